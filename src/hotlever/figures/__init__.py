@@ -20,7 +20,7 @@ from hotlever.figures.claims import (
 )
 from hotlever.figures.contact import contact_overview
 from hotlever.figures.datasets import figure_of
-from hotlever.figures.design import design_study
+from hotlever.figures.design import design_optimum, design_study
 from hotlever.figures.drawing import outlines_drawing, probe_drawing
 from hotlever.figures.fit import (
     correlation_matrix,

@@ -1,4 +1,4 @@
-"""Figures of a study of a design: curves along one number, or maps over two."""
+"""Figures of a design: curves along one number, maps over two, the best beside the start."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from hotlever.colours import BLUE, GREEN, ORANGE, PURPLE, VERMILION
-from hotlever.figures.style import entitle, figure
+from hotlever.figures.drawing import filled_regions
+from hotlever.figures.style import axis_label, entitle, figure
 from hotlever.studies.design import label_of
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from hotlever.studies.optimisation import Optimum
 
 #: Contours of a map, about.
 _LEVELS = 8
@@ -106,4 +109,41 @@ def _curves(data: xr.Dataset, labels: dict[str, str]) -> Figure:
             axes.axvline(along.attrs["base_value"], color="0.6", lw=0.8, ls=":")
         for axes in grid[1]:
             axes.set(xlabel=label_of(str(name)))
+    return made
+
+
+def design_optimum(optimum: Optimum) -> Figure:
+    """Draw the best design within bounds beside the one it began with, and their I-V curves."""
+    designs = {"start": (optimum.start, BLUE), "best": (optimum.best, VERMILION)}
+    with figure(9.0, 4.6, 2, 2, width_ratios=(1.1, 1.0)) as (made, grid):
+        curves = made.add_subplot(grid[0, 0].get_gridspec()[:, 1])
+        for axes in grid[:, 1]:
+            axes.remove()
+        handles: dict[str, Patch] = {}
+        boxes = [solved.probe.layout().box for solved, _ in designs.values()]
+        low, high = np.min([box[0] for box in boxes], 0), np.max([box[1] for box in boxes], 0)
+        for axes, (name, (solved, colour)) in zip(grid[:, 0], designs.items(), strict=True):
+            handles |= filled_regions(axes, solved.probe.layout())
+            value = f"{optimum.quantity} = {solved.value(optimum.quantity):.4g}"
+            axes.set_title(f"{name}: {value}", color=colour, parse_math=False)
+            axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+            axes.set(ylabel="y (µm)")
+            axes.grid(False)
+            u = np.linspace(0.0, solved.branch.end_u, 200)
+            shown = solved.branch.shown(u)
+            curves.plot(shown["lever_V"], shown["current_mA"], color=colour, label=name)
+            marks = {"working point": (solved.u, "o"), "knee": (solved.branch.knee_u, "^")}
+            for label, (place, mark) in marks.items():
+                if place is not None:
+                    at = solved.branch.point(place)
+                    curves.plot(
+                        at.lever_V, at.current_mA, mark, color=colour, label=f"{name}, {label}"
+                    )
+        grid[1, 0].set(xlabel="x (µm)")
+        curves.set(xlabel=axis_label("lever_V"), ylabel=axis_label("current_mA"), ylim=(0.0, None))
+        curves.legend()
+        made.legend(handles=list(handles.values()), loc="outside lower center", ncols=4)
+        limits = "; ".join(optimum.limits) or "no bound"
+        title = f"at {optimum.point}, limited by {limits}"
+        made.suptitle(title, x=0.01, ha="left", wrap=True, parse_math=False)
     return made

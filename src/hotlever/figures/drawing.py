@@ -32,11 +32,7 @@ _MARGIN, _NAME = 0.04, 0.33
 def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = None) -> Figure:
     """Draw a probe from above, with heater, reader, terminals and tip marked, or its mesh too."""
     with figure(7.0, 3.4) as (made, axes):
-        handles: dict[str, Patch | Line2D] = {}
-        for region in layout.regions:
-            colour, label = _shown_as(region)
-            axes.add_patch(_patch(region, facecolor=colour, edgecolor="0.55", lw=0.6))
-            handles.setdefault(label, Patch(facecolor=colour, edgecolor="0.55", label=label))
+        handles: dict[str, Patch | Line2D] = {**filled_regions(axes, layout)}
         if mesh is not None:
             x, y = mesh.elements.p
             axes.triplot(Triangulation(x, y, mesh.elements.t.T), color="0.25", lw=0.25)
@@ -66,6 +62,16 @@ def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = N
             made.suptitle(fill(title, _TITLE), x=0.01, ha="left", fontsize=9, parse_math=False)
         made.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
     return made
+
+
+def filled_regions(axes: Axes, layout: Layout) -> dict[str, Patch]:
+    """Draw the regions of a layout in the colours of what they are; return a key by label."""
+    handles: dict[str, Patch] = {}
+    for region in layout.regions:
+        colour, label = _shown_as(region)
+        axes.add_patch(_patch(region, facecolor=colour, edgecolor="0.55", lw=0.6))
+        handles.setdefault(label, Patch(facecolor=colour, edgecolor="0.55", label=label))
+    return handles
 
 
 def _shown_as(region: Region) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""What a change of a probe's design does: sensitivities, or a table and a figure of variations."""
+"""What a change of a probe's design does: sensitivities, variations, or the best within bounds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import DesignRequest
-from hotlever.tasks.texts import check_number, parse_varied
+from hotlever.tasks.texts import check_number, parse_bounds, parse_setting, parse_varied
 
 #: Numbers that are varied at once of which there are figures: a curve or a map.
 _DRAWN = 2
@@ -21,6 +21,10 @@ _DRAWN = 2
 
 def vary_design(reporter: Reporter, request: DesignRequest) -> None:
     """Find how knee, tip temperature and loss to air depend on a probe's design."""
+    if request.minimise is not None or request.maximise is not None:
+        return optimise_design(reporter, request)
+    if request.within is not None:
+        raise InputError("--within: goes with --minimise or --maximise")
     output, plot, outputs = request.output, request.plot, request.outputs(request.probe)
     asked: Any = {"power_mW": request.power, "air": request.air}
     check_number("--power", request.power, 1e-3, 1000)
@@ -45,7 +49,7 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
             reporter.note(
                 f"a drawing has no dimensions but these; --vary NAME=START:STOP:COUNT of {names}"
             )
-        return
+        return None
     with reporter.progress("design") as update:
         data = study.vary(start, varied, progress=update, **asked)
     reporter.note(*study.design_notes(data))
@@ -57,3 +61,35 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
         draw(plot, lambda figures: figures.design_study(data))
     if output is None:
         reporter.give(study.design_csv(data))
+    return None
+
+
+def optimise_design(reporter: Reporter, request: DesignRequest) -> None:
+    """Find the design within bounds whose quantity is least or greatest."""
+    from hotlever.studies.optimisation import optimise, optimum_text
+    from hotlever.studies.working_point import WorkingPoint
+
+    outputs = request.outputs(request.probe)
+    if request.minimise is not None and request.maximise is not None:
+        raise InputError("--minimise, --maximise: found both, expected one")
+    if request.vary is not None:
+        raise InputError("--vary: does not go with --minimise or --maximise")
+    probe = request.with_physics(read_probe(reporter, request.probe))
+    point = WorkingPoint(*parse_setting(request.at, tip=True))
+    quantity, bounds = request.minimise or request.maximise or "", parse_bounds(request.within)
+    with reporter.progress("design") as update:
+        optimum = optimise(
+            probe,
+            quantity,
+            point,
+            bounds,
+            greatest=request.maximise is not None,
+            progress=update,
+        )
+    if optimum.reason:
+        reporter.note(f"this may not be the optimum: {optimum.reason}")
+    with outputs.together():
+        if request.output is not None:
+            optimum.best.probe.to_file(request.output)
+        draw(request.plot, lambda figures: figures.design_optimum(optimum))
+    reporter.give(optimum_text(optimum) + "\n")

@@ -358,6 +358,30 @@ class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
     )
     annealing_min: float = option(ANNEALING_S / 60.0, help="Annealing (min) that the delta is of.")
     air: bool = option(True, help="Solve in air too, for k.")
+    minimise: str | None = option(
+        None,
+        metavar="QUANTITY",
+        help="Find the design whose quantity is least, such as time_constant_us; it writes a probe "
+        "file (-o FILE.toml).",
+    )
+    maximise: str | None = option(None, metavar="QUANTITY", help="Or greatest.")
+    within: list[str] | None = option(
+        None,
+        metavar="NAME=LOW:HIGH",
+        help="Bounds of a number that may change, or of a quantity (one may be left out).",
+    )
+    at: str = option(
+        "700K", metavar="POINT", help="Working point: a tip temperature, or as 8V or 2mW."
+    )
+
+    def outputs(self, *inputs: Path | None) -> Outputs:
+        """Check the files: of an optimum a probe file and a figure."""
+        if self.minimise is None and self.maximise is None:
+            return super().outputs(*inputs)
+        outputs = Outputs(*inputs)
+        outputs.file(self.output, ".toml")
+        outputs.file(self.plot, *FIGURE_TYPES)
+        return outputs
 
 
 @dataclass(kw_only=True)

@@ -149,18 +149,43 @@ def parse_timing(text: str) -> PulseTiming:
         raise error if str(error).startswith("--") else InputError(f"--pulse: {error}") from None
 
 
-def parse_setting(text: str) -> tuple[str, float]:
+def parse_setting(text: str, *, tip: bool = False) -> tuple[str, float]:
     """Parse a bias such as ``8V``, or a power such as ``2mW``, as a column and its value.
+
+    With `tip` it may be a tip temperature too.
 
     Examples
     --------
-    >>> parse_setting("8V"), parse_setting("500uW")
-    (('bias_V', 8.0), ('power_mW', 0.5))
+    >>> parse_setting("8V"), parse_setting("500uW"), parse_setting("700K", tip=True)
+    (('bias_V', 8.0), ('power_mW', 0.5), ('tip_K', 700.0))
     """
-    for column, unit in (("bias_V", "V"), ("power_mW", "mW")):
+    temperature = [("tip_K", "K")] if tip else []
+    for column, unit in (*temperature, ("bias_V", "V"), ("power_mW", "mW")):
         with suppress(InputError):
             return column, setting(text, unit, "--at", bare=unit == "V")
-    raise InputError(f"--at: found {quoted(text)}, expected a bias such as 8V or a power as 2mW")
+    also = ", or a tip temperature as 700K" if tip else ""
+    raise InputError(
+        f"--at: found {quoted(text)}, expected a bias such as 8V or a power as 2mW{also}"
+    )
+
+
+def parse_bounds(texts: Iterable[str] | None) -> dict[str, tuple[float | None, float | None]]:
+    """Parse several ``NAME=LOW:HIGH``, of which one end may be left out.
+
+    Examples
+    --------
+    >>> parse_bounds(["heater_width_um=1:3", "power_mW=:2.5"])
+    {'heater_width_um': (1.0, 3.0), 'power_mW': (None, 2.5)}
+    """
+    bounds = dict[str, tuple[float | None, float | None]]()
+    for name, text in parse_pairs("--within", texts, "NAME=LOW:HIGH").items():
+        low, colon, high = text.partition(":")
+        where = f"--within {name}"
+        if not colon:
+            raise InputError(f"{where}: found {quoted(text)}, expected LOW:HIGH, such as 1:3")
+        ends = [parse_number(end, where) if end else None for end in (low, high)]
+        bounds[name] = ends[0], ends[1]
+    return bounds
 
 
 # --- ranges: START:STOP:COUNT ---------------------------------------------------------------------

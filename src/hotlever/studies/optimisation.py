@@ -1,0 +1,356 @@
+"""The design of a lever that makes a quantity least or greatest, by exact derivatives.
+
+Sequential quadratic programming (SciPy's SLSQP; D. Kraft, DFVLR-FB 88-28 (1988)) over dimensions,
+material parameters and the series resistor, each within bounds, and with bounds on other
+quantities too. One branch is solved for each design that is tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hotlever.errors import HotleverError, InputError, unknown_name
+from hotlever.lever import Lever
+from hotlever.lever.similar import SimilarLevers
+from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of
+from hotlever.studies.working_point import QUANTITIES, SolvedDesign, WorkingPoint
+from hotlever.threads import one_blas_thread
+from hotlever.types import Array, Progress
+
+#: Designs that are tried at most, and what the objective may still change by, over its first value.
+MOST_DESIGNS, _ACCURATE = 30, 1e-6
+#: Relative change of a dimension from which on the lever is meshed anew.
+_MOVED = 0.25
+#: How near a bound is met: over its range, or over the bound of a quantity.
+_AT_BOUND = 1e-3
+#: An objective where there is no such lever, in first ones: the search steps back from it.
+_NONE = 1e3
+#: What is no number of a design: it is of the experiment.
+_NOT_OF_A_DESIGN = ("base_temperature_K",)
+
+#: From and to; None where there is no bound.
+Bounds = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A design, and the best within bounds.
+
+    Attributes
+    ----------
+    quantity : str
+        What was made least or greatest.
+    point : WorkingPoint
+    bounds : mapping of str to tuple
+        Of numbers of the design and of quantities.
+    start, best : SolvedDesign
+        Each on a mesh of its own.
+    limits : tuple of str
+        The bounds that the best design is at, of those whose removal would make it better.
+    designs : int
+        How many were tried, a branch each.
+    reason : str
+        Why it may not be the optimum; empty if it is one.
+    """
+
+    quantity: str
+    point: WorkingPoint
+    bounds: Mapping[str, Bounds]
+    start: SolvedDesign
+    best: SolvedDesign
+    limits: tuple[str, ...]
+    designs: int
+    reason: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The numbers that were varied."""
+        return tuple(name for name in self.bounds if name not in QUANTITIES)
+
+    def values(self, solved: SolvedDesign) -> dict[str, float]:
+        """Return the numbers that were varied, and all quantities, of one of both designs."""
+        varied = dict(zip(self.names, solved.probe.values(self.names).tolist(), strict=True))
+        return varied | {quantity: solved.value(quantity) for quantity in QUANTITIES}
+
+
+@one_blas_thread
+def optimise(
+    probe: Probe,
+    quantity: str,
+    point: WorkingPoint,
+    bounds: Mapping[str, Bounds],
+    *,
+    greatest: bool = False,
+    progress: Progress | None = None,
+) -> Optimum:
+    """Find the design within bounds whose quantity is least, or greatest.
+
+    Parameters
+    ----------
+    probe : Probe
+        The design to start from. A number of it outside its bounds starts at the nearer one.
+    quantity : str
+        One of `hotlever.studies.working_point.QUANTITIES`.
+    point : WorkingPoint
+    bounds : mapping of str to tuple of float
+        From and to, of numbers of the design, see `hotlever.probe.parameters`, of which there must
+        be one, and of quantities, where either may be None.
+    greatest : bool
+    progress : callable, optional
+        Called with the designs tried and how many there may be.
+
+    Raises
+    ------
+    InputError
+        If a name does not exist, or bounds are none.
+    ComputationError
+        If the design to start from cannot be solved, or has no such quantity.
+
+    Notes
+    -----
+    In air, what it takes up from a place is taken as fixed where derivatives by dimensions are
+    concerned; the values themselves are not. The optimum is a local one.
+    """
+    from scipy.optimize import minimize  # heavy for what else imports this
+
+    probe.circuit.need_cold_start("a study of a design")
+    _check(probe, quantity, bounds)
+    search = _Search(probe, quantity, point, bounds, greatest, progress)
+    start = np.clip(search.share(probe.values(search.names)), 0.0, 1.0)
+    search.solved(start)  # whatever is wrong with the first design is an error
+    reason = ""
+    try:
+        result: Any = minimize(
+            search.objective,
+            start,
+            jac=search.objective_by,
+            method="SLSQP",
+            bounds=[(0.0, 1.0)] * len(search.names),
+            constraints=search.constraints,
+            options={"ftol": _ACCURATE, "maxiter": MOST_DESIGNS},
+        )
+        reason = "" if result.success else result.message[:1].lower() + result.message[1:]
+    except _EnoughDesigns:
+        reason = f"{MOST_DESIGNS} designs were tried without coming to rest"
+    if search.best is None:
+        raise InputError(
+            f"no design was found within {_told(search.limited)}; expected wider bounds, or more "
+            "numbers that may change"
+        )
+    best = search.remade(search.best)
+    limits = search.limits(search.best)
+    first = SolvedDesign(SimilarLevers(Lever(probe)), probe, point)
+    return Optimum(quantity, point, bounds, first, best, limits, search.designs, reason)
+
+
+def _check(probe: Probe, quantity: str, bounds: Mapping[str, Bounds]) -> None:
+    if quantity not in QUANTITIES:
+        raise unknown_name("quantity", quantity, QUANTITIES)
+    numbers = [name for name in parameters_of(probe) if name not in _NOT_OF_A_DESIGN]
+    for name, (low, high) in bounds.items():
+        if name not in (*numbers, *QUANTITIES):
+            raise unknown_name("name", name, (*numbers, *QUANTITIES))
+        if name in QUANTITIES and low is None and high is None:
+            raise InputError(f"{name}: found no bound, expected one at least")
+        if name not in QUANTITIES and (low is None or high is None):
+            raise InputError(f"{name}: found one bound, expected both of a number that may change")
+        if low is not None and high is not None and not low < high:
+            raise InputError(f"{name}: found {low:g} to {high:g}, expected a rising range")
+    if not any(name not in QUANTITIES for name in bounds):
+        raise InputError("found no number that may change, expected bounds of one at least")
+
+
+def _told(bounds: Mapping[str, Bounds]) -> str:
+    texts = [
+        f"{name} from {low:g} to {high:g}"
+        if low is not None and high is not None
+        else f"{name} {'above' if high is None else 'below'} {low if high is None else high:g}"
+        for name, (low, high) in bounds.items()
+    ]
+    return " and ".join(texts)
+
+
+class _EnoughDesigns(Exception):
+    """So many designs were tried as may be."""
+
+
+class _Search:
+    """Designs as the optimiser sees them: shares of the ranges of their numbers."""
+
+    def __init__(
+        self,
+        probe: Probe,
+        quantity: str,
+        point: WorkingPoint,
+        bounds: Mapping[str, Bounds],
+        greatest: bool,
+        progress: Progress | None,
+    ) -> None:
+        self._probe, self._point, self._progress = probe, point, progress
+        self._quantity, self._sign = quantity, -1.0 if greatest else 1.0
+        self.names = tuple(name for name in bounds if name not in QUANTITIES)
+        ranges: Any = [bounds[name] for name in self.names]
+        self._low, self._high = np.array(ranges, dtype=float).T
+        self.limited = {name: both for name, both in bounds.items() if name in QUANTITIES}
+        self.designs, self._scale, self._least = 0, 1.0, np.inf
+        self.best: Array | None = None
+        self._similar: SimilarLevers | None = None
+        self._last: tuple[Array, SolvedDesign | None] | None = None
+
+    def share(self, values: Array) -> Array:
+        """Return where values of the numbers are in their ranges, (p,)."""
+        return np.asarray((values - self._low) / (self._high - self._low))
+
+    def probe_at(self, share: Array) -> Probe:
+        """Return the probe of a design."""
+        values = self._low + share * (self._high - self._low)
+        return self._probe.with_(**dict(zip(self.names, values.tolist(), strict=True)))
+
+    def remade(self, share: Array) -> SolvedDesign:
+        """Return a design solved on a mesh of its own, with what limits it differentiable."""
+        probe = self.probe_at(share)
+        return SolvedDesign(SimilarLevers(Lever(probe)), probe, self._point, self.names)
+
+    # --- what the optimiser asks ------------------------------------------------------------------
+
+    def objective(self, share: Array) -> float:
+        """Return the quantity in units of the first design's, to be made small."""
+        return self._or_none(share, lambda solved: self._sign * self._value(solved) / self._scale)
+
+    def objective_by(self, share: Array) -> Array:
+        """Return its derivatives by the shares, (p,)."""
+        return self._sign / self._scale * self._by_share(self._quantity, share)
+
+    @property
+    def constraints(self) -> list[dict[str, Any]]:
+        """The bounds on quantities, each as what must not be negative."""
+        return [
+            {
+                "type": "ineq",
+                "fun": self._room,
+                "jac": self._room_by,
+                "args": (name, bound, sign),
+            }
+            for name, both in self.limited.items()
+            for bound, sign in zip(both, (1.0, -1.0), strict=True)
+            if bound is not None
+        ]
+
+    def _room(self, share: Array, name: str, bound: float, sign: float) -> float:
+        room = self.solved_or_none(share)
+        if room is None:
+            return 0.0
+        return sign * (room.value(name) - bound) / (abs(bound) or 1.0)
+
+    def _room_by(self, share: Array, name: str, bound: float, sign: float) -> Array:
+        return sign / (abs(bound) or 1.0) * self._by_share(name, share)
+
+    def _or_none(self, share: Array, of: Callable[[SolvedDesign], float]) -> float:
+        solved = self.solved_or_none(share)
+        value = _NONE if solved is None else float(of(solved))
+        return value if np.isfinite(value) else _NONE
+
+    def _by_share(self, quantity: str, share: Array) -> Array:
+        solved = self.solved_or_none(share)
+        if solved is None:
+            return np.zeros(share.size)
+        return np.nan_to_num(solved.gradient(quantity) * (self._high - self._low))
+
+    # --- solving ----------------------------------------------------------------------------------
+
+    def solved_or_none(self, share: Array) -> SolvedDesign | None:
+        """Return a design solved, None if there is no such lever."""
+        if self._last is None or not np.array_equal(self._last[0], share):
+            try:
+                self.solved(share)
+            except HotleverError:
+                self._last = share.copy(), None
+        return self._last[1] if self._last else None
+
+    def solved(self, share: Array) -> SolvedDesign:
+        """Return a design solved, on the last mesh moved if that can follow."""
+        if self.designs == MOST_DESIGNS:
+            raise _EnoughDesigns
+        self.designs += 1
+        if self._progress is not None:
+            self._progress(self.designs, MOST_DESIGNS)
+        probe = self.probe_at(share)
+        if not self._follows(probe):
+            self._similar = SimilarLevers(Lever(probe))
+        assert self._similar is not None
+        solved = SolvedDesign(self._similar, probe, self._point, self.names)
+        value = self._value(solved)
+        if self.designs == 1:
+            self._scale = abs(value) or 1.0
+        self._last = share.copy(), solved
+        within = all(
+            self._room(share, *constraint["args"]) >= -_AT_BOUND for constraint in self.constraints
+        )
+        if within and self._sign * value < self._least:
+            self._least, self.best = self._sign * value, share.copy()
+        return solved
+
+    def _follows(self, probe: Probe) -> bool:
+        if self._similar is None:
+            return False
+        drawn, now = (each.values(self.names) for each in (self._similar.drawn, probe))
+        return bool(np.all(np.abs(now - drawn) <= _MOVED * np.abs(drawn)))
+
+    def _value(self, solved: SolvedDesign) -> float:
+        return solved.value(self._quantity)
+
+    # --- what limits a design ---------------------------------------------------------------------
+
+    def limits(self, share: Array) -> tuple[str, ...]:
+        """Return the bounds that a design is at and would be better beyond.
+
+        Of a number, as far as the bounds on quantities that are met leave it free: the objective's
+        derivatives without what these hold, by least squares.
+        """
+        met = [
+            each["args"]
+            for each in self.constraints
+            if self._room(share, *each["args"]) < _AT_BOUND
+        ]
+        by = self.objective_by(share)
+        if met:
+            held = np.array([self._room_by(share, *args) for args in met])
+            by = by - np.linalg.lstsq(held.T, by, rcond=None)[0] @ held
+        texts = []
+        for name, here, slope, *ends in zip(
+            self.names, share, by, self._low, self._high, strict=True
+        ):
+            if here < _AT_BOUND and slope > 0:
+                texts.append(f"{name} at its least, {ends[0]:g}")
+            elif here > 1.0 - _AT_BOUND and slope < 0:
+                texts.append(f"{name} at its most, {ends[1]:g}")
+        quantities = [
+            f"{name} at its {'least' if sign > 0 else 'most'}, {bound:g}"
+            for name, bound, sign in met
+        ]
+        return (*texts, *quantities)
+
+
+def optimum_text(optimum: Optimum) -> str:
+    """Return start and best of a design, and what limits it, as lines of text."""
+    start, best = optimum.values(optimum.start), optimum.values(optimum.best)
+    width = max(map(len, start))
+    limits = "; ".join(optimum.limits) or "no bound: the derivatives vanish"
+    lines = [
+        f"{optimum.quantity} at {optimum.point}: {start[optimum.quantity]:.4g} -> "
+        f"{best[optimum.quantity]:.4g}, in {optimum.designs} designs",
+        f"limited by {limits}",
+        "",
+        f"{'':<{width}}  {'start':>10}  {'best':>10}",
+    ]
+    cells = {
+        name: [f"{values[name]:.4g}" if np.isfinite(values[name]) else "-" for values in both]
+        for both in ((start, best),)
+        for name in start
+    }
+    return "\n".join(lines + [f"{n:<{width}}  {a:>10}  {b:>10}" for n, (a, b) in cells.items()])

@@ -1,0 +1,98 @@
+"""Designs by gradient: derivatives against differences, optima against what they must be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever import Lever, Probe
+from hotlever.lever.similar import SimilarLevers
+from hotlever.studies.optimisation import MOST_DESIGNS, optimise
+from hotlever.studies.working_point import QUANTITIES, SolvedDesign, WorkingPoint
+
+NAMES = ("heater_length_um", "series_resistance_ohm")
+#: Of the knee of a curve through states, differences are known less well.
+OF_KNEE = {"knee_K": 2e-2, "knee_distance_K": 2e-2, "knee_mA": 1e-2, "knee_mW": 1e-2}
+
+
+@pytest.fixture(scope="module")
+def similar(coarse: Lever) -> SimilarLevers:
+    return SimilarLevers(coarse)
+
+
+@pytest.mark.parametrize("column", ["tip_K", "bias_V", "power_mW"])
+def test_derivatives_are_those_of_differences(similar, column):
+    probe = similar.drawn
+    point = WorkingPoint(column, {"tip_K": 700.0, "bias_V": 6.0, "power_mW": 1.5}[column])
+    solved = SolvedDesign(similar, probe, point, NAMES)
+    own = [name for name in QUANTITIES if not name.startswith("knee_")]
+    quantities = QUANTITIES if column == "tip_K" else own
+    exact = {quantity: solved.gradient(quantity) for quantity in quantities}
+    for number, name in enumerate(NAMES):
+        value = float(probe.values([name])[0])
+        step = 2e-3 * value
+        above, below = (
+            SolvedDesign(similar, probe.replace({name: value + way}), point)
+            for way in (step, -step)
+        )
+        for quantity in quantities:
+            here = solved.value(quantity)
+            change = (above.value(quantity) - below.value(quantity)) / (2.0 * step)
+            if quantity == "knee_distance_V":  # a small difference of two large ones
+                here = solved.value("knee_bias_V")
+            relative = (exact[quantity][number] - change) * value / here
+            assert relative == pytest.approx(0.0, abs=OF_KNEE.get(quantity, 3e-3)), quantity
+    if column == "bias_V":
+        assert exact["bias_V"] == pytest.approx(np.zeros(2), abs=1e-12)
+
+
+def test_the_greatest_power_is_that_of_a_matched_load():
+    """Whatever heats in it, a lever takes at most V_b²/4R_s, where V_l is half the bias."""
+    point, bounds = WorkingPoint("bias_V", 8.0), {"heater_length_um": (2.0, 8.0)}
+    optimum = optimise(Probe.reference(), "power_mW", point, bounds, greatest=True)
+    most = 8.0**2 / (4.0 * Probe.reference().circuit.series_kohm)
+    assert optimum.best.value("power_mW") == pytest.approx(most, rel=1e-5)
+    assert optimum.best.value("lever_V") == pytest.approx(4.0, rel=1e-3)
+    assert optimum.limits == ()
+    assert not optimum.reason
+    assert optimum.designs <= MOST_DESIGNS
+
+
+def test_a_bound_on_another_quantity_limits_the_design():
+    point = WorkingPoint("tip_K", 700.0)
+    bounds = {"heater_length_um": (2.0, 8.0), "bias_V": (7.0, None)}
+    optimum = optimise(Probe.reference(), "power_mW", point, bounds)
+    # without it, the longest heater would take the least power
+    assert optimum.limits == ("bias_V at its least, 7",)
+    assert optimum.best.value("bias_V") == pytest.approx(7.0, rel=1e-3)
+    assert optimum.best.value("power_mW") < optimum.start.value("power_mW")
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--minimise", "powr_mW", "--within", "n_d=1e17:1e18"], "did you mean 'power_mW'?"),
+        (["--minimise", "power_mW"], "expected bounds of one at least"),
+        (["--minimise", "power_mW", "--within", "n_d=1e17"], "expected LOW:HIGH"),
+        (["--minimise", "power_mW", "--within", "n_d=1e17:"], "expected both"),
+        (["--minimise", "power_mW", "--within", "n_d=2e17:1e17"], "expected a rising range"),
+        (["--minimise", "power_mW", "--maximise", "tip_K"], "found both, expected one"),
+        (["--within", "n_d=1e17:1e18"], "goes with --minimise"),
+        (["--minimise", "power_mW", "--at", "7kg"], "or a tip temperature as 700K"),
+        (["--minimise", "power_mW", "-o", "best.csv"], "expected .toml"),
+    ],
+)
+def test_what_cannot_be_is_one_line(run, words, expected):
+    status, out, err = run("design", *words)
+    assert (status, out) == (2, "")
+    assert expected in err
+    assert len(err.splitlines()) == 1
+
+
+def test_the_command_writes_a_probe_file_and_a_figure(run, tmp_path):
+    words = ["--maximise", "power_mW", "--at", "8V", "--within", "heater_length_um=3:5"]
+    status, out, err = run("design", *words, "-o", "best.toml", "--plot", "best.png")
+    assert status == 0, err
+    assert "limited by heater_length_um at its most, 5" in out
+    assert Probe.from_file(tmp_path / "best.toml").shape.heater_length_um == pytest.approx(5.0)
+    assert (tmp_path / "best.png").stat().st_size > 10_000
