@@ -58,6 +58,8 @@ class LivePage(Page):
                 self._remarks = ui.label().classes("text-sm remark")
                 with ui.column().classes("w-full gap-1") as self._drawn:
                     self._plots = plots()
+                # plots without data would be of nothing
+                self._drawn.set_visibility(False)
                 with ui.card().classes("w-full last").props("flat bordered"):
                     ui.label("Take it with you").classes("text-bold")
                     self.kind_buttons(lambda kind: self.run(self._writing(kind)), DrawnPage.kinds)
@@ -179,8 +181,12 @@ class LivePage(Page):
         model, remark = self.said(answer, quick)
         self._model.set_text(model)
         self._remarks.set_text("; ".join(filter(None, [remark, *notes])))
-        self._drawn.set_visibility(True)
         self._plots.show(answer)
+        if not self._drawn.visible:
+            self._drawn.set_visibility(True)
+            # what was hidden had no size that figures could be drawn for
+            resized = "setTimeout(() => window.dispatchEvent(new Event('resize')))"
+            self._drawn.client.run_javascript(resized)
         return True
 
     def _blank(self) -> None:
