@@ -218,3 +218,13 @@ def test_melting_points_that_cannot_be(probe, measured, changes, message):
         columns[name][-1] = value
     with pytest.raises(InputError, match=message):
         fit(replace(measured, **columns), probe)
+
+
+def test_melting_points_that_contradict_each_other_are_no_estimate(probe, measured):
+    other = replace(measured, surface_K=measured.surface_K + 40.0 * (measured.bias_V == BIAS[6]))
+    known = {"fixed": dict.fromkeys(usual_parameters(probe)), "priors": {INTERFACE: "×/ 10"}}
+    with on_coarse_meshes():
+        result = fit(other, probe, **known)
+    assert result.describes_data is False
+    assert "melting is off by" in result.reason
+    assert result.parameters[INTERFACE].stderr is None

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import chdtrc
 
 from hotlever.estimation.residuals import Residuals
-from hotlever.measurands import FITTED
+from hotlever.measurands import FITTED, OF_A_CONTACT
 from hotlever.measurement.data import noise_about_neighbours
 from hotlever.types import Array
 
@@ -20,6 +21,8 @@ _HELD_SCATTER = 0.01
 #: Outliers stand alone: so many neighbours that are off by more than so many standard deviations
 #: are none; nor are one fewer at the end, with nothing beyond.
 _NEIGHBOURS, _FAR = 3, 8.0
+#: Temperatures of a contact are off where by chance one lever in so many is.
+_UNLIKELY = 2e-4
 #: Fewer rows tell nothing of their neighbours.
 _ROWS = 7
 #: A datum is named as an outlier beyond this many standard deviations, and so many of those
@@ -64,6 +67,23 @@ def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
             return (
                 f"{name} differs by {runs.max():.1%} of its largest value in neighbouring rows, "
                 f"from {run[0]:.3g} to {run[-1]:.3g} {residuals.unit}"
+            )
+    return _contradiction(residuals, values)
+
+
+def _contradiction(residuals: Residuals, values: Array) -> str:
+    """Return where temperatures of a contact are off by more than their errors; empty if none are.
+
+    Their errors are stated, or else their own scatter. Few as they are, each has its weight.
+    """
+    away = residuals.difference(values) / residuals.errors.scale
+    for name, row in zip(residuals.observables, away, strict=True):
+        present = np.isfinite(row)
+        if name in OF_A_CONTACT and chdtrc(present.sum(), np.sum(row[present] ** 2)) < _UNLIKELY:
+            worst = int(np.nanargmax(np.abs(row)))
+            return (
+                f"{name} is off by {abs(row[worst]):.1f} standard errors at "
+                f"{residuals.along[worst]:.3g} {residuals.unit}"
             )
     return ""
 
