@@ -88,8 +88,8 @@ def loops(name: str, state: State, sign: float) -> None:
             others = [other.real for other in seen if abs(other.imag) < 0.1 * pole.imag]
             late = slice(TIMES // 5, None)
             truth = fitted(at[late], off[late], pole, (others or [3.0 * pole.real])[0])
-            error = (pole.real / truth.real - 1.0, pole.imag / truth.imag - 1.0)
-            row += f" {error[0]:+9.2%} {error[1]:+9.2%}"
+            error = (pole - truth) / abs(truth)
+            row += f" {error.real:+9.2%} {error.imag:+9.2%}"
         else:
             row += 2 * f" {'–':>9}"
         print(f"{row} {whole:9.2%}")
@@ -133,7 +133,12 @@ def main() -> None:
         tips = ", ".join(f"{state.tip_K:.1f}" for state in held.states)
         told = [f"{error:.0e}" for error in errors]
         print(f"{name:15} tips {tips} K: {', '.join(told)} ({took:.2f} s)")
-    print("\npoles (1/µs) beside steps in time: errors of decay and frequency, of the whole answer")
+    print(
+        "\npoles (1/µs) beside steps in time: errors of decay and frequency as shares of the pole"
+    )
+    print(
+        "and of the whole answer; of loops that grow, whose steps are small, those of the steps too"
+    )
     print(f"{'lever':15} {'tip_K':>7} {'P':>6} {'I':>8} {'decay':>9} {'freq.':>8}", end="")
     print(f" {'decay':>9} {'freq.':>9} {'answer':>9}")
     for name, held in found.items():
