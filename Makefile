@@ -8,6 +8,11 @@
 FORM ?= full
 BIN := .venv/bin
 
+# Tests run side by side and start many processes: linear algebra with more than one thread in each
+# would wait for the others, and what all of them import is compiled once.
+test test-slow test-app: export OPENBLAS_NUM_THREADS := 1
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: test test-slow test-app test-hostile test-pythons reproduce docs lock env clean
 
 env: .venv/.ready
@@ -27,7 +32,7 @@ test-slow: env
 
 test-app: env
 	sh tools/get_chromium.sh
-	$(BIN)/python -m pytest -m browser -p no:cacheprovider tests/app tests/report
+	$(BIN)/python -m pytest -m browser -p no:cacheprovider -n 2 --dist loadfile tests/app tests/report
 
 test-hostile: env
 	HOTLEVER_HOSTILE=1 $(BIN)/python -m pytest tests/hostile -rP

@@ -6,7 +6,9 @@ for browser in chromium chromium-browser google-chrome; do
 done
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
     echo "chromium is missing: installing it"
-    apt-get update -qq && apt-get install -y -qq chromium
+    apt-get update -qq
+    # what it recommends serves a desktop (printers, notifications): 89 packages more
+    apt-get install -y -qq --no-install-recommends chromium fonts-liberation
 else
     echo "no Chromium here, and not root: the tests in a browser will be skipped"
 fi

@@ -27,7 +27,8 @@ def levers(draw):
         (0, -outer), (long + front, -narrow / 2 - wide / 3), (long + 2 * front, 0),
         (long + front, narrow / 2 + wide / 3),
     ]  # fmt: skip
-    half = draw(length(0.1, 0.5)) * narrow
+    # a side that starts at the very corner of the front would cut a wedge off too thin to be meant
+    half = draw(length(0.1, 0.49)) * narrow
     lean = draw(length(-0.8, 0.8)) * half
     heater = [
         (long - 1, -half), (long + 3 * front, -half - lean),

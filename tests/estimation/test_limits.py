@@ -115,6 +115,17 @@ def test_what_is_linear_has_the_linearised_error():
     np.testing.assert_allclose([TIPS - low, high - TIPS], [BAND * SLOPES] * 2)
 
 
+@pytest.mark.parametrize("moved", [[0.0, 0.0, 0.0], [0.0, 10.0, 0.0]])
+def test_a_tip_that_nothing_unknown_moves_is_known_exactly(moved, monkeypatch):
+    monkeypatch.setattr(f"{__name__}.SLOPES", np.array(moved))
+    known = profile(0.12)
+    fixed = np.array(moved) == 0.0
+    low, high = known.credible_interval(TIPS, np.array(moved), np.zeros(3))
+    np.testing.assert_array_equal(low[fixed], TIPS[fixed])
+    np.testing.assert_array_equal(high[fixed], TIPS[fixed])
+    assert (high[~fixed] > TIPS[~fixed]).all()
+
+
 @pytest.mark.parametrize("bend", [0.12, -0.15])
 def test_what_bends_has_other_limits_either_way(bend):
     found = profile(bend)

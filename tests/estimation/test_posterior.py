@@ -117,6 +117,12 @@ def test_rhat_sees_chains_that_differ_in_place_or_in_width():
     assert split_rhat(draws + np.linspace(0, 3, 2000)) > 1.2
 
 
+def test_chains_of_what_is_held_agree():
+    """Without n_d and p among what is varied, the inversion temperature is one number."""
+    assert split_rhat(np.full((4, 100), 830.0)) == 1.0
+    assert split_rhat(np.repeat([[830.0], [831.0]], 100, axis=1)) > 100.0
+
+
 def test_effective_sample_size_of_an_autoregressive_chain():
     """x' = φ x + noise has (1 − φ) / (1 + φ) effective draws for each."""
     rng, phi = np.random.default_rng(0), 0.8

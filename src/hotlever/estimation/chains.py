@@ -98,6 +98,8 @@ def _rhat_of_ranks(chains: Array) -> float:
     scores = ndtri((ranks - 0.375) / (chains.size + 0.25))
     within = scores.var(axis=1, ddof=1).mean()
     between = scores.mean(axis=1).var(ddof=1)
+    if within == 0.0:  # of what is held chains show one value, and agree
+        return 1.0 if between == 0.0 else math.inf
     return float(np.sqrt((draws - 1) / draws + between / within))
 
 

@@ -93,19 +93,20 @@ def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile
     On either side the lever is solved whose tip is moved away where it is hottest; what is near it
     serves the other biases. What the optimum tells of levers so far away does not hold where
     parameters make up for each other along a bent valley. Where no such lever is found the
-    linearised error is kept.
+    linearised error is kept, and where nothing that is unknown moves the tip there is none.
     """
     objective, at, rows = posterior.objective, posterior.at, hotter_rows(posterior.at)
     least = objective.squares(at)
-    tips = [TipTemperature(int(row)) for row in rows]
+    tips = {number: TipTemperature(int(row)) for number, row in enumerate(rows)}
+    moving = {number: tip for number, tip in tips.items() if posterior.of(tip)[1] > 0.0}
     sides = np.ones((2, rows.size))
-    for side, way in enumerate((-1.0, 1.0)):
-        penalised = [objective.penalised(_penalty(posterior, tip, way)) for tip in tips]
+    for side, way in enumerate((-1.0, 1.0) if moving else ()):
+        penalised = [objective.penalised(_penalty(posterior, tip, way)) for tip in moving.values()]
         near = _solved_near(penalised[-1], posterior, experiment)
         if near is None:
             continue
-        for number, tip in enumerate(tips):
-            there, _ = near.of(penalised[number]).minimum()
+        for pulled, (number, tip) in zip(penalised, moving.items(), strict=True):
+            there, _ = near.of(pulled).minimum()
             value, stderr = posterior.of(tip)
             away = abs(tip.value(near.shown(there), there) - value)
             rise = max(near.squares(there) - least, _LEAST_RISE)
