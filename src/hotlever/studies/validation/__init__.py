@@ -1,0 +1,1 @@
+"""Published numbers of other levers and of their materials, predicted and compared."""

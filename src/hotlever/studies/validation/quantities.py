@@ -1,0 +1,190 @@
+"""What a published number may be of: each a short function of a lever, or of a law's arguments.
+
+Those of levers solve them on the coarse mesh, within 2 K of the usual one.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from hotlever.contact.cone import cold_resistance
+from hotlever.contact.spreading import contact_resistance
+from hotlever.lever import Branch, Lever
+from hotlever.lever.lever import COARSE
+from hotlever.lever.transient.modes import slowest_modes
+from hotlever.materials.air import thermal_conductivity_of_air
+from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
+from hotlever.probe import Probe
+from hotlever.probe.tip import EXAMPLE
+from hotlever.raman import anharmonic
+from hotlever.units import PER_CM_TO_MILLI_PER_UM
+
+_PER_K_PER_W, _ROOM_K = 1e-3, 300.0
+#: mW/(µm² K) to W/(m² K).
+_PER_AREA = 1e9
+#: Unit of what lies between zero and one.
+_SHARE = "share"
+
+
+class Quantity(NamedTuple):
+    """What is predicted: a positive number, or a share."""
+
+    unit: str
+    meaning: str
+    compute: Callable[..., float]
+
+    @property
+    def is_share(self) -> bool:
+        """Whether it lies between zero and one."""
+        return self.unit == _SHARE
+
+    @property
+    def given(self) -> dict[str, bool]:
+        """Its arguments beside the lever, and whether each must be given."""
+        parameters = inspect.signature(self.compute).parameters
+        return {
+            name: parameter.default is inspect.Parameter.empty
+            for name, parameter in parameters.items()
+            if name != "probe"
+        }
+
+    @property
+    def of_a_lever(self) -> bool:
+        """Whether it needs a probe."""
+        return "probe" in inspect.signature(self.compute).parameters
+
+
+def _both_media(probe: Probe, tip_K: float) -> tuple[float, float]:
+    """Return the powers (mW) that heat the tip so far in vacuum and in the probe's air."""
+    lever = Lever(probe.in_medium("vacuum"), COARSE)
+    in_air = Lever(probe.in_medium("air"), COARSE, space=lever.space)
+    vacuum, air = (float(each.branch(tip_K).power(tip_K)) for each in (lever, in_air))
+    return vacuum, air
+
+
+def power_ratio_in_air(probe: Probe, *, tip_K: float) -> float:
+    """Power in air over that in vacuum at the same tip temperature, the paper's k."""
+    vacuum, air = _both_media(probe, tip_K)
+    return air / vacuum
+
+
+def share_into_air(probe: Probe, *, tip_K: float) -> float:
+    """Share of the power that leaves through the air instead of the leg ends, by the paper's k."""
+    vacuum, air = _both_media(probe, tip_K)
+    return 1.0 - vacuum / air
+
+
+def time_constant(probe: Probe, *, tip_K: float) -> float:
+    """Slowest time constant with the tip at a temperature, at constant power."""
+    lever = Lever(probe, COARSE)
+    branch = lever.branch(tip_K)
+    (state,) = lever.solve([float(branch.bias(tip_K, probe.circuit))])
+    constants, _ = slowest_modes(state, "power", 1)
+    return float(constants[0])
+
+
+def resistance_ratio(probe: Probe, *, power_mW: float, from_mW: float) -> float:
+    """Resistance of the lever at a power over that at a lower one."""
+    branch = _reaching(Lever(probe, COARSE), power_mW)
+    tip_K = branch.tip_temperature([from_mW, power_mW])
+    low, high = branch.lever_voltage(tip_K) / branch.current(tip_K)
+    return float(high / low)
+
+
+def _reaching(lever: Lever, power_mW: float) -> Branch:
+    branch = lever.branch_past_knee()
+    return branch if branch.highest_power_mW >= power_mW else lever.branch()
+
+
+def air_coefficient(probe: Probe) -> float:
+    """Heat that an evenly warm lever gives to the air, by area of both faces and rise."""
+    air = Lever(probe.in_medium("air"), COARSE).space.air
+    base_K = probe.circuit.base_temperature_K
+    kappa = PER_CM_TO_MILLI_PER_UM * float(thermal_conductivity_of_air(base_K)[0])
+    heat, _ = air.heat(np.full((len(air.operator.sites), 1), kappa))
+    area = sum(region.area for region in probe.layout().regions)
+    return _PER_AREA * float(heat[0]) * probe.surroundings.gas_conductivity / (2.0 * area)
+
+
+def layer_conductivity(*, thickness_um: float, temperature_K: float, scale: float) -> float:
+    """Thermal conductivity of a silicon layer along its plane."""
+    return 100.0 * scale * float(thermal_conductivity_of_layer(temperature_K, thickness_um)[0])
+
+
+def raman_softening(
+    *, temperature_K: float, reference_K: float, three_phonon: float, four_phonon: float
+) -> float:
+    """Wavenumbers by which silicon's Raman line is lower than at a reference temperature."""
+    moved, _ = anharmonic.shift(temperature_K, reference_K, three_phonon, four_phonon)
+    return -float(moved)
+
+
+def two_sided_contact(*, radius_um: float, kappa: float, other_kappa: float) -> float:
+    """Resistance of a contact of two bodies, by spreading in each."""
+    both = sum(contact_resistance(radius_um, [each]) for each in (kappa, other_kappa))
+    return both / _PER_K_PER_W
+
+
+def spreading_resistance(*, radius_um: float, kappa: float) -> float:
+    """Resistance that a tip meets as heat spreads in a sample."""
+    return contact_resistance(radius_um, [kappa]) / _PER_K_PER_W
+
+
+def surface_share(
+    *,
+    radius_um: float,
+    kappa: float,
+    interface_K_per_W: float,
+    tip_K_per_W: float | None = None,
+) -> float:
+    """Rise of the sample's surface under a tip over that of the heater; silicon is the usual tip."""
+    interface = _PER_K_PER_W * interface_K_per_W
+    below = contact_resistance(radius_um, [kappa], (), interface)
+    if tip_K_per_W is None:
+        tip = cold_resistance(EXAMPLE.with_(apex_radius_um=radius_um), _ROOM_K)
+    else:
+        tip = _PER_K_PER_W * tip_K_per_W
+    return (below - interface) / (tip + below)
+
+
+def surface_share_on_another(*, share: float, kappa: float, on_kappa: float) -> float:
+    """Rise of a surface over that of the heater by that on another sample, all else the same.
+
+    Tip and interface are one resistance, fitted to the other sample.
+    """
+    fitted = (1.0 / share - 1.0) / kappa
+    return 1.0 / (1.0 + on_kappa * fitted)
+
+
+def heat_conductance_of_contact(
+    *, radius_um: float, kappa: float, interface_m2K_per_W: float, height_um: float
+) -> float:
+    """Conductance from the heater through a silicon tip into a sample, in vacuum."""
+    interface = 1e9 * interface_m2K_per_W / (np.pi * radius_um**2)
+    tip = EXAMPLE.with_(apex_radius_um=radius_um, height_um=height_um)
+    below = contact_resistance(radius_um, [kappa], (), interface)
+    return 1e6 / (cold_resistance(tip, _ROOM_K) + below)
+
+
+#: By the names that cases have for them.
+QUANTITIES = {
+    function.__name__: Quantity(unit, (function.__doc__ or "").partition(".")[0], function)
+    for function, unit in (
+        (power_ratio_in_air, "1"),
+        (share_into_air, _SHARE),
+        (time_constant, "µs"),
+        (resistance_ratio, "1"),
+        (air_coefficient, "W/(m² K)"),
+        (layer_conductivity, "W/(m K)"),
+        (raman_softening, "cm⁻¹"),
+        (two_sided_contact, "K/W"),
+        (spreading_resistance, "K/W"),
+        (surface_share, _SHARE),
+        (surface_share_on_another, _SHARE),
+        (heat_conductance_of_contact, "nW/K"),
+    )
+}
