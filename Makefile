@@ -3,6 +3,7 @@
 # make test-pythons  sdist, wheel and some tests on every Python from 3.11 on that is there
 # make test-hostile  12 000 hostile files and arguments, full disks, kills: half an hour
 # make reproduce  the main job: the paper's results as one page in reproduce/
+# make validate   published numbers of other levers, predicted and compared, as one page in validate/
 # make docs       the documentation as a site in docs/_build/
 # Each makes the environment in .venv first. FORM=quick shortens reproduce.
 FORM ?= full
@@ -13,7 +14,7 @@ BIN := .venv/bin
 test test-slow test-app: export OPENBLAS_NUM_THREADS := 1
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: test test-slow test-app test-hostile test-pythons reproduce docs lock env clean
+.PHONY: test test-slow test-app test-hostile test-pythons reproduce validate docs lock env clean
 
 env: .venv/.ready
 
@@ -43,6 +44,9 @@ test-pythons: env
 reproduce: env
 	$(BIN)/hotlever reproduce -o reproduce $(if $(filter quick,$(FORM)),--quick)
 
+validate: env
+	$(BIN)/hotlever validate -o validate
+
 docs: env
 	$(BIN)/python -m sphinx --quiet -W --keep-going -n -d docs/_build/.doctrees docs docs/_build
 
@@ -52,4 +56,4 @@ lock: env
 	    --no-header --all-extras --output-file requirements.lock pyproject.toml
 
 clean:
-	rm -rf .venv build reproduce docs/_build benchmarks/results tests/app/screenshots
+	rm -rf .venv build reproduce validate docs/_build benchmarks/results tests/app/screenshots

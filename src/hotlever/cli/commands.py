@@ -35,6 +35,7 @@ _MODULES = {
     "reproduce": "reproduce",
     "spectrum": "levers",
     "sweep": "levers",
+    "validate": "validate",
 }
 
 

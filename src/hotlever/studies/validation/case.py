@@ -45,7 +45,7 @@ class Variant(Record):
     """Another assumption that was tried because the published number is outside the band."""
 
     why: str
-    changes: dict[str, float | str]
+    changes: dict[str, bool | float | str]
 
 
 class Case(Record):
@@ -62,6 +62,7 @@ class Case(Record):
     prediction: Stored | None = None
     published: Published | None = None
     remark: str = ""
+    outside: str = Field(default="", description="why the published value is not in the band")
     variants: dict[str, Variant] = Field(default_factory=dict)
 
     @classmethod

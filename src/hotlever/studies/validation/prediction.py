@@ -29,6 +29,11 @@ _MOST_MISSING = 0.25
 #: Verdicts, by the distance of the published number from the median in standard deviations of both.
 _WITHIN = {1.0: "inside 68 %", BAND: "inside 95 %"}
 OUTSIDE = "outside"
+#: Columns of the table, behind the name of the case.
+COLUMNS = (
+    *("group", "quantity", "unit", "predicted", "low_95", "high_95"),
+    *("published", "published_error", "verdict", "source"),
+)
 
 
 @dataclass(frozen=True)
@@ -171,23 +176,20 @@ def comparison(cases: list[Case], now: list[Prediction]) -> xr.Dataset:
     now : list of Prediction
         What they predict today.
     """
-    rows: dict[str, list[Any]] = {
-        name: []
-        for name in (
-            *("group", "quantity", "unit", "predicted", "low_95", "high_95", "published"),
-            *("published_error", "verdict", "source", "predicted_now"),
-        )
-    }
+    rows: list[tuple[Any, ...]] = []
     for case, today in zip(cases, now, strict=True):
         assert case.prediction is not None
         assert case.published is not None
         value, error = case.published.value, case.published.error
         stored = Prediction.as_stored(case.prediction, case.asked.is_share)
-        row = (
-            *(case.group, case.quantity, case.asked.unit, stored.median, *stored.band_95),
-            *(value, error, stored.verdict(value, error), case.source, today.median),
+        rows.append(
+            (
+                *(case.group, case.quantity, case.asked.unit, stored.median, *stored.band_95),
+                *(value, error, stored.verdict(value, error), case.source, today.median),
+            )
         )
-        for column, entry in zip(rows.values(), row, strict=True):
-            column.append(entry)
-    columns = {name: (("case",), column, {}) for name, column in rows.items()}
-    return xr.Dataset(columns, {"case": [case.name for case in cases]})
+    columns = zip((*COLUMNS, "predicted_now"), zip(*rows, strict=True), strict=True)
+    return xr.Dataset(
+        {name: ("case", list(column)) for name, column in columns},
+        {"case": [case.name for case in cases]},
+    )

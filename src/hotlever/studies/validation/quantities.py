@@ -73,7 +73,7 @@ def power_ratio_in_air(probe: Probe, *, tip_K: float) -> float:
 
 
 def share_into_air(probe: Probe, *, tip_K: float) -> float:
-    """Share of the power that leaves through the air instead of the leg ends, by the paper's k."""
+    """Share of the power that leaves through the air instead of the leg ends."""
     vacuum, air = _both_media(probe, tip_K)
     return 1.0 - vacuum / air
 
@@ -118,7 +118,7 @@ def layer_conductivity(*, thickness_um: float, temperature_K: float, scale: floa
 def raman_softening(
     *, temperature_K: float, reference_K: float, three_phonon: float, four_phonon: float
 ) -> float:
-    """Wavenumbers by which silicon's Raman line is lower than at a reference temperature."""
+    """Softening of silicon's Raman line from a reference temperature."""
     moved, _ = anharmonic.shift(temperature_K, reference_K, three_phonon, four_phonon)
     return -float(moved)
 
@@ -141,7 +141,10 @@ def surface_share(
     interface_K_per_W: float,
     tip_K_per_W: float | None = None,
 ) -> float:
-    """Rise of the sample's surface under a tip over that of the heater; silicon is the usual tip."""
+    """Rise of a sample's surface under a tip over that of the heater.
+
+    Where the tip is not stated it is a cone of silicon.
+    """
     interface = _PER_K_PER_W * interface_K_per_W
     below = contact_resistance(radius_um, [kappa], (), interface)
     if tip_K_per_W is None:
