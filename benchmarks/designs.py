@@ -1,7 +1,8 @@
 """Designs by gradient beside optima that are known.
 
-One is known exactly: a lever's power is at most V_b²/4R_s, whatever heats in it. The others are of one number each, found
-again by SciPy's bounded scalar search to 1e-4 of the range, or as the root at which a bound is met.
+One is known exactly: a lever's power is at most V_b²/4R_s, whatever heats in it. The others are of
+one number each, found again by SciPy's bounded scalar search to 1e-4 of the range, or as the root
+at which a bound is met.
 Targets: 1e-3 of the optimum, at most 30 branches.
 
 Run: python benchmarks/designs.py
