@@ -100,7 +100,7 @@ def test_a_lever_that_is_not_described_has_no_numbers(calibrations, converged):
     refused = replace(calibrations["a"], reason="current differs by 5%", converged=converged)
     table = compare_calibrations({**calibrations, "a": refused})
     assert np.isnan(table.value.sel(lever="a")).all()
-    assert "a is left out: its data are not described" in calibration_statements(table)
+    assert "lever a is left out: its data are not described" in calibration_statements(table)
     row = calibrations_csv(table, {}).splitlines()[1]
     answer = "false" if converged else "unknown"
     assert row.endswith(f"{answer},{refused.doubt},{refused.measurement.path}")

@@ -69,7 +69,7 @@ def test_a_lever_that_stands_apart_is_named():
     parameters = fits["lever-7"].parameters
     away = parameters["c_kappa"].value + 0.3
     parameters["c_kappa"] = replace(parameters["c_kappa"], value=away)
-    assert "lever-7 stands apart from the other levers in c_kappa" in statements(
+    assert "lever lever-7 stands apart from the other levers in c_kappa" in statements(
         compare_levers(fits)
     )
 
@@ -107,7 +107,7 @@ def test_a_lever_that_determines_nothing_spoils_neither_mean_nor_verdict():
     rows = {row[0]: row for row in lever_rows(data)}
     assert rows["dull"][1] == "not determined"
     assert statements(data) == [
-        "dull is left out of the mean of c_kappa, which its data do not determine",
+        "lever dull is left out of the mean of c_kappa, which its data do not determine",
         *statements(before),
     ]
     assert statements(before)[0].startswith("the levers differ in c_kappa")
@@ -121,12 +121,12 @@ def test_a_lever_that_is_not_described_is_left_out_and_named(answer):
     fits["other"] = fit_of(values, {"c_kappa": 0.001}, described=answer)
     data = compare_levers(fits)
     assert data["mean"].equals(before["mean"])
-    assert "other is left out: its data are not described" in statements(data)
+    assert "lever other is left out: its data are not described" in statements(data)
     assert set(next(row for row in lever_rows(data) if row[0] == "other")[1:]) == {""}
     assert set(levers_csv(data).splitlines()[-1].split(",")) == {"other", ""}
     only = compare_levers({"other": fits["other"]})
     assert np.isnan(only["mean"]).all()
-    assert statements(only) == ["other is left out: its data are not described"]
+    assert statements(only) == ["lever other is left out: its data are not described"]
     batch = Batch(fits)
     assert batch.exit_status == 1
     assert list(batch.undescribed) == ["other"]

@@ -201,7 +201,9 @@ def law_rows(levers: xr.Dataset) -> list[list[str]]:
 def calibration_statements(levers: xr.Dataset) -> list[str]:
     """Say in words whether the levers differ, and which have no tip temperature there, and why."""
     answers = zip(levers.lever.values, levers.described.values, levers.reason.values, strict=True)
-    missing = [f"{lever}: {reason}" for lever, described, reason in answers if described and reason]
+    missing = [
+        f"lever {lever}: {reason}" for lever, described, reason in answers if described and reason
+    ]
     return statements(levers) + missing
 
 

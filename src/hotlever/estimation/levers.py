@@ -179,11 +179,11 @@ def statements(levers: xr.Dataset) -> list[str]:
     chi_square = np.where(count > 1, levers.chi_square.values, np.nan)
     limit = chdtri(np.maximum(count - 1, 1), _RARE)
     texts = [
-        f"{lever} is left out: its data are not described"
+        f"lever {lever} is left out: its data are not described"
         for lever in levers.lever.values[~levers.described.values]
     ]
     texts += [
-        f"{lever} is left out of the mean of {quantities}, which its data do not determine"
+        f"lever {lever} is left out of the mean of {quantities}, which its data do not determine"
         for lever, quantities in _by_lever(~levers.counts & levers.value.notnull())
     ]
     for index in np.flatnonzero(chi_square > limit):
@@ -206,7 +206,7 @@ def statements(levers: xr.Dataset) -> list[str]:
     # the standard deviation of a normal distribution that has this median
     spread = 1.4826 * away.median("lever")
     return texts + [
-        f"{lever} stands apart from the other levers in {quantities}"
+        f"lever {lever} stands apart from the other levers in {quantities}"
         for lever, quantities in _by_lever(away > _APART * np.hypot(spread, many.stderr))
     ]
 

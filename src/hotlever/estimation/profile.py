@@ -289,6 +289,7 @@ def _dataset(
             "side": sides,
         },
         quantity=name,
+        lever=result.probe.title,
         optimum=optimum.value,
         notes="\n".join(notes),
     )

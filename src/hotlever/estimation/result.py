@@ -139,6 +139,11 @@ class Fit(Outcome):
     notes: list[str] = field(default_factory=list)
     converged: bool = True
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        # figures of it say of which lever it is
+        object.__setattr__(self, "band", self.band.assign_attrs(lever=self.probe.title))
+
     def _without_errors(self) -> dict[str, Any]:
         stderr = xr.full_like(self.band.tip_stderr_K, np.nan)
         return {

@@ -263,8 +263,8 @@ def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> x
     if silicon is not None:
         owned = {full_name(material, own): own for own in ("n_d", "p")}
         sampled = {owned[name]: column for name, column in columns.items() if name in owned}
-        moved = silicon.model_copy(update=sampled)
-        columns[INVERSION] = np.broadcast_to(moved.inversion_temperature(), values.shape[:3])
+        if sampled:  # else it is what it was
+            columns[INVERSION] = silicon.model_copy(update=sampled).inversion_temperature()
     rhat = [rhat_of_ensembles(column) for column in columns.values()]
     chained = {
         name: column.reshape(ensembles * walkers, draws)
@@ -288,6 +288,7 @@ def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> x
         fixed=", ".join(f"{name} = {value:g}" for name, value in at_rest),
         observables=", ".join(fit.observables),
         sampler=f"emcee {emcee.__version__}",
+        lever=fit.probe.title,
     )
     for name, known in parameters_of(fit.probe).items():
         if name in fit.names:
@@ -368,6 +369,7 @@ def predictive_band(
         },
         coordinates={"quantile": list(BAND_QUANTILES), "bias": grid, "power_mW": power},
         samples=len(chosen),
+        lever=fit.probe.title,
     )
 
 

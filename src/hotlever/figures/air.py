@@ -71,6 +71,7 @@ def air_loss(
         lower.axhline(0.0, color="0.6", lw=0.6)
         lower.set(xlabel=axis_label("tip_K"), ylabel="share of the power\nlost to air (%)")
         beside(lower)
+        entitle(made, shares)
     return made
 
 

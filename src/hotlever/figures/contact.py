@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from hotlever.colours import BLUE, HEAT, ORANGE, PURPLE, VERMILION
 from hotlever.contact.picture import contact_picture
-from hotlever.figures.style import axis_label, curve, figure, marker
+from hotlever.figures.style import axis_label, curve, entitle, figure, marker
 from hotlever.probe import Probe
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def contact_overview(data: xr.Dataset, probe: Probe) -> Figure:
         for above in (temperature, heat):
             above.set(xlabel="")
             above.tick_params(labelbottom=False)
+        entitle(made, data)
     return made
 
 

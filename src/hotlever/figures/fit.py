@@ -148,8 +148,8 @@ def _stated(band: xr.Dataset) -> bool:
     return bool(band.tip_stderr_K.notnull().any())
 
 
-def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
-    """Draw the correlation of fitted parameters (paper's Fig. 4 d-f)."""
+def correlation_matrix(names: Sequence[str], correlation: Array, lever: str = "") -> Figure:
+    """Draw the correlation of fitted parameters (paper's Fig. 4 d-f), titled by the lever."""
     count = len(names)
     with figure(1.2 + 0.52 * count, 0.6 + 0.52 * count) as (made, axes):
         image = axes.imshow(correlation, cmap="PuOr", vmin=-1, vmax=1)
@@ -163,6 +163,7 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
             style: Any = {"ha": "center", "va": "center", "fontsize": 7.5}
             axes.text(column, row, f"{round(value, 2) + 0.0:.2f}", color=colour, **style)
         made.colorbar(image, label="correlation (1)", shrink=0.9)
+        entitle(made, more=lever)
     return made
 
 
@@ -198,8 +199,8 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
         made,
         grid,
     ):
-        if not stated:
-            made.suptitle(NOT_DESCRIBED, color=VERMILION)
+        style: Any = {} if stated else {"color": VERMILION}
+        entitle(made, band, more="" if stated else NOT_DESCRIBED, **style)
         for (upper, *lower), (name, rows, label) in zip(grid.T, panels, strict=True):
             x = band[name].values
             upper.plot(x, rows[2], color=BLUE, label=middle_name)
@@ -244,6 +245,7 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
         for axes in grid.ravel()[len(profiles) :]:
             axes.remove()
         panel_letters(panels)
+        entitle(made, *profiles)
         grid[0, 0].legend(loc="upper center", frameon=True, facecolor="white", edgecolor="none")
     return made
 
@@ -311,6 +313,7 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
             if left:
                 axes.set_ylabel(shown[down][0])
         made.align_labels()
+        entitle(made, posterior)
         handles = [Patch(color=_DARK, label="68 %"), Patch(color=_LIGHT, label="95 %")]
         if marks:
             handles.append(Patch(color=VERMILION, label="optimum of the fit"))

@@ -100,6 +100,7 @@ class AirFields:
                 "air_heat_mW": (("region", "bias"), table),
             },
             coordinates={"bias": sweep.bias.values, "region": list(by_region[0])},
+            lever=sweep.attrs["lever"],
         )
 
     def write_vtu(self, state: State, path: str | os.PathLike[str]) -> None:

@@ -101,7 +101,7 @@ def _add_correlation(page: Page, fit: Fit) -> None:
         return
     page.figure(
         "fit_correlation",
-        figures.correlation_matrix(fit.names, fit.correlation),
+        figures.correlation_matrix(fit.names, fit.correlation, fit.probe.title),
         "Correlation of the fitted parameters.",
     )
 
