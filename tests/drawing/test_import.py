@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import tomllib
+from pathlib import Path
+
 import gdstk
 import numpy as np
 import pytest
 from reference_drawing import reference_library
 
+import hotlever
 from drawn import TIP, box, library_of, pointed_lever, turned, written
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
+
+EXAMPLES = Path(hotlever.__file__).parent / "examples"
 
 
 def imported(run, tmp_path, name, *options):
@@ -127,6 +133,28 @@ def test_what_cannot_be_told_is_left_to_the_user(run, tmp_path):
     text = (tmp_path / "probe.toml").read_text(encoding="utf-8")
     assert '# heater = "1/0"    # not found in the drawing' in text
     assert run("sweep", "probe.toml")[0] == 2
+
+
+def test_a_film_that_is_heater_and_legs_needs_no_heater(run, tmp_path):
+    """What is said to be written makes it a lever."""
+    lever = Probe.from_file(EXAMPLES / "palladium-on-nitride.toml")
+    lever.to_file(tmp_path / "pd.toml", drawing=tmp_path / "pd.gds")
+    status, out, _ = run("probe", "import", "pd.gds", "-o", "probe.toml")
+    assert status == 0
+    assert '[layers.body] drawn = "1/0" and [layers.film] drawn = "2/0"' in out
+    sections = tomllib.loads((tmp_path / "probe.toml").read_text(encoding="utf-8"))
+    del sections["material"]
+    sections["probe"]["tip_um"] = [56.0, 0.0]
+    sections["layers"] = {
+        "body": {"drawn": "1/0", "material": "nitride"},
+        "film": {"drawn": "2/0", "material": "metal", "thickness_um": 0.05},
+    }
+    sections["materials"] = {
+        "nitride": {"kind": "dielectric", "preset": "SiN"},
+        "metal": {"kind": "metal-film", "preset": "Pd"},
+    }
+    made = Probe.from_sections(sections, "probe", tmp_path)
+    assert made.layout().heater.area == pytest.approx(lever.layout().heater.area, rel=1e-6)
 
 
 def test_a_proposal_that_is_at_fault_is_drawn_with_its_place(run, tmp_path):

@@ -128,6 +128,13 @@ class _Silicon:
         holes = sum(len(piece.interiors) for piece in rest)
         return len(rest) > 1 or holes > len(self.shape.interiors)
 
+    def lies_on(self, other: str) -> bool:
+        """Whether another layer is below all of it, and beyond."""
+        below = self.areas[other]
+        return below.area > self.shape.area and bool(
+            below.buffer(self.tolerance).covers(self.shape)
+        )
+
     def _sizable(self, shape: BaseGeometry) -> list[Polygon]:
         return [
             piece for piece in parts_of(shape) if piece.area > 10 * self.tolerance * piece.length
@@ -154,6 +161,14 @@ def _low_doped(best: _Silicon, inferred: LayerInference) -> None:
         inferred.doubts.append(
             "no layer lies across the silicon so that current has to pass it: the heater is missing"
         )
+        below = [name for name in best.areas if name != best.name and best.lies_on(name)]
+        inferred.doubts += [
+            f"layer {best.name} lies on layer {name}: if it is a film that is heater and legs in "
+            f'one, there is no heater to name; then say [layers.body] drawn = "{name}" and '
+            f'[layers.film] drawn = "{best.name}", each with a material of [materials], and the '
+            "film's thickness_um"
+            for name in below[:1]
+        ]
         return
     heater = _hinted(best.cutters, ("heat", "htr")) or _farthest(best)
     reason = "the silicon falls apart without it"
