@@ -91,7 +91,7 @@ def answer(
     failures: list[ComputationError] = []
     states = {}
     for z, lever in zip(distances.tolist(), levers, strict=True):
-        branch, reading, failure = lever._read(np.array([bias]))
+        branch, reading, failure = lever.read(np.array([bias]))
         if failure is None:
             u = float(reading.u[0])
             signals[z], states[z] = reader.signal(lever, branch, u, bias), (lever, branch, u)

@@ -106,7 +106,7 @@ def _out_of_contact(report: Report, probe: Probe, quick: bool, most: float) -> L
 @lru_cache(maxsize=_KEPT)
 def _solved(report: Report, probe: Probe, quick: bool, most: float) -> Lever:
     lever = Lever(probe, COARSE) if quick else make_lever(report, probe)
-    lever._read(np.array([most]))
+    lever.read(np.array([most]))
     return lever
 
 
@@ -122,7 +122,7 @@ def _curves(report: Report, probe: Probe, most: float) -> dict[str, Any]:
     """Return the columns of a sweep up to a bias, or as far as both levers go."""
     levers = _touching(report, probe, most)
     for lever in levers:
-        branch, *_ = lever._read(np.array([most]))
+        branch, *_ = lever.read(np.array([most]))
         most = branch.highest_bias(lever.circuit, most)
     free, lever = levers
     data = sweep_in_contact(lever, np.linspace(0.0, most, _POINTS), free=free, sensitivities=False)

@@ -18,14 +18,13 @@ from hotlever.app.workers import Report
 from hotlever.tasks.approaching import approach
 from hotlever.tasks.calibrating import calibrate_files
 from hotlever.tasks.contacting import touch
+from hotlever.tasks.design_requests import DesignRequest, ImportRequest
 from hotlever.tasks.designing import vary_design
 from hotlever.tasks.fitting import fit_files
 from hotlever.tasks.importing import propose_probe
 from hotlever.tasks.measured_requests import CalibrateRequest, FitRequest, RamanRequest
 from hotlever.tasks.requests import (
     ContactRequest,
-    DesignRequest,
-    ImportRequest,
     PulseRequest,
     ReaderRequest,
     SpectrumRequest,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hotlever.cli import output as terminal
 from hotlever.cli.options import command
-from hotlever.tasks.requests import DesignRequest
+from hotlever.tasks.design_requests import DesignRequest
 
 
 @command("design", DesignRequest)

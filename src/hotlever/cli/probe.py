@@ -12,9 +12,10 @@ from hotlever.cli.commands import Commands, app
 from hotlever.cli.options import command
 from hotlever.errors import unknown_name
 from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.tasks.design_requests import ImportRequest
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe
-from hotlever.tasks.requests import File, ImportRequest, PlotRequest, ProbeRequest, option
+from hotlever.tasks.requests import File, PlotRequest, ProbeRequest, option
 
 probe_app = typer.Typer(
     cls=Commands, help="Write, describe, draw and import probes.", rich_markup_mode=None

@@ -159,7 +159,7 @@ def sweep_in_contact(
         "tip_change_K": data.tip_K.values - before.tip_K.values,
     }
     if sensitivities:
-        branch, reading, _ = lever._read(data.bias_V.values)
+        branch, reading, _ = lever.read(data.bias_V.values)
         powered = data.current_mA.values != 0
         slope = np.zeros(powered.size)
         by = sensitivities_of(branch, reading.u[powered], lever.circuit, [INTERFACE])

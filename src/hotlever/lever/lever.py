@@ -34,8 +34,7 @@ from hotlever.types import Array, Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-
-#: Tip temperature (K) up to which branches are followed: where the material laws end.
+#: Tip temperature (K) up to which branches are followed: where material laws end.
 HOTTEST = 1300.0
 #: A coarse mesh, with coarse panels for the air: within 2 K of the default one, at a fifth of its
 #: price. For differences between levers, and for fits, which the default one corrects.
@@ -197,7 +196,7 @@ class Lever:
             If not every bias is reached; ``partial`` holds the states up to there.
         """
         values = checked_bias(bias, self.probe)
-        branch, reading, failure = self._read(values)
+        branch, reading, failure = self.read(values)
         states: list[State] = []
         for u, value in zip(reading.u, values.tolist(), strict=True):
             if failure is not None and np.isnan(u):
@@ -217,10 +216,10 @@ class Lever:
         at = np.array([u])
         return self.polished(branch.states(at), bias, branch.parametrisation.constraint(at))
 
-    def _read(
+    def read(
         self, bias: Array, progress: Progress | None = None
     ) -> tuple[Branch, Reading, ComputationError | None]:
-        """Return the branch, where a ramp finds it, and why it does not have all the biases."""
+        """Return the branch, where on it a ramp finds biases (V), and why it lacks some of them."""
         below, above = min(float(bias.min()), 0.0) or None, float(bias.max())
         branch, failure = as_far_as_possible(lambda: self.branch_to(above, progress, below))
         reading = branch.read(self.circuit, bias)
@@ -276,7 +275,7 @@ class Lever:
         where a leg gets hot faster than the tip.
         """
         values = checked_bias(bias, self.probe)
-        branch, reading, failure = self._read(values, progress)
+        branch, reading, failure = self.read(values, progress)
         reached = np.flatnonzero(np.isfinite(reading.u))
         u, slopes = reading.u[reached], None
         if sensitivities:

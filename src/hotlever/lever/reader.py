@@ -179,7 +179,7 @@ def over_surface(
     rows, notes = [], list[str]()
     for distance in each(distances.tolist(), progress):
         near = at_distance(lever, distance)
-        branch, reading, failure = near._read(values)
+        branch, reading, failure = near.read(values)
         if failure is not None:
             notes.append(f"at {distance:.4g} µm: {failure}")
         rows.append(
@@ -319,7 +319,7 @@ def best_bias(
     def resolution(bias_V: float) -> float:
         signals = []
         for near in levers:
-            branch, reading, _ = near._read(np.array([bias_V]))
+            branch, reading, _ = near.read(np.array([bias_V]))
             if np.isnan(reading.u[0]):
                 return np.inf
             signals.append(reader.signal(near, branch, reading.u[0], bias_V))

@@ -153,11 +153,11 @@ class SolidLever(Lever):
         flat = self._flat.space.elements
         return flat.interpolation(self.space.elements.nodes[:2].T)[0]
 
-    def _read(
+    def read(
         self, bias: Array, progress: Progress | None = None
     ) -> tuple[Branch, Reading, ComputationError | None]:
         """Return the branch of the flat lever; see `Lever`."""
-        return self._flat._read(bias, progress)
+        return self._flat.read(bias, progress)
 
     def _state_at(self, branch: Branch, u: float, bias: float) -> State:
         """Return a state from the cache, or solve it from that of the flat lever."""

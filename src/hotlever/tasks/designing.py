@@ -9,10 +9,10 @@ from hotlever.errors import InputError
 from hotlever.files import write_text
 from hotlever.probe.shapes import DRAWING
 from hotlever.studies import design as study
+from hotlever.tasks.design_requests import DesignRequest
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import DesignRequest
 from hotlever.tasks.texts import check_number, parse_bounds, parse_setting, parse_varied
 
 #: Numbers that are varied at once of which there are figures: a curve or a map.

@@ -7,9 +7,9 @@ from pathlib import Path
 from hotlever.files import write_text
 from hotlever.probe.drawing.outlines import DrawingError
 from hotlever.probe.importing import import_drawing
+from hotlever.tasks.design_requests import ImportRequest
 from hotlever.tasks.files import draw
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import ImportRequest
 
 
 def propose_probe(reporter: Reporter, request: ImportRequest) -> None:

@@ -10,9 +10,8 @@ from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
-from hotlever.errors import InputError, shown, unknown_name
+from hotlever.errors import InputError, shown
 from hotlever.files import FIGURE_TYPES, Outputs
-from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.probes import read_probe
 from hotlever.units import setting
 
@@ -340,79 +339,6 @@ class ReaderRequest(TableRequest, LeverRequest):
     vibration: str | None = option(
         None, metavar="LENGTH", help="Of the lever itself, for each √Hz; none if left out."
     )
-
-
-@dataclass(kw_only=True)
-class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
-    """What a change of a probe's design does."""
-
-    vary: list[str] | None = option(
-        None,
-        metavar="NAME=START:STOP:COUNT",
-        help="Sweep a number of the probe file, annealing_K or annealing_min; repeated: each with "
-        "each, as a map. A table of sensitivities if left out.",
-    )
-    power: float = option(2.0, help="Power (mW) in vacuum at which the tip temperature is given.")
-    annealing_K: float = option(
-        ANNEALING_K, "--annealing-K", help="Annealing (K) that the probe's delta is of."
-    )
-    annealing_min: float = option(ANNEALING_S / 60.0, help="Annealing (min) that the delta is of.")
-    air: bool = option(True, help="Solve in air too, for k.")
-    minimise: str | None = option(
-        None,
-        metavar="QUANTITY",
-        help="Find the design whose quantity is least, such as time_constant_us; it writes a probe "
-        "file (-o FILE.toml).",
-    )
-    maximise: str | None = option(None, metavar="QUANTITY", help="Or greatest.")
-    within: list[str] | None = option(
-        None,
-        metavar="NAME=LOW:HIGH",
-        help="Bounds of a number that may change, or of a quantity (one may be left out).",
-    )
-    at: str = option(
-        "700K", metavar="POINT", help="Working point: a tip temperature, or as 8V or 2mW."
-    )
-
-    def outputs(self, *inputs: Path | None) -> Outputs:
-        """Check the files: of an optimum a probe file and a figure."""
-        if self.minimise is None and self.maximise is None:
-            return super().outputs(*inputs)
-        outputs = Outputs(*inputs)
-        outputs.file(self.output, ".toml")
-        outputs.file(self.plot, *FIGURE_TYPES)
-        return outputs
-
-
-@dataclass(kw_only=True)
-class ImportRequest(PlotRequest):
-    """A probe file for a drawing."""
-
-    drawing: Path = argument(MISSING, metavar="DRAWING", help="GDSII, OASIS or DXF file.")
-    output: File = option(
-        None, "-o", "--output", help="Probe file to write; standard output if left out."
-    )
-    cell: str | None = option(None, help="Of GDSII or OASIS; the top cell if left out.")
-    unit: str | None = option(
-        None, help="Of the drawing's numbers, as mm; what the file says if left out."
-    )
-
-    @property
-    def known_unit(self) -> str | None:
-        """The unit, by a name that drawings are read with."""
-        from hotlever.probe.drawing.sheet import UNITS
-
-        name = None if self.unit is None else self.unit.replace("µ", "u").replace("μ", "u")
-        if name is not None and name not in UNITS:
-            raise unknown_name("unit", name, UNITS, "--unit")
-        return name
-
-    def outputs(self) -> Outputs:
-        """Check the files that are written, none of which is read."""
-        outputs = Outputs(self.drawing)
-        outputs.file(self.output, ".toml")
-        outputs.file(self.plot, *FIGURE_TYPES)
-        return outputs
 
 
 def check_medium(medium: str | None, *more: str) -> None:
