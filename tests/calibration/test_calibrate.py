@@ -28,6 +28,9 @@ from hotlever.probe.priors import Prior, default_priors, published_material
 from made_up import GONE, damaged
 from synthetic_curves import measured_curve, measurement_of
 
+#: Keys of the budget after the GUM, which older files have not.
+GUM = ("gum", "gum_bias_V", "effective_dof", "coverage_factor", "expanded_uncertainty_K")
+
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 
 
@@ -98,6 +101,35 @@ def test_the_budget_adds_up_and_every_source_counts(calibrated):
     assert calibrated.tip_temperature_uncertainty_K == np.nanmax(calibrated.table.tip_stderr_K)
     table = calibrated.table
     np.testing.assert_allclose(table.tip_high_K - table.tip_low_K, 3.92 * table.tip_stderr_K)
+
+
+def test_the_budget_after_the_gum_is_the_table_s_row_by_row(calibrated, tmp_path):
+    content = calibrated.content()
+    hottest, rows = calibrated.table.isel(bias=-1), content["gum"]
+    stderr = hottest.tip_stderr_K.item()
+    assert content["gum_bias_V"] == hottest.bias_V.item() == calibrated.table.bias_V.max()
+    parts = {row["quantity"]: row["contribution_K"] for row in rows}
+    assert np.linalg.norm(list(parts.values())) == pytest.approx(stderr, rel=1e-6)
+    assert set(parts) == {"noise of current", "model", *calibrated.priors}
+    for source, names in {
+        "measurement": ("noise of current", "current_scale"),
+        "electronics": ("series_resistance_ohm",),
+    }.items():
+        together = np.linalg.norm([parts[name] for name in names])
+        of_table = hottest.budget_K.sel(source=source).item()
+        assert together == pytest.approx(of_table, rel=1e-6)
+    for row in rows:
+        assert abs(row["sensitivity"]) * row["u"] == pytest.approx(row["contribution_K"])
+        assert (row["type"] == "A") == (row["quantity"] == "noise of current")
+        assert (row["dof"] is None) == (row["type"] == "B")
+    # of forty data and one more, the fit has taken up several
+    assert 15.0 < rows[0]["dof"] < 40.0
+    assert content["expanded_uncertainty_K"] == content["coverage_factor"] * calibrated.gum.u
+    effective = stderr**4 / (rows[0]["contribution_K"] ** 4 / rows[0]["dof"])
+    assert content["effective_dof"] == pytest.approx(effective)
+    old = {key: value for key, value in content.items() if key not in GUM}
+    (tmp_path / "old.json").write_text(json.dumps(old))
+    assert read_calibration(tmp_path / "old.json").content() == old
 
 
 def test_priors_say_what_was_known_and_what_the_data_made_of_it(calibrated):
@@ -279,6 +311,8 @@ def test_a_fit_as_object_or_file_and_data_as_object_or_file_are_one(shared_fit, 
         (("power_law", "exponents"), 2.0, "did you mean 'exponent'"),
         (("k",), 10**400, "expected a finite number"),
         (("notes",), {}, "notes = {}"),
+        (("gum_bias_V",), 99.0, "gum_bias_V: expected the bias of a row of the table"),
+        (("gum", 0, "type"), "C", "gum.0.type = 'C'"),
     ],
 )
 def test_damaged_calibration_files_get_one_line(calibrated, tmp_path, keys, value, message):
@@ -299,7 +333,7 @@ def test_what_is_no_json_is_no_calibration(tmp_path):
 def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
     status, out, err = run(
         "calibrate", example, "--fit", shared_fit, "-o", "cal.json", "--table", "t.csv",
-        "--plot", "cal.png", "--prior", "dimensions=±1%",
+        "--plot", "cal.png", "--prior", "dimensions=±1%", "--at", "8.05V",
     )  # fmt: skip
     assert status == 0, err
     assert "based on a fit of this lever in vacuum" in out
@@ -309,6 +343,9 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
     sources = {"measurement", "electronics", "base temperature", "geometry", "material", "model"}
     assert set(content["uncertainty_budget_K"]) == sources
     assert content["priors"]["heater_length_um"]["spread"] == pytest.approx(0.04)
+    (stderr,) = (row["tip_stderr_K"] for row in content["table"] if row["bias_V"] == 8.05)
+    parts = [row["contribution_K"] for row in content["gum"]]
+    assert (content["gum_bias_V"], np.linalg.norm(parts)) == (8.05, pytest.approx(stderr, rel=1e-6))
     assert content["tip_temperature_uncertainty_K"] < 40
     assert (tmp_path / "t.csv").read_text().startswith("bias_V,lever_V,current_mA,power_mW,tip_K")
     assert (tmp_path / "cal.png").stat().st_size > 10_000
@@ -365,6 +402,14 @@ def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, re
     other = replace(measurement_of(measured_curve(air, rng, to_V=12.0)), medium="air")
     fitted = fit(vacuum, Probe.reference(), fixed={"p": None})
     both = calibrate(other, fit=fitted)
+    (earlier,) = (row for row in both.gum.inputs if row.quantity == "fit")
+    assert both.gum.u == pytest.approx(both.table.tip_stderr_K[-1].item(), rel=1e-6)
+    assert earlier.contribution == pytest.approx(both.table.budget_K.sel(source="fit")[-1].item())
+    # how many degrees of freedom a fit to other data has is not known
+    assert np.isnan(both.gum.dof)
+    content = both.content()
+    assert content["effective_dof"] is None
+    assert both.file().model_validate(content, context="").result().content() == content
     assert both.medium == "air"
     assert {"fit", "measurement", "air"} <= set(both.table.source.values.tolist())
     error = np.abs(both.table.tip_K - air.tip_temperature(both.table.power_mW))

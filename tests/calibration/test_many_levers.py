@@ -112,7 +112,10 @@ def test_a_lever_that_is_not_described_has_no_numbers(calibrations, converged):
     [
         (("a.csv", "b.csv", "--fit", "f.json", "-o", "out"), "--fit: expected a single data file"),
         (("a.csv", "b.csv"), "expected -o FOLDER or --report DIR to write their calibrations to"),
-        (("a.csv", "--at", "8V"), "--at: expected several data files"),
+        (
+            ("a.csv", "--at", "2mW"),
+            "found '2mW', expected a bias such as 8V of one data file",
+        ),
         (("a.csv", "b.csv", "-o", "out", "--at", "3K"), "expected a bias such as 8V or a power"),
     ],
 )

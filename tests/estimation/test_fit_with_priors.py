@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from threading import Thread
@@ -11,6 +12,7 @@ from threading import Thread
 import numpy as np
 import pytest
 
+from hotlever.calibration.tip_temperature import tip_by_bias
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, estimator, fit, read_fit
 from hotlever.estimation.inverse_problem import estimate
@@ -100,6 +102,37 @@ def test_the_shares_add_up_to_the_covariance(solved):
     np.testing.assert_allclose(
         total / np.outer(scale, scale), one.posterior.covariance / np.outer(scale, scale), atol=1e-6
     )
+
+
+def test_the_estimate_follows_data_and_scales_as_said(solved):
+    """By Gauss and Newton's step after the data have changed by a standard deviation."""
+    objective, at, residuals = solved.objective, solved.prediction, solved.residuals
+    point = objective.point(at.probe)
+    jacobian, before = objective.of_data(at.slopes, point), residuals.weighted(at.values)
+    gain = objective.laplace(at.slopes, point) * objective.coordinates.rates(point)[:, None]
+
+    def step(more):
+        changed = copy(residuals)
+        changed.data = residuals.data + more
+        return -gain @ jacobian.T @ (changed.weighted(at.values) - before)
+
+    influences, errors = solved.posterior.influences, residuals.errors
+    for number, name in enumerate(residuals.observables):
+        more = np.zeros(residuals.data.shape)
+        first = np.flatnonzero(residuals.present[number])[0]
+        more[number, first] = 1.0 / errors.weights[number, first]
+        np.testing.assert_allclose(influences[name][:, 0], step(more), rtol=1e-6)
+    for scale in residuals.common:
+        more = np.zeros(residuals.data.shape)
+        more[residuals.observables.index(scale.observable)] = scale.errors
+        # what is known to be shown too large is corrected downwards
+        np.testing.assert_allclose(influences[scale.name][:, 0], -step(more), rtol=1e-6)
+    assert residuals.common
+
+
+def test_a_budget_is_within_the_measured_range(solved):
+    with pytest.raises(InputError, match=r"at 12 V: expected a bias .* from 0.5 to 11 V"):
+        tip_by_bias(solved, at_V=12.0)
 
 
 def test_how_far_a_prior_is_pulled_is_what_the_others_gain_without_it(solved):

@@ -35,8 +35,10 @@ from hotlever.calibration.table import (
     interpolated,
     stored_table,
 )
+from hotlever.calibration.uncertainty_budget import InputSection
 from hotlever.datasets import frame_text
 from hotlever.errors import InputError, unknown_name
+from hotlever.estimation.gum import Budget
 from hotlever.estimation.outcome import (
     IF_ANY,
     Columns,
@@ -98,6 +100,10 @@ class Calibration(Outcome):
         Of the same lever in a pulse.
     converged : bool
         Whether the search for the lever came to its end.
+    gum : Budget, optional
+        The uncertainty budget of one tip temperature; none by the paper's rule.
+    gum_bias_V : float, optional
+        The bias of its row of the table.
     """
 
     route: str
@@ -117,6 +123,8 @@ class Calibration(Outcome):
     notes: list[str] = field(default_factory=list)
     pulse: PulseCalibration | None = None
     converged: bool = True
+    gum: Budget | None = None
+    gum_bias_V: float | None = None
 
     lever = "lever like this one"
 
@@ -129,6 +137,8 @@ class Calibration(Outcome):
             "knee": self.knee.without_errors,
             "k_stderr": np.nan,
             "pulse": None,
+            "gum": None,
+            "gum_bias_V": None,
         }
 
     @property
@@ -209,7 +219,7 @@ class Calibration(Outcome):
 
     def file(self, request: dict[str, JsonValue] | None = None) -> CalibrationFile:
         """Return what the calibration file holds."""
-        budget = budget_of(self.table)
+        budget, gum = budget_of(self.table), self.gum
         return CalibrationFile.holding(
             self,
             power_law_residual_K=self.law_residual_K,
@@ -218,6 +228,9 @@ class Calibration(Outcome):
             table={name: self.table[name].values for name in self.columns},
             budget_K=budget,
             apex_budget_K=budget_of(self.table, BUDGETS[1]) or None,
+            effective_dof=None if gum is None else gum.dof,
+            coverage_factor=None if gum is None else gum.coverage_factor(),
+            expanded_uncertainty_K=None if gum is None else gum.expanded(),
             data=MeasurementSection.of(self.measurement),
             request=request,
         )
@@ -266,13 +279,22 @@ _Pulse = Annotated[
     PulseCalibration,
     stored_as(PulseSection, PulseSection.calibration, PulseCalibration.section),
 ]
+_Gum = Annotated[
+    Budget,
+    stored_as(
+        list[InputSection],
+        lambda rows: Budget(tuple(row.row() for row in rows)),
+        lambda budget: [InputSection.of(row).model_dump() for row in budget.inputs],
+    ),
+]
 
 
 class CalibrationFile(ResultFile[Calibration]):
     """What a calibration file holds: the schema that it is written and read by.
 
-    Beside what a `Calibration` has: of the knee ``tip_K`` and whether it was measured, and the
-    largest errors in the table, all in all and by source.
+    Beside what a `Calibration` has: of the knee ``tip_K`` and whether it was measured, the
+    largest errors in the table, all in all and by source, and what follows from the budget ``gum``
+    for 95 % at its bias.
     """
 
     route: str
@@ -291,6 +313,11 @@ class CalibrationFile(ResultFile[Calibration]):
     apex_budget_K: dict[str, Vector] | None = IF_ANY
     measured_rms_K: Number = np.nan
     pulse: _Pulse | None = IF_ANY
+    gum: _Gum | None = IF_ANY
+    gum_bias_V: float | None = IF_ANY
+    effective_dof: Number | None = IF_ANY
+    coverage_factor: float | None = IF_ANY
+    expanded_uncertainty_K: float | None = IF_ANY
 
     @field_serializer("power_law")
     def _with_threshold(self, law: PowerLaw | None) -> dict[str, float] | None:
@@ -299,6 +326,8 @@ class CalibrationFile(ResultFile[Calibration]):
     @model_validator(mode="after")
     def _rows_belong_together(self, info: ValidationInfo) -> Self:
         check_rows(self.table, self.budget_K, "bias", str(info.context), self.apex_budget_K)
+        if self.gum is not None and self.gum_bias_V not in self.table["bias_V"]:
+            raise InputError(f"{info.context}: gum_bias_V: expected the bias of a row of the table")
         return self
 
     def result(self) -> Calibration:

@@ -16,6 +16,7 @@ from hotlever.calibration.calibration import Calibration, rms
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.plausibility import misfit, what_data_lack
 from hotlever.calibration.power_law import law_of_model, power_turns
+from hotlever.calibration.table import budget_of
 from hotlever.calibration.tip_temperature import (
     OF_THE_MEASUREMENT,
     highest_bias,
@@ -23,6 +24,7 @@ from hotlever.calibration.tip_temperature import (
     tip_by_bias,
     tips_in_contact,
 )
+from hotlever.calibration.uncertainty_budget import budget_of_estimate
 from hotlever.errors import ComputationError
 from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
@@ -141,6 +143,7 @@ def calibrated_by_estimate(
     stated: Mapping[str, Prior],
     route: str,
     samples: int = 0,
+    at_V: float | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
     """Return the calibration of an estimated lever, of which some was known beforehand.
@@ -149,7 +152,7 @@ def calibrated_by_estimate(
     """
     probe, priors = estimate.probe, estimate.priors(stated)
     circuit, medium = probe.circuit, probe.surroundings.medium
-    tip = tip_by_bias(estimate, samples, progress)
+    tip = tip_by_bias(estimate, samples, at_V, progress)
     converged, reason = _verdict(estimate, priors)
     notes = [*what_data_lack(measured, circuit, tip.table.tip_K.values), *estimate.notes]
     notes += [tip.asymmetry] if tip.asymmetry and not reason else []
@@ -182,10 +185,19 @@ def calibrated_by_estimate(
         )
     if not probe.shape.outline_moves:
         notes.append("the outline is taken to be as drawn: no error of it is in the result")
+    bias = tip.table.bias_V.values
+    row = int(np.nanargmax(tip.table.tip_K) if at_V is None else np.searchsorted(bias, at_V))
+    model = {
+        source: float(error[row])
+        for source, error in budget_of(tip.table).items()
+        if source in ("model", "jump")
+    }
     if by_power:
         law, residual = law_of_model(vacuum, None if threshold is None else threshold.power_mW)
     return Calibration(
         table=tip.table,
+        gum=budget_of_estimate(estimate, priors, tip.slopes[row], model),
+        gum_bias_V=float(bias[row]),
         route=route,
         medium=medium,
         power_law=law,

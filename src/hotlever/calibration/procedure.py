@@ -15,6 +15,7 @@ from hotlever.calibration.plausibility import check_plausible
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
 from hotlever.calibration.table import BUDGETS, budget_of, table_with_budget
+from hotlever.calibration.uncertainty_budget import correction
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
@@ -36,6 +37,7 @@ def calibrate(
     priors: Mapping[str, Prior | str] | None = None,
     pulse: PulseTiming | None = None,
     samples: int = 0,
+    at_V: float | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
     """Find the tip temperature of a lever from its I-V curve.
@@ -69,6 +71,8 @@ def calibrate(
     samples : int
         Of the posterior, at least, from which the limits of the tip temperature are taken; by
         default they follow from its linearised error, or estimates of hotter and colder levers.
+    at_V : float, optional
+        Bias of the uncertainty budget; that of the hottest tip by default.
     progress : callable, optional
         Called with solved branches, then with steps of the sampler and followed pulses, and how
         many there usually are.
@@ -105,6 +109,11 @@ def calibrate(
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
         if samples:
             raise InputError("the paper's rule has no posterior; expected a probe or a fit")
+        if at_V is not None:
+            raise InputError(
+                "the paper's rule has no uncertainty budget; expected a probe or a fit, in the "
+                "medium of the data"
+            )
         if pulse is not None:
             raise InputError(
                 "the paper's rule says nothing about a pulse; expected a probe or a fit, in the "
@@ -126,7 +135,9 @@ def calibrate(
         check_plausible(measured, probe, causes, known_beforehand(probe, priors))
         try:
             estimate, stated = estimate_lever(measured, probe, fit, priors, progress)
-            result = calibrated_by_estimate(measured, estimate, stated, route, samples, progress)
+            result = calibrated_by_estimate(
+                measured, estimate, stated, route, samples, at_V, progress
+            )
         except ComputationError as error:
             raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
         if result.reason and result.converged:
@@ -164,4 +175,8 @@ def _in_either(result: Calibration, other: Calibration) -> Calibration:
             (budget_of(result.table, BUDGETS[1]), "apex_K"),
         )
     )
-    return replace(result, table=table_with_budget(columns, parts, of_apex=of_apex))
+    gum = result.gum
+    if gum is not None and result.gum_bias_V is not None:
+        choice = np.interp(result.gum_bias_V, columns["bias_V"], choices["tip_K"]).item()
+        gum = replace(gum, inputs=(*gum.inputs, correction("medium", choice)))
+    return replace(result, table=table_with_budget(columns, parts, of_apex=of_apex), gum=gum)

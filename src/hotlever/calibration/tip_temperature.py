@@ -71,6 +71,8 @@ class TipByBias(NamedTuple):
     table : xarray.Dataset
         At even biases, and more where the tip is steep, see `hotlever.calibration.table`; the
         limits are as far away as the errors say, unless these do not hold.
+    slopes : ndarray, shape (rows, p)
+        Derivatives of the tip temperature there by what is varied.
     jumps : list of Jump
         Between measured rows.
     asymmetry : str
@@ -78,12 +80,16 @@ class TipByBias(NamedTuple):
     """
 
     table: xr.Dataset
+    slopes: Array
     jumps: list[Jump]
     asymmetry: str
 
 
 def tip_by_bias(
-    estimate: Estimate, samples: int = 0, progress: Progress | None = None
+    estimate: Estimate,
+    samples: int = 0,
+    at_V: float | None = None,
+    progress: Progress | None = None,
 ) -> TipByBias:
     """Return the tip temperature of an estimated lever with its error, by bias.
 
@@ -92,14 +98,17 @@ def tip_by_bias(
     estimate : Estimate
     samples : int
         Of the posterior, from which the credible interval is then taken; none by default.
+    at_V : float, optional
+        A bias that has a row.
     progress : callable, optional
 
     Raises
     ------
     InputError
-        If samples are asked for of an estimate without priors.
+        If samples are asked for of an estimate without priors, or the bias is not in the measured
+        range.
     """
-    probe, circuit, bias = estimate.probe, estimate.probe.circuit, _rows(estimate)
+    probe, circuit, bias = estimate.probe, estimate.probe.circuit, _rows(estimate, at_V)
     predicted = estimate.predicted(bias)
     tip, slopes = predicted.values[TIP], predicted.slopes[TIP][:, estimate.objective.columns]
     parts = errors_by_source(estimate.posterior, slopes)
@@ -122,7 +131,7 @@ def tip_by_bias(
     if not circuit.starts_cold:
         total = table.power_mW.values + _held_power(estimate, bias)
         table[TOTAL_POWER] = quantity(TOTAL_POWER, "bias", total)
-    return TipByBias(table, jumps, asymmetry)
+    return TipByBias(table, slopes, jumps, asymmetry)
 
 
 def tips_in_contact(estimate: Estimate) -> tuple[Array, Array]:
@@ -174,11 +183,20 @@ def measured_range(estimate: Estimate) -> Array:
     return np.linspace(present.min(), min(present.max(), highest_bias(estimate)), _ROWS)
 
 
-def _rows(estimate: Estimate) -> Array:
-    """Return the biases (V) of the table: even ones, and more where the tip rises steeply."""
+def _rows(estimate: Estimate, at_V: float | None) -> Array:
+    """Return the biases (V) of the table: even ones, more where the tip rises steeply, and one."""
     even, branch = measured_range(estimate), estimate.branch
     fine = np.linspace(even[0], even[-1], _FINE)
-    return with_steep_rows(even, fine, branch.tip_K(branch.read(estimate.probe.circuit, fine).u))
+    tip = branch.tip_K(branch.read(estimate.probe.circuit, fine).u)
+    rows = with_steep_rows(even, fine, tip)
+    if at_V is None:
+        return rows
+    if not even[0] <= at_V <= even[-1]:
+        raise InputError(
+            f"an uncertainty budget at {at_V:.4g} V: expected a bias in the measured range, from "
+            f"{even[0]:.4g} to {even[-1]:.4g} V"
+        )
+    return np.union1d(rows, at_V)
 
 
 def highest_bias(estimate: Estimate) -> float:

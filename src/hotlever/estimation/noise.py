@@ -204,6 +204,16 @@ class DataErrors:
         own = scatter * self._relative / self._root
         self.scale = np.where(self.without[:, None], own, self.scale)
 
+    def degrees_of_freedom(self, leverage: Array) -> Array:
+        """Return those of the errors of each observable, (observables,); infinite of stated ones.
+
+        A scatter has as many as data count, less what a fit has taken up; where a usual one counts
+        as a datum more, one more (see `take_scatter`).
+        """
+        count = np.sum(np.where(self.present, self.down**2, 0.0), axis=1) + self.measured
+        free = np.maximum(count - leverage.sum(axis=1), 1.0)
+        return np.where(self.without | (not self.measured), free, np.inf)
+
     def noise_squares(self, difference: Array) -> float:
         """Return the mean square of weighted noise, as data scatter about their neighbours.
 
@@ -322,6 +332,17 @@ class CommonCovariance:
         along = self._pattern / np.maximum(size, 1e-300)
         kept = 1.0 / np.sqrt(1.0 + size**2) - 1.0
         return np.asarray(rows + along @ (kept * (along.T @ rows).T).T)
+
+    def of_errors(self, rows: Array) -> tuple[Array, dict[str, Array]]:
+        """Return how estimates follow errors of one standard deviation, independent of each other.
+
+        By decorrelated rows (N, p) of which each tells how an estimate follows a datum: for the
+        errors of single data (N, p), and by name for the data's scales, (1, p) each.
+        """
+        own = self.decorrelated(rows)
+        names = (error.name for error in self._errors)
+        # a meter that is known to show too much has data that are corrected downwards
+        return own, dict(zip(names, np.expand_dims(-self._pattern.T @ own, 1), strict=True))
 
     def told(self, differences: Array, slopes: Array, covariance: Array) -> dict[str, Moved]:
         """Return the errors as the data tell them, by name.

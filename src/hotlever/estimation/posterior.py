@@ -56,34 +56,55 @@ class Posterior:
         residual, enlarged by its leverage h (MacKinnon and White's HC3, J. Econometrics 29, 305
         (1985)): C = A⁻¹ Jᵀ V J A⁻¹ with A = JᵀJ and V = r² / (1 − h)².
         """
-        objective, scale = self.objective, np.outer(self._rates, self._rates)
-        if objective.informed:
-            return objective.laplace(self.at.slopes, self._point) * scale
+        if self.objective.informed:
+            laplace = self.objective.laplace(self.at.slopes, self._point)
+            return laplace * np.outer(self._rates, self._rates)
+        return np.asarray(self._by_residuals @ self._by_residuals.T)
+
+    @property
+    def _by_residuals(self) -> Array:
+        """How far each datum's own residual, enlarged by its leverage, moves parameters, (p, N)."""
+        objective = self.objective
         residual = objective.residuals.weighted(self.at.values)
         jacobian = objective.of_data(self.at.slopes, self._point)
         inverse = inverse_or_nan(jacobian.T @ jacobian)
         if residual.size <= self._point.size:
-            return np.full_like(inverse, np.nan)
+            return np.full_like(jacobian.T, np.nan)
         leverage = np.einsum("ij,jk,ik->i", jacobian, inverse, jacobian)
         influence = inverse @ jacobian.T * (residual / np.maximum(1.0 - leverage, _LEAST_FREE))
-        return np.asarray(influence @ influence.T * scale)
+        return np.asarray(self._rates[:, None] * influence)
+
+    @cached_property
+    def influences(self) -> dict[str, Array]:
+        """How far independent errors of one standard deviation move the parameters, (p, m) each.
+
+        By the observable of data with noise, the scale of a meter or thermometer, and the source
+        of a prior: the estimate is, to first order, a weighted sum of all of them, each with an
+        error of its own.
+        """
+        objective, prior = self.objective, self.objective.prior
+        if not objective.informed:
+            moved = objective.residuals.of_errors(self._by_residuals.T)
+            return {name: rows.T for name, rows in moved.items()}
+        influence = self._rates[:, None] * objective.laplace(self.at.slopes, self._point)
+        jacobian = objective.of_data(self.at.slopes, self._point)
+        by_data = objective.residuals.of_errors(jacobian)
+        influences = {name: influence @ rows.T for name, rows in by_data.items()}
+        by_prior, sources = objective.of_priors(self._point), np.array(prior.sources)
+        for source in dict.fromkeys(prior.sources):
+            influences[source] = influence @ by_prior[sources == source].T
+        return influences
 
     @cached_property
     def shares(self) -> dict[str, Array]:
         """What adds up to the covariance, (p, p) each, independent of each other.
 
-        By the source of each prior, and of the data as ``measurement``: the estimate is, to first
-        order, a weighted sum of all of them, each with an error of its own.
+        By the source of each prior, and of the data as ``measurement``.
         """
-        objective, prior = self.objective, self.objective.prior
-        if not objective.informed:
-            return {"measurement": self.covariance}
-        jacobian = objective.of_data(self.at.slopes, self._point)
-        influence = self._rates[:, None] * objective.laplace(self.at.slopes, self._point)
-        shares = {"measurement": influence @ (jacobian.T @ jacobian) @ influence.T}
-        for source, row in zip(prior.sources, objective.of_priors(self._point), strict=True):
-            share = np.outer(influence @ row, influence @ row)
-            shares[source] = shares.get(source, 0.0) + share
+        shares: dict[str, Array] = {}
+        for name, columns in self.influences.items():
+            source = name if name in self.objective.prior.sources else "measurement"
+            shares[source] = shares.get(source, 0.0) + columns @ columns.T
         return shares
 
     @cached_property

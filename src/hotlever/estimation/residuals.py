@@ -199,6 +199,21 @@ class Residuals:
         each = self._each(values), self._each_by(slopes)
         return self._common_covariance.told(*each, covariance)
 
+    def of_errors(self, rows: Array) -> dict[str, Array]:
+        """Return how estimates follow independent errors, by observable and by scale, (m, p) each.
+
+        By rows (N, p) of `weighted`; see `hotlever.estimation.noise.CommonCovariance.of_errors`.
+        """
+        single, scales = self._common_covariance.of_errors(rows)
+        row = np.nonzero(self.present)[0]
+        noise = {name: single[row == number] for number, name in enumerate(self.observables)}
+        return noise | scales
+
+    def noise(self, values: Array) -> Array:
+        """Return the root mean square of the data's errors, (observables,)."""
+        errors = self.errors.scale if self.errors.measured else self.difference(values)
+        return np.sqrt(np.nanmean(np.where(self.present, errors, np.nan) ** 2, axis=1))
+
     def deviations(self, values: Array) -> Array:
         """Return differences in units of the scatter of their observable; 0 where nothing is."""
         return self.errors.deviations(self.difference(values))

@@ -67,7 +67,8 @@ def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes)
     with reporter.progress("calibrate") as update:
-        result = calibrate(measurement, fit=fit, progress=update, **how)
+        at_V = None if request.at is None else parse_setting(request.at)[1]
+        result = calibrate(measurement, fit=fit, at_V=at_V, progress=update, **how)
     _write(reporter, request, outputs, result)
     if not result.describes_data:
         raise ComputationError(f"{data}: {result.doubt}")

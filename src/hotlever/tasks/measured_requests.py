@@ -6,7 +6,7 @@ from dataclasses import MISSING, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hotlever.errors import InputError, unknown_name
+from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.requests import (
     DriveRequest,
@@ -17,7 +17,14 @@ from hotlever.tasks.requests import (
     check_medium,
     option,
 )
-from hotlever.tasks.texts import USUAL, check_number, parse_number, parse_pairs, parse_priors
+from hotlever.tasks.texts import (
+    USUAL,
+    check_number,
+    parse_number,
+    parse_pairs,
+    parse_priors,
+    parse_setting,
+)
 from hotlever.units import setting
 
 if TYPE_CHECKING:
@@ -177,8 +184,9 @@ class CalibrateRequest(PlotRequest, LeversRequest):
     at: str | None = option(
         None,
         metavar="BIAS|POWER",
-        help="Where several levers are compared, as 8V or 2mW; the highest bias that all of them "
-        "were measured at if left out.",
+        help="Bias of the uncertainty budget, as 8V; the hottest tip if left out. With several "
+        "levers where they are compared, as 8V or 2mW; the highest bias that all of them were "
+        "measured at if left out.",
     )
     table: File = option(
         None,
@@ -209,8 +217,11 @@ class CalibrateRequest(PlotRequest, LeversRequest):
         check_medium(self.medium, UNKNOWN_MEDIUM)
         of_one = {"--fit": self.fit, "--table": self.table, "--plot": self.plot}
         self.need_single(*(name for name, path in of_one.items() if path is not None))
-        if self.at is not None and not self.several:
-            raise InputError("--at: expected several data files")
+        if self.at is not None and not self.several and parse_setting(self.at)[0] != "bias_V":
+            raise InputError(
+                f"--at: found {quoted(self.at)}, expected a bias such as 8V of one data file, or "
+                "several data files"
+            )
         self.table_options()
 
     def table_options(self) -> dict[str, Any]:
