@@ -24,8 +24,11 @@ from hotlever.probe.tip import Tip
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
-#: Steps up the cone, evenly spaced in the logarithm of the distance, and nodes along an arc.
-_STEPS, _NODES = 160, 16
+#: Steps up the cone, evenly spaced in the logarithm of the distance: with them temperature and heat
+#: are within 5e-6 in vacuum, and within 3e-5 in air, whose share bends where the cone ends.
+_STEPS, _STEPS_IN_AIR = 48, 96
+#: Nodes along an arc.
+_NODES = 16
 #: Exponent of the share of the arcs that counts beyond the lever's own surface.
 _BEYOND = 1.5
 
@@ -99,10 +102,10 @@ def _climbed(
 ) -> tuple[Array, list[Array]]:
     """Return heights (µm) up the cone, and temperatures and heats at each of them."""
     # the radius and, where air matters, the jumps set the scale of what happens near the end
-    scale = tip.apex_radius_um
-    position = np.linspace(0.0, math.log1p(tip.height_um / scale), 2 * _STEPS + 1)
+    scale, steps = tip.apex_radius_um, _STEPS if air is None else _STEPS_IN_AIR
+    position = np.linspace(0.0, math.log1p(tip.height_um / scale), 2 * steps + 1)
     height = scale * np.expm1(position)
-    per_step = (height + scale) * (position[-1] / _STEPS)
+    per_step = (height + scale) * (position[-1] / steps)
     radius = tip.apex_radius_um + tip.slope * height
     area = _shell(tip) * math.pi * radius**2
     lost = None if air is None else air.conductance(tip, height)
@@ -119,7 +122,7 @@ def _climbed(
 
     state = np.stack([apex_K, apex_mW])
     states = [state]
-    for at in range(0, 2 * _STEPS, 2):  # classical Runge-Kutta
+    for at in range(0, 2 * steps, 2):  # classical Runge-Kutta
         first = slopes(at, state)
         second = slopes(at + 1, state + first / 2.0)
         third = slopes(at + 1, state + second / 2.0)

@@ -140,9 +140,9 @@ def hold(
     Examples
     --------
     >>> from hotlever import Lever, Probe
-    >>> found = hold(Lever(Probe.reference()), "resistance", [3000.0])
-    >>> found.data.tip_K.values.round().tolist(), found.data.state.values.tolist()
-    ([699.0, 1001.0], [1, 2])
+    >>> held = hold(Lever(Probe.reference()), "resistance", [3000.0])
+    >>> held.data.tip_K.values.round().tolist(), held.data.state.values.tolist()
+    ([752.0, 959.0], [1, 2])
     """
     if held not in HELD:
         raise unknown_name("quantity to hold", held, HELD)
