@@ -99,8 +99,9 @@ def test_no_band_is_drawn_and_the_figure_says_so(refused, good):
     assert len(with_band.axes) == 2 * len(without.axes)
     assert with_band.axes[0].collections
     assert not any(axes.collections for axes in without.axes)
-    assert without.get_suptitle().startswith("the data are not described")
-    assert with_band.get_suptitle() == ""
+    lever = "three-leg lever in vacuum"
+    assert without.get_suptitle().startswith(f"{lever}; the data are not described")
+    assert with_band.get_suptitle() == lever
 
 
 def test_the_page_has_no_errors(refused):

@@ -124,7 +124,7 @@ def test_johnson_noise_of_a_resistor_of_many_temperatures():
     uneven = {"circuit.ground.kind": "ground", "circuit.ground.base_temperature_K": 900.0}
     probe = Probe.reference().with_(**uneven, series_resistance_ohm=1e7)
     lever = Lever(probe, COARSE)
-    branch, reading, _ = lever._read(np.array([1.0]))
+    branch, reading, _ = lever.read(np.array([1.0]))
     constraint = branch.parametrisation.constraint(reading.u)
     state = lever.polished(branch.states(reading.u), 1.0, constraint)
     found = Response.of(lever.equations, state.x, constraint, "lever_V")
