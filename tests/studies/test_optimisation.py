@@ -68,6 +68,15 @@ def test_a_bound_on_another_quantity_limits_the_design():
     assert optimum.best.value("power_mW") < optimum.start.value("power_mW")
 
 
+def test_a_search_that_is_cut_off_has_the_best_that_it_saw(monkeypatch):
+    """The first step is to a heater that is longer than its lever."""
+    monkeypatch.setattr("hotlever.studies.optimisation.MOST_DESIGNS", 2)
+    point, bounds = WorkingPoint("tip_K", 700.0), {"heater_length_um": (2.0, 60.0)}
+    optimum = optimise(Probe.reference(), "power_mW", point, bounds)
+    assert "without coming to rest" in optimum.reason
+    assert optimum.best.value("power_mW") == pytest.approx(optimum.start.value("power_mW"))
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

@@ -7,7 +7,7 @@ quantities too. One branch is solved for each design that is tried.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -143,7 +143,7 @@ def optimise(
             "numbers that may change"
         )
     best = search.remade(search.best)
-    limits = search.limits(search.best)
+    limits = search.limits(search.best, best)
     first = SolvedDesign(SimilarLevers(Lever(probe)), probe, point)
     return Optimum(quantity, point, bounds, first, best, limits, search.designs, reason)
 
@@ -220,11 +220,13 @@ class _Search:
 
     def objective(self, share: Array) -> float:
         """Return the quantity in units of the first design's, to be made small."""
-        return self._or_none(share, lambda solved: self._sign * self._value(solved) / self._scale)
+        solved = self.solved_or_none(share)
+        value = np.nan if solved is None else self._sign * solved.value(self._quantity)
+        return value / self._scale if np.isfinite(value) else _NONE
 
     def objective_by(self, share: Array) -> Array:
         """Return its derivatives by the shares, (p,)."""
-        return self._sign / self._scale * self._by_share(self._quantity, share)
+        return self._by_share(self.solved_or_none(share), self._quantity, self._sign / self._scale)
 
     @property
     def constraints(self) -> list[dict[str, Any]]:
@@ -232,34 +234,35 @@ class _Search:
         return [
             {
                 "type": "ineq",
-                "fun": self._room,
-                "jac": self._room_by,
-                "args": (name, bound, sign),
+                "fun": lambda share, *bound: self._room(self.solved_or_none(share), *bound),
+                "jac": lambda share, *bound: self._room_by(self.solved_or_none(share), *bound),
+                "args": bound,
             }
+            for bound in self._bounds
+        ]
+
+    @property
+    def _bounds(self) -> list[tuple[str, float, float]]:
+        """The bounds on quantities: of what, where, and 1 for the least and −1 for the most."""
+        return [
+            (name, bound, sign)
             for name, both in self.limited.items()
             for bound, sign in zip(both, (1.0, -1.0), strict=True)
             if bound is not None
         ]
 
-    def _room(self, share: Array, name: str, bound: float, sign: float) -> float:
-        room = self.solved_or_none(share)
-        if room is None:
-            return 0.0
-        return sign * (room.value(name) - bound) / (abs(bound) or 1.0)
-
-    def _room_by(self, share: Array, name: str, bound: float, sign: float) -> Array:
-        return sign / (abs(bound) or 1.0) * self._by_share(name, share)
-
-    def _or_none(self, share: Array, of: Callable[[SolvedDesign], float]) -> float:
-        solved = self.solved_or_none(share)
-        value = _NONE if solved is None else float(of(solved))
-        return value if np.isfinite(value) else _NONE
-
-    def _by_share(self, quantity: str, share: Array) -> Array:
-        solved = self.solved_or_none(share)
+    def _room(self, solved: SolvedDesign | None, name: str, bound: float, sign: float) -> float:
         if solved is None:
-            return np.zeros(share.size)
-        return np.nan_to_num(solved.gradient(quantity) * (self._high - self._low))
+            return 0.0
+        return sign * (solved.value(name) - bound) / (abs(bound) or 1.0)
+
+    def _room_by(self, solved: SolvedDesign | None, name: str, bound: float, sign: float) -> Array:
+        return self._by_share(solved, name, sign / (abs(bound) or 1.0))
+
+    def _by_share(self, solved: SolvedDesign | None, quantity: str, scale: float) -> Array:
+        if solved is None:
+            return np.zeros(len(self.names))
+        return scale * np.nan_to_num(solved.gradient(quantity) * (self._high - self._low))
 
     # --- solving ----------------------------------------------------------------------------------
 
@@ -284,13 +287,11 @@ class _Search:
             self._similar = SimilarLevers(Lever(probe))
         assert self._similar is not None
         solved = SolvedDesign(self._similar, probe, self._point, self.names)
-        value = self._value(solved)
+        value = solved.value(self._quantity)
         if self.designs == 1:
             self._scale = abs(value) or 1.0
         self._last = share.copy(), solved
-        within = all(
-            self._room(share, *constraint["args"]) >= -_AT_BOUND for constraint in self.constraints
-        )
+        within = all(self._room(solved, *bound) >= -_AT_BOUND for bound in self._bounds)
         if within and self._sign * value < self._least:
             self._least, self.best = self._sign * value, share.copy()
         return solved
@@ -301,25 +302,18 @@ class _Search:
         drawn, now = (each.values(self.names) for each in (self._similar.drawn, probe))
         return bool(np.all(np.abs(now - drawn) <= _MOVED * np.abs(drawn)))
 
-    def _value(self, solved: SolvedDesign) -> float:
-        return solved.value(self._quantity)
-
     # --- what limits a design ---------------------------------------------------------------------
 
-    def limits(self, share: Array) -> tuple[str, ...]:
+    def limits(self, share: Array, solved: SolvedDesign) -> tuple[str, ...]:
         """Return the bounds that a design is at and would be better beyond.
 
         Of a number, as far as the bounds on quantities that are met leave it free: the objective's
         derivatives without what these hold, by least squares.
         """
-        met = [
-            each["args"]
-            for each in self.constraints
-            if self._room(share, *each["args"]) < _AT_BOUND
-        ]
-        by = self.objective_by(share)
+        met = [bound for bound in self._bounds if self._room(solved, *bound) < _AT_BOUND]
+        by = self._by_share(solved, self._quantity, self._sign / self._scale)
         if met:
-            held = np.array([self._room_by(share, *args) for args in met])
+            held = np.array([self._room_by(solved, *bound) for bound in met])
             by = by - np.linalg.lstsq(held.T, by, rcond=None)[0] @ held
         texts = []
         for name, here, slope, *ends in zip(
