@@ -17,7 +17,7 @@ import numpy as np
 from hotlever.air.chip import BaseLine
 from hotlever.app.jobs import Task
 from hotlever.app.live import coloured
-from hotlever.app.work import request_of
+from hotlever.app.work import probe_of, request_of
 from hotlever.app.workers import Report
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever import Branch, Lever
@@ -46,7 +46,7 @@ def described(
     report: Report, folder: Path, name: str | None, tilt_deg: float | None
 ) -> dict[str, Any]:
     """Return the distances (µm) that a probe allows, and what its file says of its surroundings."""
-    probe = Probe.reference() if name is None else Probe.from_file(folder / name)
+    probe = probe_of(folder, name)
     around = probe.surroundings
     tilt = around.surface_tilt_deg if tilt_deg is None else tilt_deg
     line = _Line(probe.layout())

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 
 from hotlever import figures
 from hotlever.app.project import CALIBRATIONS, file_stamp
+from hotlever.app.work import probe_of
 from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.levers import calibration_rows, compare_calibrations
@@ -62,7 +63,7 @@ def understood(
     Beside it may be told its columns, the file of the probe, and the pulse that was measured.
     """
     told = told or {}
-    probe = _probe(folder, told.get("probe"))
+    probe = probe_of(folder, told.get("probe"))
     assigned = parse_columns(told.get("columns") or [])
     pulse = told.get("waveform")
     waveform = waveform_from_text("pulse", pulse) if pulse else None
@@ -201,7 +202,7 @@ def probe_of_values(
 
 def probe_file(report: Report, folder: Path, name: str, suffix: str, mesh: bool = False) -> bytes:
     """Return the drawing of a probe as the content of a file."""
-    probe = _probe(folder, name)
+    probe = probe_of(folder, name)
     triangles = chosen_space(probe).mesh if mesh else None
     return _file(figures.probe_drawing(probe.layout(), name, mesh=triangles), suffix)
 
@@ -247,7 +248,7 @@ def design_numbers(report: Report, folder: Path, name: str | None) -> dict[str, 
     """Return what can be varied of a probe, what is asked for first before the rest."""
     from hotlever.studies.design import Design
 
-    design = Design(_probe(folder, name))
+    design = Design(probe_of(folder, name))
     numbers = design.numbers
     return {key: numbers[key] for key in dict.fromkeys((*design.usual, *numbers)) if numbers[key]}
 
@@ -259,7 +260,7 @@ def materials(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
     if name is None:
         made_of, curves = None, catalogue.curves()
     else:
-        probe = _probe(folder, name)
+        probe = probe_of(folder, name)
         made_of = probe.made_of
         curves = catalogue.curves(made_of, probe.layout().thickness_um)
     return {"kinds": catalogue.sections(made_of), "figure": _svg(figures.material_curves(curves))}
@@ -335,10 +336,6 @@ def _impossible(values: Mapping[str, Any], fault: str) -> Figure:
     place = None if wrong is None else np.mean(wrong.rings[0], axis=0).tolist()
     outlines = {region.name: region.rings for region in regions}
     return figures.outlines_drawing(outlines, fault=fault, place=place)
-
-
-def _probe(folder: Path, name: str | None) -> Probe:
-    return Probe.reference() if name is None else Probe.from_file(folder / name)
 
 
 #: Pages of results, whose figures may be asked for as files; the latest last.

@@ -16,7 +16,7 @@ import numpy as np
 
 from hotlever.app.jobs import Task
 from hotlever.app.live import coloured
-from hotlever.app.work import request_of
+from hotlever.app.work import probe_of, request_of
 from hotlever.app.workers import Report
 from hotlever.contact.law import INTERFACE
 from hotlever.contact.picture import contact_picture
@@ -43,7 +43,7 @@ _near: WeakKeyDictionary[Lever, State] = WeakKeyDictionary()
 
 def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
     """Return radius (nm), interface (K/W) and sample that a probe file states, or usual ones."""
-    probe = Probe.reference() if name is None else Probe.from_file(folder / name)
+    probe = probe_of(folder, name)
     contact = probe.contact
     return {
         "radius_nm": 1e3 * (probe.tip or EXAMPLE).apex_radius_um,

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter
 from hotlever.app.changes import Changes
 from hotlever.app.jobs import Task
 from hotlever.app.workers import Report
+from hotlever.probe import Probe
 from hotlever.tasks.approaching import approach
 from hotlever.tasks.calibrating import calibrate_files
 from hotlever.tasks.contacting import touch
@@ -84,3 +85,8 @@ def request_of(task: Task, folder: Path | None = None) -> tuple[Any, Callable[[R
         files = [str(folder / name) for name in task.files] if folder else list(task.files)
         options[files_are] = files if task.command in _OF_SEVERAL else files[0]
     return TypeAdapter(request).validate_python(options), do
+
+
+def probe_of(folder: Path, name: str | None) -> Probe:
+    """Return the probe of a file in a folder, the reference probe where none is named."""
+    return Probe.reference() if name is None else Probe.from_file(folder / name)

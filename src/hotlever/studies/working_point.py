@@ -39,8 +39,6 @@ OF_THE_KNEE = {
 DISTANCES = {"knee_distance_K": "knee_K", "knee_distance_V": "knee_bias_V"}
 TIME_CONSTANT = "time_constant_us"
 QUANTITIES = (*OF_A_STATE, TIME_CONSTANT, *OF_THE_KNEE, *DISTANCES)
-#: What may select the working point.
-SELECTING = ("tip_K", "bias_V", "power_mW")
 
 #: Distance (K^½) of the states that tell how derivatives change at the knee.
 _NEAR_KNEE = 0.3
@@ -55,7 +53,7 @@ class WorkingPoint:
     Attributes
     ----------
     column : str
-        One of `SELECTING`.
+        ``tip_K``, ``bias_V`` or ``power_mW``.
     value : float
         K, V or mW.
     """

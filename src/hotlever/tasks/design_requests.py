@@ -51,14 +51,15 @@ class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
         "700K", metavar="POINT", help="Working point: a tip temperature, or as 8V or 2mW."
     )
 
-    def outputs(self, *inputs: Path | None) -> Outputs:
-        """Check the files: of an optimum a probe file and a figure."""
-        if self.minimise is None and self.maximise is None:
-            return super().outputs(*inputs)
-        outputs = Outputs(*inputs)
-        outputs.file(self.output, ".toml")
-        outputs.file(self.plot, *FIGURE_TYPES)
-        return outputs
+    @property
+    def asks_for_best(self) -> bool:
+        """Whether the best design is looked for."""
+        return self.minimise is not None or self.maximise is not None
+
+    @property
+    def output_types(self) -> tuple[str, ...]:
+        """How the name of the file may end: the best design is a probe file."""
+        return (".toml",) if self.asks_for_best else super().output_types
 
 
 @dataclass(kw_only=True)

@@ -21,8 +21,9 @@ _DRAWN = 2
 
 def vary_design(reporter: Reporter, request: DesignRequest) -> None:
     """Find how knee, tip temperature and loss to air depend on a probe's design."""
-    if request.minimise is not None or request.maximise is not None:
-        return optimise_design(reporter, request)
+    if request.asks_for_best:
+        optimise_design(reporter, request)
+        return
     if request.within is not None:
         raise InputError("--within: goes with --minimise or --maximise")
     output, plot, outputs = request.output, request.plot, request.outputs(request.probe)
@@ -49,7 +50,7 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
             reporter.note(
                 f"a drawing has no dimensions but these; --vary NAME=START:STOP:COUNT of {names}"
             )
-        return None
+        return
     with reporter.progress("design") as update:
         data = study.vary(start, varied, progress=update, **asked)
     reporter.note(*study.design_notes(data))
@@ -61,7 +62,6 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
         draw(plot, lambda figures: figures.design_study(data))
     if output is None:
         reporter.give(study.design_csv(data))
-    return None
 
 
 def optimise_design(reporter: Reporter, request: DesignRequest) -> None:

@@ -108,10 +108,15 @@ class TableRequest(PlotRequest):
         None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
     )
 
+    @property
+    def output_types(self) -> tuple[str, ...]:
+        """How the name of the table's file may end."""
+        return ".csv", ".nc"
+
     def outputs(self, *inputs: Path | None) -> Outputs:
         """Check these files, which are none of the inputs."""
         outputs = Outputs(*inputs)
-        outputs.file(self.output, ".csv", ".nc")
+        outputs.file(self.output, *self.output_types)
         outputs.file(self.plot, *FIGURE_TYPES)
         return outputs
 
