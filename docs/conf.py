@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pydoc
 import re
 import sys
 from pathlib import Path
@@ -49,9 +50,13 @@ html_show_copyright = False
 
 
 def by_last_name(app: Any, env: Any, node: Any, contents: Any) -> Any:
-    """Find what a docstring means by a name without its module, where only one thing has it."""
+    """Find what is meant by a name without its module, or by one of another that offers it too."""
     domain, target = env.domains["py"], node.get("reftarget", "")
     full = [name for name in domain.objects if name.endswith(f".{target}")]
+    if not full and target.startswith("hotlever."):
+        meant = pydoc.locate(target)
+        defined = f"{getattr(meant, '__module__', '')}.{getattr(meant, '__qualname__', '')}"
+        full = [defined] if defined in domain.objects else []
     if node.get("refdomain") != "py" or len(full) != 1:
         return None
     return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", full[0], node, contents)

@@ -52,7 +52,8 @@ def fit(
     progress : callable, optional
         Called with solved sweeps and how many there usually are.
     seen : callable, optional
-        Called with each `Prediction` on the way, which comes nearer and nearer to the data.
+        Called with each `hotlever.estimation.experiment.Prediction` on the way, which comes nearer
+        and nearer to the data.
     **choices
         Fields of `FitOptions`, such as ``fixed={"n_d": 3.3e17}``.
 

@@ -27,8 +27,9 @@ _OF_THE_CONTACT = (
     *("tip_K", "apex_K", "sample_mW"),
     *("tip_K_per_mW", "interface_K_per_mW", "spreading_K_per_mW", "current_change_mA"),
 )
-#: Columns of a file, by bias and in time.
+#: Columns of a file by bias.
 CONTACT_COLUMNS: tuple[str, ...] = ("bias_V", "current_mA", *_OF_THE_CONTACT)
+#: Columns of a file in time.
 HISTORY_COLUMNS: tuple[str, ...] = ("time_us", *CONTACT_COLUMNS)
 #: By this name probes have the radius of the contact.
 _RADIUS = "apex_radius_um"

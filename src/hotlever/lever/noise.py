@@ -6,9 +6,9 @@ electro-thermal feedback of the circuit counts, as at all frequencies that the l
 Mather, Appl. Opt. 21, 1125 (1982)). One-sided spectral densities (V²/Hz):
 
 - Johnson noise (H. Nyquist, Phys. Rev. 32, 110 (1928)), current densities of 4 k_B T σ, which heat
-  as well: 4 k_B ∫ T σ |∇φ − τ ∇V|² dV, for a resistor alone 4 k_B ∫ T ρ |j|² dV / I². Resistors of
+  as well: 4 k_B ∫ T σ (∇φ − τ ∇V)² dV, for a resistor alone 4 k_B ∫ T ρ j² dV / I². Resistors of
   the circuit are at room temperature.
-- Fluctuations of the temperature, heat fluxes of 4 k_B T² κ: 4 k_B ∫ T² κ |∇τ|² dV over lever and
+- Fluctuations of the temperature, heat fluxes of 4 k_B T² κ: 4 k_B ∫ T² κ (∇τ)² dV over lever and
   air; of one thermal conductance 4 k_B T² G.
 - 1/f noise (F. N. Hooge, Phys. Lett. A 29, 139 (1969)), conductivities of α σ²/(n f):
   α/f ∫ σ²/n (∇V·(∇φ − τ ∇V))² dV, for a resistor of N carriers α V²/(N f).

@@ -90,7 +90,7 @@ def at_fixed_bias(
         Derivatives of V_l, I_h, V_r and the rise of the tip, see
         `hotlever.lever.sensitivities.by_parameter`.
     of_circuit : ndarray, shape (n, p)
-        Derivatives of the bias for a given state, see `Circuit.bias_by`.
+        Derivatives of the bias for a given state, see `hotlever.probe.supply.SweptSupply.bias_by`.
 
     Returns
     -------

@@ -26,7 +26,7 @@ _LONGEST, _MOST_STEPS, _DEEPEST = 1000, 300, 60
 TEMPERATURE = "T"
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*")
 
-#: Value and derivatives, by name.
+# Value and derivatives, by name.
 Dual = tuple[Any, dict[str, Any]]
 
 #: Functions and their derivatives by the argument, which are given the value too.

@@ -68,7 +68,7 @@ class _Cubic(NamedTuple):
 
 
 class _Reduced(NamedTuple):
-    """|S| e/k_B plus the logarithm of the density, by w = ln(1 + density / density of states).
+    """S e/k_B in size plus the logarithm of the density, by w = ln(1 + density / that of states).
 
     And its derivative by the scattering exponent.
     """
@@ -228,8 +228,8 @@ def thermoelectric_n_silicon(
     """Thermoelectricity of n-doped silicon, β (A cm⁻¹ K⁻¹) and γ (W cm⁻¹ K⁻²), (2, ...).
 
     From γ the bipolar part of pure silicon is taken off: κ of Eq. 4 was measured on pure silicon
-    and has it. The phonons' drag on the carriers is left out; it adds to |S| of lightly doped
-    silicon near and below room temperature.
+    and has it. The phonons' drag on the carriers is left out; it makes S of lightly doped silicon
+    larger near and below room temperature.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ _NONE = 1e3
 #: What is no number of a design: it is of the experiment.
 _NOT_OF_A_DESIGN = ("base_temperature_K",)
 
-#: From and to; None where there is no bound.
+# From and to; None where there is no bound.
 Bounds = tuple[float | None, float | None]
 
 

@@ -1,7 +1,8 @@
 """Thomson heat in strips of one doping: at which temperature it turns, and where they are hottest.
 
-There is no Peltier heat in them. |S| of one carrier grows with the temperature, that of two falls:
-Thomson heat −T J·(∂S/∂T ∇T) has the other sign above the temperature at which |S| is largest.
+There is no Peltier heat in them. S of one carrier grows in size with the temperature, that of two
+falls: Thomson heat −T J·(∂S/∂T ∇T) has the other sign above the temperature at which S is largest
+in size.
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ def turn_of_thomson_heat(silicon: LowDopedSilicon) -> float:
 
 @one_blas_thread
 def largest_seebeck(silicon: LowDopedSilicon) -> float:
-    """Return the temperature (K) at which |S| of the majority's sign is largest, from the law."""
+    """Return the temperature (K) at which S of the majority's sign is largest, from the law."""
     T = np.linspace(300.0, 1300.0, 1001)
     sigma, _ = silicon.electrical_conductivity(T, silicon.n_d)
     (beta, _), _ = silicon.thermoelectric(T, silicon.n_d, silicon.carrier)

@@ -38,6 +38,7 @@ OF_THE_KNEE = {
 #: From the working point up to the knee.
 DISTANCES = {"knee_distance_K": "knee_K", "knee_distance_V": "knee_bias_V"}
 TIME_CONSTANT = "time_constant_us"
+#: All that may be made least or greatest, or bounded.
 QUANTITIES = (*OF_A_STATE, TIME_CONSTANT, *OF_THE_KNEE, *DISTANCES)
 
 #: Distance (K^½) of the states that tell how derivatives change at the knee.

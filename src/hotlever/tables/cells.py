@@ -18,7 +18,7 @@ from hotlever.units import LARGEST_NUMBER, LONGEST_NUMBER, NUMBER
 MOST_LINES = 200_000  #: of a file, unless its reader says otherwise
 LONGEST_LINE = 2**17  #: characters; a spectrometer's map has some 40 000
 
-#: A line of a file, and its number.
+# A line of a file, and its number.
 Line = tuple[int, str]
 
 #: Lines by which a file's dialect is told.

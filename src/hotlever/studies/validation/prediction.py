@@ -22,6 +22,7 @@ from hotlever.studies.validation.case import Case, Stored
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
+#: Levers that are drawn from the priors of a case.
 DRAWS = 64
 _SEED = 30
 #: Share of the draws that may be no lever, or one that does not show the quantity.
