@@ -146,7 +146,7 @@ def test_what_escapes_is_one_line_that_names_a_log(monkeypatch, tmp_path, run, e
     def fails(*_):
         raise error
 
-    monkeypatch.setattr("hotlever.cli.probe.read_probe", fails)
+    monkeypatch.setattr("hotlever.tasks.describing.read_probe", fails)
     status, out, err = run("probe", "show")
     assert (status, out, len(err.splitlines())) == (1, "", 1)
     assert words in err
@@ -160,7 +160,7 @@ def test_the_log_goes_where_it_can(monkeypatch, tmp_path, run):
     (tmp_path / "state").write_text("a file")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("hotlever.cli.probe.read_probe", lambda *_: 1 / 0)
+    monkeypatch.setattr("hotlever.tasks.describing.read_probe", lambda *_: 1 / 0)
     status, _, err = run("probe", "show")
     assert status == 1
     [log] = tmp_path.glob("hotlever-*.log")

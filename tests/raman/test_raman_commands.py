@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import synthetic_spectra as synthetic
-from hotlever.cli.raman import spread_option
+from hotlever.cli.options import spread_option
 from hotlever.figures import raman as figures
 from hotlever.raman.calibration import published_raman_calibration
 from hotlever.raman.reading import read_spectra

@@ -81,7 +81,7 @@ def answer(
     HotleverError
         If the reader can show nothing, or has no state at this bias.
     """
-    request, _ = request_of(task, folder)
+    request = request_of(task, folder)
     ends = parse_distances(request.distance)
     distances = np.geomspace(ends[0], ends[-1], _DISTANCES)
     probe = probe_over_surface(report, request, distances)

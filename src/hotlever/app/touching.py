@@ -73,7 +73,7 @@ def answer(
     HotleverError
         If there is no such contact, or no state at this bias.
     """
-    request, _ = request_of(task, folder)
+    request = request_of(task, folder)
     probe = probe_in_contact(report, request)
     curves: dict[str, Any] | None = None
     if quick:

@@ -1,4 +1,4 @@
-"""The command line of hotlever: one module for each command, and `main`, which runs them."""
+"""The command line of hotlever: the commands of `hotlever.tasks`, and `main`, which runs them."""
 
 from hotlever.cli.running import main
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import typer
-from typer import Argument, Option
 
-from hotlever.cli.commands import app
-from hotlever.cli.output import fail, tell
 from hotlever.errors import InputError
+from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.requests import argument, option
 from hotlever.tasks.texts import check_number
 from hotlever.unforeseen import unforeseen_error
 
@@ -20,19 +20,23 @@ _PASSWORD = "HOTLEVER_APP_PASSWORD"
 _LEAST_PASSWORD = 8
 
 
-@app.command("app")
-def app_command(
-    folder: Path = Argument(
-        Path(), metavar="[FOLDER]", help="The project: its files are those of the command line."
-    ),
-    host: str = Option("127.0.0.1", help="Address to serve at; others need --yes-share."),
-    port: int = Option(0, help="Port to serve at; a free one if left out."),
-    yes_share: bool = Option(
-        False, "--yes-share", help="Let others in, who know the password that is asked for."
-    ),
-    no_browser: bool = Option(False, "--no-browser", help="Print the address only."),
-) -> None:
+@dataclass(kw_only=True)
+class AppRequest:
     """Open a page in your browser in which files are dropped and sliders moved."""
+
+    folder: Path = argument(
+        Path(), metavar="[FOLDER]", help="The project: its files are those of the command line."
+    )
+    host: str = option("127.0.0.1", help="Address to serve at; others need --yes-share.")
+    port: int = option(0, help="Port to serve at; a free one if left out.")
+    yes_share: bool = option(
+        False, "--yes-share", help="Let others in, who know the password that is asked for."
+    )
+    no_browser: bool = option(False, "--no-browser", help="Print the address only.")
+
+
+def open_app(reporter: Reporter, request: AppRequest) -> None:
+    """Serve a project until Ctrl-C."""
     try:
         import nicegui  # noqa: F401
     except ImportError:
@@ -40,12 +44,13 @@ def app_command(
     from hotlever.app.project import Project
     from hotlever.app.server import LOCAL, Served, serve
 
-    check_number("--port", port, 0, 65535)
+    check_number("--port", request.port, 0, 65535)
     password = None
-    if host not in LOCAL:
-        if not yes_share:
+    if request.host not in LOCAL:
+        if not request.yes_share:
             raise InputError(
-                f"--host {host}: others could reach your files; add --yes-share if they should"
+                f"--host {request.host}: others could reach your files; add --yes-share if they "
+                "should"
             )
         password = os.environ.get(_PASSWORD) or _asked()
         if len(password) < _LEAST_PASSWORD:
@@ -55,12 +60,13 @@ def app_command(
             )
 
     def say(address: str) -> None:
-        tell(f"hotlever app: {address}  (Ctrl-C ends it)")
+        reporter.tell(f"hotlever app: {address}  (Ctrl-C ends it)")
 
     def failed(error: BaseException) -> None:
-        fail(unforeseen_error(error, ["app", str(folder)]))
+        reporter.fail(unforeseen_error(error, ["app", str(request.folder)]))
 
-    serve(Project(folder), Served(host, port, password), not no_browser, say, failed)
+    served = Served(request.host, request.port, password)
+    serve(Project(request.folder), served, not request.no_browser, say, failed)
 
 
 def _asked() -> str:

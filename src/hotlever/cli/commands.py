@@ -1,42 +1,26 @@
-"""The ``hotlever`` command: the application, and where each command is.
+"""The ``hotlever`` command: a command line of the commands that there are.
 
-Commands are thin: parse, call the library, write, print. A command's module is imported when it is
-called, and imports what it computes with when it computes, so that the command line answers at
-once.
+A command is parsed, done and reported. What it computes with is imported when it is done, so that
+the command line answers at once.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
 import typer
 import typer.core
 
 from hotlever import __version__
+from hotlever.cli.browser import AppRequest
+from hotlever.cli.options import add_command
 from hotlever.cli.output import give
 from hotlever.errors import InputError, unknown_name
+from hotlever.tasks.commands import COMMANDS, Command
 
-#: The module of each command, which registers itself on `app` when it is imported.
-_MODULES = {
-    "app": "browser",
-    "cache": "cache",
-    "calibrate": "estimate",
-    "contact": "levers",
-    "design": "design",
-    "fit": "estimate",
-    "join": "raman",
-    "materials": "materials",
-    "probe": "probe",
-    "pulse": "levers",
-    "raman": "raman",
-    "raman-check": "raman",
-    "reader": "levers",
-    "reproduce": "reproduce",
-    "spectrum": "levers",
-    "sweep": "levers",
-    "validate": "validate",
-}
+_EVERY = {**COMMANDS, "app": Command(AppRequest, "hotlever.cli.browser", "open_app")}
+#: What the commands are for whose names have a word in common.
+_GROUPS = {"probe": "Write, describe, draw and import probes."}
 
 
 class Commands(typer.core.TyperGroup):
@@ -61,18 +45,6 @@ class Commands(typer.core.TyperGroup):
         return name, command, rest
 
 
-app = typer.Typer(
-    name="hotlever",
-    cls=Commands,
-    help="How hot is the tip of a Joule-heated silicon cantilever probe, and how sure are we?",
-    invoke_without_command=True,
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-
-
-@app.callback()
 def root(
     version: bool = typer.Option(
         False, "--version", help="Print the version and exit.", is_eager=True
@@ -83,8 +55,24 @@ def root(
         raise typer.Exit
 
 
-def command_line(command: str = "") -> Any:
-    """Return the command line with the command of some name, or with all where there is none."""
-    for name in [command] if command in _MODULES else _MODULES:
-        import_module(f"hotlever.cli.{_MODULES[name]}")
+def command_line(word: str = "") -> Any:
+    """Return the command line with the commands that begin with a word, or all if none does."""
+    app = typer.Typer(
+        name="hotlever",
+        cls=Commands,
+        help="How hot is the tip of a Joule-heated silicon cantilever probe, and how sure are we?",
+        invoke_without_command=True,
+        add_completion=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+    )
+    app.callback()(root)
+    groups = {"": app}
+    asked = {name: command for name, command in _EVERY.items() if name.split()[0] == word}
+    for name, command in (asked or _EVERY).items():
+        group, _, last = name.rpartition(" ")
+        if group not in groups:
+            groups[group] = typer.Typer(cls=Commands, help=_GROUPS[group], rich_markup_mode=None)
+            app.add_typer(groups[group], name=group)
+        add_command(groups[group], last, command)
     return typer.main.get_command(app)

@@ -1,4 +1,4 @@
-"""What is asked of tasks about designs: what a change does, the best within bounds, a drawing."""
+"""What is asked of tasks about probes: what a change of the design does, files, drawings."""
 
 from __future__ import annotations
 
@@ -18,10 +18,13 @@ from hotlever.tasks.requests import (
     option,
 )
 
+#: Shapes of new probe files, and the methods of `Probe` that make one.
+NEW_PROBES = {"three-leg": "reference", "u-shape": "u_shape"}
+
 
 @dataclass(kw_only=True)
 class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
-    """What a change of a probe's design does."""
+    """Show how knee, tip temperature and loss to air depend on a probe's design."""
 
     vary: list[str] | None = option(
         None,
@@ -63,8 +66,23 @@ class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
 
 
 @dataclass(kw_only=True)
+class NewRequest:
+    """Write the reference probe as a commented file."""
+
+    output: File = option(None, "-o", "--output", help="File; standard output if left out.")
+    shape: str = option("three-leg", help=f"One of: {', '.join(NEW_PROBES)}.")
+
+
+@dataclass(kw_only=True)
+class ShowRequest(PlotRequest, ProbeRequest):
+    """Draw and describe a probe."""
+
+    mesh: bool = option(False, "--mesh", help="Draw the triangles of the mesh too.")
+
+
+@dataclass(kw_only=True)
 class ImportRequest(PlotRequest):
-    """A probe file for a drawing."""
+    """Say what a drawing holds, and propose a probe file for it."""
 
     drawing: Path = argument(MISSING, metavar="DRAWING", help="GDSII, OASIS or DXF file.")
     output: File = option(

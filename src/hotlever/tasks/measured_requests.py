@@ -109,7 +109,14 @@ class LeversRequest(MeasuredRequest):
 
 @dataclass(kw_only=True)
 class FitRequest(DriveRequest, LeversRequest):
-    """Material parameters from measurements."""
+    """Find the material parameters that make the model match a measurement.
+
+    Of what was measured in time, a file with a column as 'time (us)', the heat capacity, and what
+    else is free; the wave form is the column V_b, or what is told.
+
+    With several data files: of each lever, in parallel, and how the levers scatter. The same
+    command again goes on where it was stopped.
+    """
 
     observables: str | None = option(
         None, help="Some of current,reader,tip,bridge; all that the file has if left out."
@@ -170,7 +177,11 @@ class FitRequest(DriveRequest, LeversRequest):
 
 @dataclass(kw_only=True)
 class CalibrateRequest(PlotRequest, LeversRequest):
-    """The tip temperature of levers from their I-V curves."""
+    """Find the tip temperature of a lever from its I-V curve, with its error.
+
+    With several data files: of each lever, in parallel, and where the levers differ. The same
+    command again goes on where it was stopped.
+    """
 
     fit: File = option(None, help="A fit of this lever (hotlever fit -o).")
     power_law: File = option(None, help="Power law in vacuum (JSON), or a calibration file.")
@@ -249,9 +260,11 @@ class CalibrateRequest(PlotRequest, LeversRequest):
         return outputs
 
 
-def calibration_option() -> Any:
-    """Return the field of a calibration of Raman spectra."""
-    return option(
+@dataclass(kw_only=True)
+class RamanLawRequest:
+    """A calibration of Raman spectra."""
+
+    calibration: str | None = option(
         None,
         metavar="CAL.json",
         help="A calibration that --save-calibration wrote, or 'published' for the published "
@@ -259,16 +272,10 @@ def calibration_option() -> Any:
     )
 
 
-def spectra_argument() -> Any:
-    """Return the field of the spectra that are measured."""
-    return argument(MISSING, metavar="FILE_OR_DIR...", help="Spectra, or folders of spectra.")
-
-
 @dataclass(kw_only=True)
-class ThermometerRequest:
+class ThermometerRequest(RamanLawRequest):
     """How the silicon line is found, and what its shift is read with; see `set_up`."""
 
-    calibration: str | None = calibration_option()
     calibrate_from: list[Path] | None = option(
         None, metavar="FILE_OR_DIR...", help="Hot-plate spectra to calibrate from; one or more."
     )
@@ -315,9 +322,14 @@ class ThermometerRequest:
         return [*several, self.temperatures, self.calibration, self.corrections]
 
 
+def spectra_argument() -> Any:
+    """Return the field of the spectra that are measured."""
+    return argument(MISSING, metavar="FILE_OR_DIR...", help="Spectra, or folders of spectra.")
+
+
 @dataclass(kw_only=True)
 class RamanRequest(ThermometerRequest):
-    """The silicon line in spectra, and the temperature."""
+    """Find the silicon line in Raman spectra and, calibrated, the temperature."""
 
     spectra: list[Path] = spectra_argument()
     save_calibration: File = option(
@@ -335,3 +347,24 @@ class RamanRequest(ThermometerRequest):
         outputs.file(self.save_calibration, ".json")
         outputs.file(self.output, ".csv")
         return outputs
+
+
+@dataclass(kw_only=True)
+class JoinRequest(ThermometerRequest):
+    """Join a bias log with tip spectra into the file that `hotlever fit` takes.
+
+    A spectrum belongs to the row that names it in a 'file' column, or has the bias in its name
+    (tip_5.25V.txt); else spectra and rows are paired in order.
+    """
+
+    bias_log: Path = argument(MISSING, metavar="BIAS_LOG.csv", help="The bias sweep.")
+    spectra: list[Path] = spectra_argument()
+    output: File = option(None, "--output", "-o", metavar="DATA.csv", help="Left out: print.")
+
+
+@dataclass(kw_only=True)
+class RamanCheckRequest(RamanLawRequest):
+    """How far the paper's linear law is off above 900 K, and what that does to the knee."""
+
+    plot: File = option(None, metavar="FILE.png|.svg|.pdf", help="The check as a figure.")
+    output: File = option(None, "--output", "-o", metavar="FILE.json", help="The numbers.")

@@ -1,7 +1,8 @@
 """What is asked of tasks: dataclasses whose fields are options of commands; here on levers.
 
 The command line fills one from what is typed, the app from what is chosen on a page. With each
-field stands what the command line says of it. Requests that share options inherit them.
+field stands what the command line says of it; the docstring of a request is the help of its command
+(`hotlever.tasks.commands`). Requests that share options inherit them.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class ProbeRequest:
 
 @dataclass(kw_only=True)
 class MaterialsRequest(PlotRequest):
-    """Materials to list."""
+    """List kinds of material, or those of a probe: parameters, units, bounds, laws, sources."""
 
     probe: File = argument(
         None,
@@ -123,7 +124,7 @@ class TableRequest(PlotRequest):
 
 @dataclass(kw_only=True)
 class SweepRequest(TableRequest, LeverRequest):
-    """A lever over a range of bias."""
+    """Solve a lever over a range of bias."""
 
     bias: str | None = option(
         None,
@@ -241,7 +242,7 @@ class TimesRequest(DriveRequest):
 
 @dataclass(kw_only=True)
 class PulseRequest(TableRequest, LeverRequest, TimesRequest):
-    """A lever in time."""
+    """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
 
     hold_resistance: str | None = option(
         None,
@@ -283,7 +284,7 @@ class PulseRequest(TableRequest, LeverRequest, TimesRequest):
 
 @dataclass(kw_only=True)
 class ContactRequest(TableRequest, LeverRequest, TimesRequest):
-    """A lever whose tip touches a sample, at rest or in time."""
+    """Touch a sample with the tip: apex, heat into the sample, change of the current."""
 
     sample: str | None = option(
         None,
@@ -306,7 +307,7 @@ class ContactRequest(TableRequest, LeverRequest, TimesRequest):
 
 @dataclass(kw_only=True)
 class SpectrumRequest(TableRequest, LeverRequest):
-    """A lever under small signals."""
+    """Show impedance and thermal response to small signals at a bias, or harmonics."""
 
     bias: str = option(MISSING, metavar="V", help="Of the operating point.")
     frequency: str = option(
@@ -319,7 +320,7 @@ class SpectrumRequest(TableRequest, LeverRequest):
 
 @dataclass(kw_only=True)
 class ReaderRequest(TableRequest, LeverRequest):
-    """A lever that reads its distance to a surface."""
+    """Read the distance to a surface: signal, noise, resolution."""
 
     distance: str = option(
         "0.3um:3um:10",

@@ -1,26 +1,30 @@
-"""``hotlever cache``: what is kept on disk to save time."""
+"""What is kept on disk to save time."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from contextlib import suppress
+from dataclasses import dataclass
 
-from typer import Option
+from hotlever.cache import CACHE_VARIABLE, cache_folder, kept_files, largest_size
+from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.requests import option
 
-from hotlever.cli.commands import app
-from hotlever.cli.output import give
 
-
-@app.command("cache")
-def cache_command(clear: bool = Option(False, "--clear", help="Remove all that is kept.")) -> None:
+@dataclass(kw_only=True)
+class CacheRequest:
     """Show what is kept on disk to save time: reduced levers, operators of the air, states."""
-    from hotlever.cache import CACHE_VARIABLE, cache_folder, kept_files, largest_size
 
+    clear: bool = option(False, "--clear", help="Remove all that is kept.")
+
+
+def show_cache(reporter: Reporter, request: CacheRequest) -> None:
+    """Show how many files of each kind are kept, and how large they are."""
     folder = cache_folder()
     if folder is None:
-        give(f"the cache is switched off: {CACHE_VARIABLE} is empty\n")
+        reporter.give(f"the cache is switched off: {CACHE_VARIABLE} is empty\n")
         return
-    if clear:
+    if request.clear:
         for _, path in kept_files(folder):
             with suppress(OSError):
                 path.unlink()
@@ -32,4 +36,4 @@ def cache_command(clear: bool = Option(False, "--clear", help="Remove all that i
     lines = [f"{folder} (at most {largest_size() / 1e9:g} GB)"]
     for kind, bytes_of in sizes.items():
         lines.append(f"{kind:<10} {len(bytes_of):>6} files {sum(bytes_of) / 1e6:>10.1f} MB")
-    give("\n".join([*lines, ""]))
+    reporter.give("\n".join([*lines, ""]))

@@ -1,0 +1,86 @@
+"""Pages that show how far the numbers hold: the paper's results, and other levers' published ones.
+
+What computes is imported when it is needed, since the requests stand here too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from hotlever.files import Outputs, write_text
+from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.requests import File, argument, option
+
+
+@dataclass(kw_only=True)
+class ReproduceRequest:
+    """Compute the paper's tables and figures and put them on one page."""
+
+    output: Path = option(
+        Path("reproduce"), "-o", "--output", help="Folder for the page and its figures."
+    )
+    quick: bool = option(
+        False,
+        "--quick",
+        help="Leave out what takes longest: k by geometry, the tip, the mesh; fewer levers.",
+    )
+
+
+@dataclass(kw_only=True)
+class ValidateRequest:
+    """Predict published numbers of other levers and compare them, on one page and in a table."""
+
+    case: File = argument(
+        None, metavar="[CASE.toml]", help="A case of your own, whose prediction is printed."
+    )
+    output: Path = option(
+        Path("validate"), "-o", "--output", help="Folder for the page and its table."
+    )
+
+
+def reproduce(reporter: Reporter, request: ReproduceRequest) -> None:
+    """Write the page of the paper's results."""
+    from hotlever.report.reproduce import reproduce_page
+
+    outputs = Outputs()
+    outputs.folder(request.output)
+    with reporter.progress_bars("reproduce", "levers") as (update, within):
+        page = reproduce_page(quick=request.quick, progress=update, within=within)
+    with outputs.together():
+        written = page.write(request.output)
+    reporter.give(f"{written}\n")
+
+
+def validate(reporter: Reporter, request: ValidateRequest) -> None:
+    """Write the page and the table of published numbers, or predict those of one case."""
+    if request.case is not None:
+        _predict(reporter, request.case)
+        return
+    from hotlever.datasets import frame_text
+    from hotlever.report.validation_pages import validation_page
+    from hotlever.studies.validation.prediction import COLUMNS
+
+    outputs = Outputs()
+    outputs.folder(request.output)
+    with reporter.progress_bars("validate", "draws") as (update, within):
+        page, compared = validation_page(update, within)
+    with outputs.together():
+        written = page.write(request.output)
+        table = compared.to_dataframe()[list(COLUMNS)]
+        write_text(request.output / "validation.csv", frame_text(table, float_format="%.6g"))
+    reporter.give(f"{written}\n")
+
+
+def _predict(reporter: Reporter, path: Path) -> None:
+    from hotlever.studies.validation.case import Case
+    from hotlever.studies.validation.prediction import predict
+
+    case = Case.from_file(path)
+    with reporter.progress("draws") as update:
+        prediction = predict(case, update)
+    text = prediction.toml()
+    if case.published is not None:
+        value, error = case.published.value, case.published.error
+        text += f"# published {value:g} ± {error:g}: {prediction.verdict(value, error)}\n"
+    reporter.give(text)
