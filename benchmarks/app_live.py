@@ -11,7 +11,6 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
-from pathlib import Path
 from typing import Any
 
 from hotlever import Lever, Probe
@@ -19,8 +18,6 @@ from hotlever.app import approaching, touching
 from hotlever.app.jobs import Task
 from hotlever.lever.reader import over_surface
 from problems import table
-
-HERE = Path()
 
 
 class Silent:
@@ -60,7 +57,7 @@ def contact() -> None:
             task = Task("contact", (), options)
 
             def ask(quick: bool, task: Task = task, bias: float = bias) -> dict[str, Any]:
-                return touching.answer(REPORT, HERE, task, bias, 12.0, quick)
+                return touching.answer(REPORT, task, bias, 12.0, quick)
 
             seconds, moving = timed(lambda ask=ask: ask(True))
             full = ask(False)["now"]
@@ -79,7 +76,7 @@ def reader() -> None:
     full = Lever(Probe.reference().with_(**surface, surface_gap_um=0.5))
     rows = []
     for bias, z in ((9.0, 0.5), (9.0, 0.9), (10.0, 0.5), (11.0, 2.0), (6.0, 0.25), (4.0, 3.3)):
-        ask = (REPORT, HERE, task, bias, z)
+        ask = (REPORT, task, bias, z)
         seconds, now = timed(lambda ask=ask: approaching.answer(*ask))
         data = over_surface(full, [z], [bias])
         off = [

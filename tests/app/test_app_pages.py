@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import contextlib
 import csv
 import io
 import sys
@@ -53,7 +54,7 @@ class Here(Report):
 
 
 def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> None:
-    """Let a user visit the app in a folder."""
+    """Let a user visit the app in a folder, in which its workers work."""
 
     async def told() -> None:
         async with user_simulation() as user:
@@ -64,7 +65,8 @@ def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> No
 
     modules = dict(sys.modules)
     try:
-        asyncio.run(told())
+        with contextlib.chdir(folder):
+            asyncio.run(told())
     finally:
         # the simulation takes out those of its pages, this package among them
         sys.modules.update(modules)
@@ -154,11 +156,11 @@ def test_simulate_goes_as_far_as_the_lever(tmp_path: Path) -> None:
     """Beyond the slider's end too, where only the curves shown at first ended."""
     changes, ask = {"series_resistance_ohm": 8000.0}, {"most": 12.0, "quick": False}
     here: Any = Here()
-    found = live.answer(here, tmp_path, None, changes, {**ask, "bias": 14.0})
+    found = live.answer(here, None, changes, {**ask, "bias": 14.0})
     tip_K = Lever(Probe.reference().with_(**changes)).sweep([14.0]).tip_K.item()
     assert found["now"]["tip_K"] == pytest.approx(tip_K, abs=1e-6)
     with pytest.raises(BranchEndError, match=r"^silicon melts at a bias of 13\.2"):
-        live.answer(here, tmp_path, None, {}, {**ask, "bias": 14.0})
+        live.answer(here, None, {}, {**ask, "bias": 14.0})
 
 
 def test_where_the_reduced_lever_ends_another_answers(
@@ -169,7 +171,7 @@ def test_where_the_reduced_lever_ends_another_answers(
     here: Any = Here()
     ask = {"most": 12.0, "quick": True, "reduced": True}
     for bias, model in ((8.0, "reduced lever"), (13.0, "coarse lever")):
-        found = live.answer(here, tmp_path, None, {}, {**ask, "bias": bias})
+        found = live.answer(here, None, {}, {**ask, "bias": bias})
         assert found["model"] == model
         assert found["now"]["tip_K"] == pytest.approx(coarse.sweep([bias]).tip_K.item(), abs=0.2)
     live._quick.cache_clear()
@@ -202,8 +204,8 @@ def test_numbers_of_another_bias_are_not_shown(tmp_path: Path) -> None:
 def test_a_lever_that_moves_shows_nearly_what_it_shows_at_rest(tmp_path: Path) -> None:
     ask = {"bias": 8.0, "most": 12.0, "quick": True, "reduced": False}
     here: Any = Here()
-    coarse = live.answer(here, tmp_path, None, {"n_d": 5e17}, ask)
-    full = live.answer(here, tmp_path, None, {"n_d": 5e17}, {**ask, "quick": False})
+    coarse = live.answer(here, None, {"n_d": 5e17}, ask)
+    full = live.answer(here, None, {"n_d": 5e17}, {**ask, "quick": False})
     assert coarse["model"] == "coarse lever"
     assert abs(coarse["now"]["tip_K"] - full["now"]["tip_K"]) < 2.0
     assert np.abs(coarse["now"]["line"] - full["now"]["line"]).max() < 5.0
@@ -304,7 +306,7 @@ def test_commands_run_in_processes_that_can_be_ended(tmp_path: Path) -> None:
         # an answer that nobody waits for any more is not the next one's
         worker = jobs._spare
         assert worker is not None
-        first = asyncio.create_task(worker.call("hotlever.app.live:described", tmp_path, None))
+        first = asyncio.create_task(worker.call("hotlever.app.live:described", None))
         await asyncio.sleep(0.05)
         first.cancel()
         assert await worker.call("builtins:isinstance", object) is True

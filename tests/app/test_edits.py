@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import tomllib
 from pathlib import Path
 
@@ -59,7 +60,8 @@ def test_layers_change_what_they_are_made_of(tmp_path: Path) -> None:
 
 
 def _row(text: str, folder: Path, name: str) -> LayerRow:
-    rows = settable(Report.__new__(Report), folder, text)["layers"]
+    with contextlib.chdir(folder):
+        rows = settable(Report.__new__(Report), text)["layers"]
     return next(row for row in rows if row.name == name)
 
 

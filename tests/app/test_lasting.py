@@ -233,7 +233,7 @@ def test_what_nobody_typed_is_drawn_once(tmp_path: Path, monkeypatch: pytest.Mon
     draw = showing.probe_of_text
 
     def counted(*arguments: Any) -> Any:
-        drawn.append(arguments[3])
+        drawn.append(arguments[2])
         return draw(*arguments)
 
     monkeypatch.setattr(showing, "probe_of_text", counted)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import os
@@ -48,7 +49,8 @@ def done(task: Task, folder: Path) -> tuple[Job, list[Any]]:
     job = Job(task)
     here = Hearing(job)
     try:
-        run(here, folder, task)
+        with contextlib.chdir(folder):
+            run(here, task)
         job.end("failed" if job.message else "done")
     except HotleverError as error:
         job.end("failed", str(error))
@@ -58,7 +60,8 @@ def done(task: Task, folder: Path) -> tuple[Job, list[Any]]:
 def understood(folder: Path) -> dict[str, Any]:
     """Return what a measurement is understood as, in this process."""
     here: Any = Here()
-    return showing.understood(here, folder, "mine.csv")
+    with contextlib.chdir(folder):
+        return showing.understood(here, "mine.csv")
 
 
 def test_the_lever_that_is_fitted_is_drawn_beside_the_data(

@@ -53,9 +53,9 @@ def test_reader_shows_what_the_lever_reads_between_the_distances_that_are_solved
     visit(tmp_path, story)
 
 
-def test_a_tilted_surface_is_asked_for_only_where_it_is_below_the_lever(tmp_path: Path) -> None:
+def test_a_tilted_surface_is_asked_for_only_where_it_is_below_the_lever() -> None:
     described = [
-        approaching.described(None, tmp_path, None, tilt)["nearest_um"]  # type: ignore[arg-type]
+        approaching.described(None, None, tilt)["nearest_um"]  # type: ignore[arg-type]
         for tilt in (0.0, 2.0, -2.0)
     ]
     front, base = np.tan(np.radians(2.0)) * np.array([54.4 - 48.58, 48.58])

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,11 +41,9 @@ _READ = tuple(name for name in Signal._fields if not name.startswith(("source", 
 _CURVES = ("reader_V", "dlnR_dz_per_um", "noise_V_per_rtHz", "resolution_nm_per_rtHz", "tip_K")
 
 
-def described(
-    report: Report, folder: Path, name: str | None, tilt_deg: float | None
-) -> dict[str, Any]:
+def described(report: Report, name: str | None, tilt_deg: float | None) -> dict[str, Any]:
     """Return the distances (µm) that a probe allows, and what its file says of its surroundings."""
-    probe = probe_of(folder, name)
+    probe = probe_of(name)
     around = probe.surroundings
     tilt = around.surface_tilt_deg if tilt_deg is None else tilt_deg
     line = _Line(probe.layout())
@@ -63,15 +60,12 @@ def described(
 
 
 @one_blas_thread
-def answer(
-    report: Report, folder: Path, task: Task, bias: float, distance: float
-) -> dict[str, Any]:
+def answer(report: Report, task: Task, bias: float, distance: float) -> dict[str, Any]:
     """Return what a reader shows at a bias (V) and a distance (µm), and by the distance.
 
     Parameters
     ----------
     report : Report
-    folder : path
     task : Task
         That of ``hotlever reader``, over the distances of the curves.
     bias, distance : float
@@ -81,7 +75,7 @@ def answer(
     HotleverError
         If the reader can show nothing, or has no state at this bias.
     """
-    request = request_of(task, folder)
+    request = request_of(task)
     ends = parse_distances(request.distance)
     distances = np.geomspace(ends[0], ends[-1], _DISTANCES)
     probe = probe_over_surface(report, request, distances)

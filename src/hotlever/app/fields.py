@@ -24,7 +24,7 @@ _LAST = ("heat_capacity", "heat_capacity_scale", "emissivity", "melting_point_K"
 _MOST_LAYERS = 40
 
 
-def settable(report: Report, folder: Path, text: str) -> dict[str, Any]:
+def settable(report: Report, text: str) -> dict[str, Any]:
     """Return what can be set in a probe file: layers, materials, thickness, tip and circuit.
 
     Nothing, if the text is no probe file that could be edited so.
@@ -38,17 +38,17 @@ def settable(report: Report, folder: Path, text: str) -> dict[str, Any]:
     except (InputError, AttributeError):
         return {}
     is_drawing = sections["probe"].get("shape") == "drawing"
-    cards = [_card(("materials", name), section, folder) for name, section in materials.items()]
+    cards = [_card(("materials", name), section) for name, section in materials.items()]
     others = ["circuit", *(["probe"] if is_drawing else [])]
     return {
-        "layers": _rows(sections, folder) if is_drawing else [],
+        "layers": _rows(sections) if is_drawing else [],
         "materials": list(materials),
         "cards": [_other(name, values.get(name, {})) for name in reversed(others)] + cards,
         "new": _new_materials(),
     }
 
 
-def _rows(sections: Mapping[str, Any], folder: Path) -> list[LayerRow]:
+def _rows(sections: Mapping[str, Any]) -> list[LayerRow]:
     rows = []
     for part in ("layers", "terminals"):
         for name, given in sections[part].items():
@@ -61,7 +61,7 @@ def _rows(sections: Mapping[str, Any], folder: Path) -> list[LayerRow]:
     probe = sections["probe"]
     if isinstance(file := probe.get("file"), str):
         used = {row.label for row in rows}
-        path = folder / file
+        path = Path(file)
         unit = probe.get("unit_um")
         try:
             asked = (path, file_stamp(path), probe.get("cell"), unit)
@@ -107,7 +107,7 @@ def _other(name: str, section: Mapping[str, Any]) -> dict[str, Any]:
     return {"section": (name,), "title": _TITLES[name], "fields": shown}
 
 
-def _card(path: Section, section: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def _card(path: Section, section: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parameters of a material: of its kind, and those that formulas name."""
     from hotlever.materials.kinds import KINDS
     from hotlever.materials.parameters import STATED
@@ -124,7 +124,7 @@ def _card(path: Section, section: Mapping[str, Any], folder: Path) -> dict[str, 
     preset = PRESETS.get(str(section.get("preset")))
     usual = usual_values(kind.model_fields["kind"].default) | dict(preset.values if preset else {})
     try:
-        given = with_tables(section, folder)
+        given = with_tables(section, Path())
     except InputError:
         given = {}
     useless = kind.without_use({**usual, **given})

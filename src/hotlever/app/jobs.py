@@ -151,7 +151,7 @@ class Jobs:
     def prepare(self) -> None:
         """Have a process ready."""
         if self._spare is None or self._spare.lost:
-            self._spare = Worker()
+            self._spare = Worker(self._folder)
 
     def running(self, page: str) -> bool:
         """Return whether a page has work."""
@@ -179,7 +179,7 @@ class Jobs:
 
     async def _run(self, page: str, job: Job, worker: Worker) -> None:
         try:
-            await worker.call("hotlever.app.work:run", self._folder, job.task, heard=job.hear)
+            await worker.call("hotlever.app.work:run", job.task, heard=job.hear)
             job.end("failed" if job.message else "done")
         except HotleverError as error:
             # what was reached may be written; the message says where it stopped

@@ -182,14 +182,13 @@ class LiveLever:
 
 @one_blas_thread
 def answer(
-    report: Report, folder: Path, name: str | None, changes: dict[str, Any], ask: dict[str, Any]
+    report: Report, name: str | None, changes: dict[str, Any], ask: dict[str, Any]
 ) -> dict[str, Any]:
     """Return what a probe of the project shows with some values changed.
 
     Parameters
     ----------
     report : Report
-    folder : path
     name : str or None
         A probe file; None is the reference probe.
     changes : dict
@@ -204,7 +203,7 @@ def answer(
         If the lever has no state at this bias; a reduced lever that ends below leaves the answer to
         a coarse one.
     """
-    probe = _probe(folder, name, changes)
+    probe = _probe(name, changes)
     most = max(ask["most"], ask["bias"])
     live = _quick(probe, most, ask["reduced"]) if ask["quick"] else _full(report, probe, most)
     if live.model == REDUCED and not live.reaches(ask["bias"]):
@@ -221,11 +220,11 @@ def answer(
     }
 
 
-def prepare(report: Report, folder: Path, name: str | None, changes: dict[str, Any]) -> bool:
+def prepare(report: Report, name: str | None, changes: dict[str, Any]) -> bool:
     """Make the reduced lever of a probe, if it can have one; return whether it has."""
     with suppress(OSError, AttributeError):
         os.nice(_NICE)  # sliders come first
-    probe = _probe(folder, name, changes)
+    probe = _probe(name, changes)
     if not _can_be_reduced(probe):
         return False
     with report.progress_bars("air", "live sliders") as (meshing, training):
@@ -233,9 +232,9 @@ def prepare(report: Report, folder: Path, name: str | None, changes: dict[str, A
     return True
 
 
-def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
+def described(report: Report, name: str | None) -> dict[str, Any]:
     """Return what sliders need of a probe: by group names, values, bounds and units."""
-    probe = _probe(folder, name, {})
+    probe = _probe(name, {})
     sliders: dict[str, list[Any]] = {"material": [], "dimensions": [], "circuit": []}
     parameters = of_materials(probe)
     values = probe.values(list(parameters)).tolist()
@@ -269,8 +268,8 @@ def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
     }
 
 
-def _probe(folder: Path, name: str | None, changes: dict[str, Any]) -> Probe:
-    path = None if name is None else folder / name
+def _probe(name: str | None, changes: dict[str, Any]) -> Probe:
+    path = None if name is None else Path(name)
     stamp = 0.0 if path is None else file_stamp(path)
     return _read_probe(path, stamp, tuple(sorted(changes.items())))
 

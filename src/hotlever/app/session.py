@@ -50,18 +50,18 @@ class Session(History):
 
     def _worker(self, name: str) -> Worker:
         if name not in self.workers:
-            self.workers[name] = Worker()
+            self.workers[name] = Worker(self.project.folder)
         return self.workers[name]
 
     async def ask(
         self, worker: str, function: str, *arguments: Any, heard: Heard | None = None
     ) -> Any:
-        """Call ``module:function`` of the app in a process, with the folder of the project.
+        """Call ``module:function`` of the app in a process.
 
         Raises
         ------
         HotleverError
             As the function says, or if the process died.
         """
-        name, folder = f"hotlever.app.{function}", self.project.folder
-        return await self._worker(worker).call(name, folder, *arguments, heard=heard)
+        name = f"hotlever.app.{function}"
+        return await self._worker(worker).call(name, *arguments, heard=heard)

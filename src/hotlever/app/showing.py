@@ -55,19 +55,17 @@ _POINTS = 1000
 _OF_RESULTS = {"bias_V", "current_mA", "lever_V", "tip_K", "power_mW"}
 
 
-def understood(
-    report: Report, folder: Path, name: str, told: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
+def understood(report: Report, name: str, told: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return what a measurement file was understood as.
 
     Beside it may be told its columns, the file of the probe, and the pulse that was measured.
     """
     told = told or {}
-    probe = probe_of(folder, told.get("probe"))
+    probe = probe_of(told.get("probe"))
     assigned = parse_columns(told.get("columns") or [])
     pulse = told.get("waveform")
     waveform = waveform_from_text("pulse", pulse) if pulse else None
-    measurement = read_measurement_of(probe, folder / name, assigned, waveform)
+    measurement = read_measurement_of(probe, Path(name), assigned, waveform)
     data = measurement.dataset(probe.circuit)
     (along,) = data.sizes
     data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
@@ -78,7 +76,7 @@ def understood(
     notes = [note for note in measurement.notes if note not in measurement.unused]
     return {
         "rows": [(Path(name).name, *head[1:]), *rows],
-        "notes": [note.replace(f"{folder}/", "") for note in notes],
+        "notes": notes,
         "observables": list(measurement.observables),
         "medium": measurement.medium,
         "data": in_time
@@ -86,12 +84,12 @@ def understood(
     }
 
 
-def measurements(report: Report, folder: Path, names: list[str], most: int) -> list[str]:
+def measurements(report: Report, names: list[str], most: int) -> list[str]:
     """Return those of some files, `most` of them, that are measurements of levers.
 
     Logs and spectra are none, nor are tables that hotlever has written, under whatever name.
     """
-    paths = (folder / name for name in names)
+    paths = (Path(name) for name in names)
     measured = (path.name for path in paths if _is_measurement(path, file_stamp(path)))
     return list(islice(measured, most))
 
@@ -106,40 +104,38 @@ def _is_measurement(path: Path, stamp: float) -> bool:
         return not set(file.readline().strip().split(",")) >= _OF_RESULTS
 
 
-def columns(report: Report, folder: Path, name: str, told: Mapping[str, Any]) -> list[FileColumn]:
+def columns(report: Report, name: str, told: Mapping[str, Any]) -> list[FileColumn]:
     """Return the columns of a measurement file, and what they are used as; see `understood`."""
     try:
         assigned = parse_columns(told.get("columns") or [])
     except InputError:
         assigned = {}
-    return file_columns(folder / name, assigned, driven=bool(told.get("waveform")))
+    return file_columns(Path(name), assigned, driven=bool(told.get("waveform")))
 
 
-def page(report: Report, folder: Path, kind: str, name: str) -> None:
+def page(report: Report, kind: str, name: str) -> None:
     """Send the blocks of the page of a result, a fit or a calibration, as they are drawn."""
 
     def send(block: Block) -> None:
         drawing = {"figure": _svg(block["figure"])} if block["kind"] == "figure" else {}
         report.send("block", {**block, **drawing})
 
-    _page(kind, folder / name, send)
+    _page(kind, Path(name), send)
 
 
-def drawn(report: Report, folder: Path, kind: str, name: str, figure: str, suffix: str) -> bytes:
+def drawn(report: Report, kind: str, name: str, figure: str, suffix: str) -> bytes:
     """Return a figure of a result as the content of a file."""
-    blocks = _page(kind, folder / name).blocks
+    blocks = _page(kind, Path(name)).blocks
     made = next(block["figure"] for block in blocks if block.get("name") == figure)
     return _file(made, suffix)
 
 
-def doubted(report: Report, folder: Path, name: str) -> str:
+def doubted(report: Report, name: str) -> str:
     """Return why a calibration does not say what to set; empty if it does."""
-    return _calibration(folder / name, file_stamp(folder / name)).doubt
+    return _calibration(Path(name), file_stamp(Path(name))).doubt
 
 
-def settings(
-    report: Report, folder: Path, name: str, along: str, value: float
-) -> dict[str, float] | None:
+def settings(report: Report, name: str, along: str, value: float) -> dict[str, float] | None:
     """Return what to set, and what follows, for a tip temperature, a bias or a power.
 
     None outside the calibrated range.
@@ -149,7 +145,7 @@ def settings(
     InputError
         If the data of the calibration are not described.
     """
-    calibration = _calibration(folder / name, file_stamp(folder / name))
+    calibration = _calibration(Path(name), file_stamp(Path(name)))
     calibration.need_described("what to set")
     table = calibration.table
     if along == "tip_K":
@@ -168,11 +164,9 @@ def settings(
     return {**row, "bias_V": bias, **({along: value} if along != "bias_V" else {})}
 
 
-def probe_of_text(
-    report: Report, folder: Path, text: str, title: str, mesh: bool = False
-) -> dict[str, Any]:
+def probe_of_text(report: Report, text: str, title: str, mesh: bool = False) -> dict[str, Any]:
     """Return the drawing of a probe file that is being written."""
-    with tempfile.NamedTemporaryFile("w", suffix=".toml", dir=folder, prefix=".hotlever-") as file:
+    with tempfile.NamedTemporaryFile("w", suffix=".toml", dir=".", prefix=".hotlever-") as file:
         file.write(text)
         file.flush()
         try:
@@ -185,7 +179,6 @@ def probe_of_text(
 
 def probe_of_values(
     report: Report,
-    folder: Path,
     shape: str,
     changes: dict[str, Any],
     title: str,
@@ -200,33 +193,33 @@ def probe_of_values(
     return _described(probe, title, mesh) | {"text": probe.to_toml()}
 
 
-def probe_file(report: Report, folder: Path, name: str, suffix: str, mesh: bool = False) -> bytes:
+def probe_file(report: Report, name: str, suffix: str, mesh: bool = False) -> bytes:
     """Return the drawing of a probe as the content of a file."""
-    probe = probe_of(folder, name)
+    probe = probe_of(name)
     triangles = chosen_space(probe).mesh if mesh else None
     return _file(figures.probe_drawing(probe.layout(), name, mesh=triangles), suffix)
 
 
-def refused(report: Report, folder: Path, names: list[str], spectra: bool) -> list[str]:
+def refused(report: Report, names: list[str], spectra: bool) -> list[str]:
     """Return a line for each file that is no measurement, or no spectrum."""
     lines = []
     for name in names:
         try:
             if spectra:
-                read_spectra([folder / name])
+                read_spectra([Path(name)])
             else:
-                read_measurement(folder / name)
+                read_measurement(name)
         except InputError as error:
-            lines.append(str(error).replace(f"{folder}/", ""))
+            lines.append(str(error))
     return lines
 
 
-def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:
+def levers(report: Report, names: list[str]) -> dict[str, Any]:
     """Return the table of the fits, or of the calibrations, that are there."""
     rows, head = [], ["lever"]
     calibrations = dict[str, Calibration]()
     for name in names:
-        path, lever = folder / name, Path(name).name.split(".")[0]
+        path, lever = Path(name), Path(name).name.split(".")[0]
         try:
             if path.parent.name == CALIBRATIONS:
                 calibrations[lever] = _calibration(path, file_stamp(path))
@@ -244,29 +237,29 @@ def levers(report: Report, folder: Path, names: list[str]) -> dict[str, Any]:
     return {"head": [*head, "remark"], "rows": rows}
 
 
-def design_numbers(report: Report, folder: Path, name: str | None) -> dict[str, float]:
+def design_numbers(report: Report, name: str | None) -> dict[str, float]:
     """Return what can be varied of a probe, what is asked for first before the rest."""
     from hotlever.studies.design import Design
 
-    design = Design(probe_of(folder, name))
+    design = Design(probe_of(name))
     numbers = design.numbers
     return {key: numbers[key] for key in dict.fromkeys((*design.usual, *numbers)) if numbers[key]}
 
 
-def materials(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
+def materials(report: Report, name: str | None) -> dict[str, Any]:
     """Return all materials, or those of a probe file, in words and as curves."""
     from hotlever.materials import catalogue
 
     if name is None:
         made_of, curves = None, catalogue.curves()
     else:
-        probe = probe_of(folder, name)
+        probe = probe_of(name)
         made_of = probe.made_of
         curves = catalogue.curves(made_of, probe.layout().thickness_um)
     return {"kinds": catalogue.sections(made_of), "figure": _svg(figures.material_curves(curves))}
 
 
-def packed(report: Report, folder: Path, paths: list[Path]) -> bytes:
+def packed(report: Report, paths: list[Path]) -> bytes:
     """Return files as the content of one."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -26,33 +26,32 @@ from hotlever.types import Array
 _POINTS = 800
 
 
-def names(report: Report, folder: Path, folders: Sequence[str]) -> list[str]:
+def names(report: Report, folders: Sequence[str]) -> list[str]:
     """Return the names of the spectra in some folders of a project, each with its folder."""
     spectra: list[str] = []
     for name in folders:
         # there may be none yet, and other files among them, of which the command says so
         with suppress(InputError):
-            for file, _ in spectrum_files([folder / name]):
+            for file, _ in spectrum_files([Path(name)]):
                 with suppress(InputError, OSError):
                     spectra += (f"{name}/{one}" for one in _names(file, file.stat().st_mtime))
     return spectra
 
 
-def measured(report: Report, folder: Path, name: str, asked: dict[str, Any]) -> dict[str, Any]:
+def measured(report: Report, name: str, asked: dict[str, Any]) -> dict[str, Any]:
     """Return the counts of a spectrum, its fit, and what is read from it, in words.
 
     Parameters
     ----------
     report : Report
-    folder : path
     name : str
         As `names` has it.
     asked : dict
-        Of the thermometer: ``calibration``, ``calibrate_from`` and ``corrections`` are names in the
-        folder, or empty, and ``law`` is one.
+        Of the thermometer: ``calibration``, ``calibrate_from`` and ``corrections`` are files
+        or folders, or empty, and ``law`` is one.
     """
-    spectrum = _spectrum(folder, name)
-    setup, doubt = _setup(folder, asked)
+    spectrum = _spectrum(name)
+    setup, doubt = _setup(asked)
     (line,) = measure([spectrum], setup.options, corrections=setup.corrections)
     table = read_lines([line], setup.thermometer)
     inside = in_window(spectrum.x, "")
@@ -97,25 +96,25 @@ def _summary(line: Line, table: Any) -> str:
     return f"{text} ({flags})" if flags else text
 
 
-def _setup(folder: Path, asked: dict[str, Any]) -> tuple[Thermometry, str]:
+def _setup(asked: dict[str, Any]) -> tuple[Thermometry, str]:
     """Return the thermometer; one without temperatures, and why, if that cannot be made."""
-    by_hand = folder / asked["corrections"] if asked["corrections"] else None
+    by_hand = Path(asked["corrections"]) if asked["corrections"] else None
     options: dict[str, Any] = {"law": asked["law"], "corrections": by_hand}
     calibrated: dict[str, Any] = {}
     if asked["calibration"]:
-        calibrated = {"calibration": str(folder / asked["calibration"])}
+        calibrated = {"calibration": asked["calibration"]}
     elif asked["calibrate_from"]:
-        calibrated = {"calibrate_from": [folder / asked["calibrate_from"]]}
+        calibrated = {"calibrate_from": [Path(asked["calibrate_from"])]}
     try:
         return set_up(Silence(), ThermometerRequest(**calibrated, **options)), ""
     except HotleverError as error:
-        doubt = f"no temperature: {str(error).replace(f'{folder}/', '')}"
+        doubt = f"no temperature: {error}"
     return set_up(Silence(), ThermometerRequest(**options)), doubt
 
 
-def _spectrum(folder: Path, name: str) -> Spectrum:
+def _spectrum(name: str) -> Spectrum:
     where, _, last = name.rpartition("/")
-    for file, _ in spectrum_files([folder / where]):
+    for file, _ in spectrum_files([Path(where)]):
         if last == file.name or last.startswith(f"{file.name}["):
             for spectrum in read_file(file):
                 if spectrum.name == last:

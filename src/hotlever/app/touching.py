@@ -8,7 +8,6 @@ contact``.
 from __future__ import annotations
 
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -41,9 +40,9 @@ _CURVES = ("bias_V", "tip_K", "apex_K", "sample_mW", "beside_mW", "current_chang
 _near: WeakKeyDictionary[Lever, State] = WeakKeyDictionary()
 
 
-def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
+def described(report: Report, name: str | None) -> dict[str, Any]:
     """Return radius (nm), interface (K/W) and sample that a probe file states, or usual ones."""
-    probe = probe_of(folder, name)
+    probe = probe_of(name)
     contact = probe.contact
     return {
         "radius_nm": 1e3 * (probe.tip or EXAMPLE).apex_radius_um,
@@ -53,15 +52,12 @@ def described(report: Report, folder: Path, name: str | None) -> dict[str, Any]:
 
 
 @one_blas_thread
-def answer(
-    report: Report, folder: Path, task: Task, bias: float, most: float, quick: bool
-) -> dict[str, Any]:
+def answer(report: Report, task: Task, bias: float, most: float, quick: bool) -> dict[str, Any]:
     """Return what a tip in contact shows at a bias (V), and unless `quick` by the bias.
 
     Parameters
     ----------
     report : Report
-    folder : path
     task : Task
         That of ``hotlever contact``.
     bias, most : float
@@ -73,11 +69,11 @@ def answer(
     HotleverError
         If there is no such contact, or no state at this bias.
     """
-    request = request_of(task, folder)
+    request = request_of(task)
     probe = probe_in_contact(report, request)
     curves: dict[str, Any] | None = None
     if quick:
-        end = 1e-3 * described(report, folder, next(iter(task.files), None))["radius_nm"]
+        end = 1e-3 * described(report, next(iter(task.files), None))["radius_nm"]
         free = _out_of_contact(report, probe.with_(**{"tip.apex_radius_um": end}), True, most)
         now, _near[free] = state_in_contact(free, probe, bias, _near.get(free))
     else:

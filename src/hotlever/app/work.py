@@ -1,11 +1,10 @@
-"""What a worker process does for a page: tasks of `hotlever.tasks`, in the folder of a project.
+"""What a worker process does for a page: tasks of `hotlever.tasks`.
 
 The options of a task have the names and texts that the command line has.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -18,22 +17,21 @@ from hotlever.probe import Probe
 from hotlever.tasks.commands import COMMANDS
 
 
-def run(report: Report, folder: Path, task: Task) -> None:
-    """Do a task in a folder; what it writes there can be undone.
+def run(report: Report, task: Task) -> None:
+    """Do a task; what it writes can be undone.
 
     Raises
     ------
     HotleverError
         If it cannot be done, or only in part.
     """
-    os.chdir(folder)
     request = request_of(task)
-    with Changes(folder).recorded(task.line):
+    with Changes(Path()).recorded(task.line):
         COMMANDS[task.command].do(report, request)
 
 
-def request_of(task: Task, folder: Path | None = None) -> Any:
-    """Return the request of a task; its files are in a folder that is given.
+def request_of(task: Task) -> Any:
+    """Return the request of a task.
 
     Raises
     ------
@@ -47,12 +45,12 @@ def request_of(task: Task, folder: Path | None = None) -> Any:
     switched_off = [name for name in options if name.startswith("no_")]
     options |= {name.removeprefix("no_"): not options.pop(name) for name in switched_off}
     if task.files:
-        files = [str(folder / name) for name in task.files] if folder else list(task.files)
         (argument,) = command.arguments
-        options[argument.name] = files if "list" in str(argument.type) else files[0]
+        several = "list" in str(argument.type)
+        options[argument.name] = list(task.files) if several else task.files[0]
     return TypeAdapter(command.request).validate_python(options)
 
 
-def probe_of(folder: Path, name: str | None) -> Probe:
-    """Return the probe of a file in a folder, the reference probe where none is named."""
-    return Probe.reference() if name is None else Probe.from_file(folder / name)
+def probe_of(name: str | None) -> Probe:
+    """Return the probe of a file, the reference probe where none is named."""
+    return Probe.reference() if name is None else Probe.from_file(name)

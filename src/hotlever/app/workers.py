@@ -1,7 +1,8 @@
 """Processes that work for the app: started by spawn, told by messages, ended at any time.
 
-`Worker` is the app's side of one. `serve` runs in the process, where it calls functions of this
-package one after the other; each is given a `Report` first, by which it tells of its progress.
+`Worker` is the app's side of one. `serve` runs in the process, which works in the folder of the
+project as a terminal does, and calls functions of this package one after the other; each is given a
+`Report` first, by which it tells of its progress.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import partial
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, NoReturn
 
 from hotlever.errors import HotleverError
@@ -56,9 +58,16 @@ class WorkerLostError(HotleverError):
 
 
 class Worker:
-    """A process that answers calls one after the other; one that died is replaced at the next."""
+    """A process that answers calls one after the other; one that died is replaced at the next.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    folder : path
+        Where it works.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
         self._turn = asyncio.Lock()
         self._answer: asyncio.Future[Any] | None = None
         self._heard: Heard | None = None
@@ -69,7 +78,7 @@ class Worker:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=serve, args=(theirs,), name="hotlever")
+        self._process = context.Process(target=serve, args=(theirs, self._folder), name="hotlever")
         self._process.start()
         theirs.close()
         self.lost = False
@@ -212,9 +221,10 @@ class Report:
 _Call = tuple[int, str, tuple[Any, ...]]
 
 
-def serve(connection: Connection) -> None:
-    """Answer calls until the app is gone, or says that this ends."""
+def serve(connection: Connection, folder: Path) -> None:
+    """Answer calls in a folder until the app is gone, or says that this ends."""
     _quiet()
+    os.chdir(folder)
     calls: queue.Queue[_Call] = queue.Queue()
     threading.Thread(target=_listen, args=(connection, calls), daemon=True).start()
     with suppress(KeyboardInterrupt):
