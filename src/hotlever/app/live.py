@@ -160,7 +160,7 @@ class LiveLever:
             raise self.branch.ended(reading)
         shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
         x = self.branch.equations.space.expanded(self.branch.states(reading.u))
-        low = self.branch.base_temperature_K
+        low, knee = self.branch.base_temperature_K, self.branch.knee
         drawn, T = self.map, self.space.nodal(x[:, 0], low, self.circuit.end_rises())[0]
         # in steps, so that colours stay the same while the lever gets a little hotter
         high = _SCALE_K * np.ceil(max(float(T.max()), low + 1.0) / _SCALE_K)
@@ -170,6 +170,8 @@ class LiveLever:
             "tip_K": float(self.branch.tip_K(reading.u)[0]),
             "power_mW": shown["lever_V"] * shown["current_mA"],
             "hottest_K": float(T.max()),
+            "knee": np.nan if knee is None else knee.tip_K,
+            "knee_V": np.nan if knee is None else knee.lever_V,
             "scale_K": (low, high),
             "picture": drawn.picture(T, low, high),
             "line": drawn.line(T),

@@ -8,8 +8,19 @@ from typing import Any
 
 from nicegui import ui
 
+from hotlever.app.pages.live_page import texts_of
 from hotlever.app.pages.page import Page
+from hotlever.app.pages.plots import LivePlots
+from hotlever.errors import HotleverError
 
+#: Numbers of a state, as `hotlever.app.pages.live_page.LivePage` shows them.
+NUMBERS = {
+    "tip_K": ("tip", "{:.1f} K", 1.0),
+    "current_mA": ("current I_h", "{:.4f} mA", 1.0),
+    "lever_V": ("lever voltage V_l", "{:.4f} V", 1.0),
+    "power_mW": ("power P_l", "{:.4f} mW", 1.0),
+    "reader_V": ("reader V_r", "{:.4f} V", 1.0),
+}
 _NONE, _NOW, _PROBE = "", "now", "probe:"
 _OPTIONS = {
     _NONE: "nothing",
@@ -66,3 +77,29 @@ def beside_in_words(chosen: dict[str, Any]) -> str:
         return f"{name} with {changes}" if changes else name
     name = chosen["beside"].removeprefix(_PROBE)
     return _OPTIONS.get(chosen["beside"]) or Path(name or "reference probe").stem
+
+
+class PlotsWithBeside(LivePlots):
+    """The plots of the page Simulate, with what the lever beside shows, once the other rests."""
+
+    def __init__(self, page: Page) -> None:
+        self._session, self._chosen = page.session, page.chosen
+        self._text = ui.label().classes("text-sm remark").props("data-number=beside")
+        super().__init__()
+
+    async def show_beside(self, ask: dict[str, Any]) -> None:
+        """Show the lever beside as `hotlever.app.live.answer` is asked; none of a quick answer."""
+        lever, answer, text = lever_beside(self._chosen), None, ""
+        if lever is not None and not ask["quick"]:
+            text = f"Dashed: {beside_in_words(self._chosen)}"
+            asked = lever["probe"], lever["changes"], {**ask, "reduced": False}
+            try:
+                answer = await self._session.ask("beside", "live:answer", *asked)
+                texts = texts_of(answer["now"], NUMBERS)
+                text += ": " + ", ".join(f"{NUMBERS[key][0]} {texts[key]}" for key in texts)
+            except HotleverError as error:
+                text = f"{text}: {error}"
+            if self._text.is_deleted or lever != lever_beside(self._chosen):
+                return
+        self._text.set_text(text)
+        self.beside(answer)

@@ -11,10 +11,11 @@ from hotlever.app.jobs import Task
 from hotlever.app.pages.contact_plots import ContactPlots
 from hotlever.app.pages.drawn import probe_files
 from hotlever.app.pages.frame import ErrorBanner, flat_button
-from hotlever.app.pages.live_page import LivePage
+from hotlever.app.pages.live_page import LiveTaskPage
 from hotlever.app.pages.page import MEDIA
 from hotlever.app.pages.sample import SampleLayers
 from hotlever.app.session import Session
+from hotlever.app.workers import Heard
 
 #: Biases of a table that is written.
 _BIASES = 25
@@ -41,7 +42,7 @@ _MOVING = (
 _AT_REST = "full lever: the numbers of hotlever contact"
 
 
-class ContactPage(LivePage):
+class ContactPage(LiveTaskPage):
     """One tab of the page."""
 
     name = "contact"
@@ -98,10 +99,10 @@ class ContactPage(LivePage):
         most = self.chosen["most"]
         return {"bias": f"{most / _BIASES:g}:{most:g}:{_BIASES}"}
 
-    async def ask(self, task: Task, state: list[float], quick: bool, heard: Any) -> dict[str, Any]:
+    async def ask(self, lever: Task, at: list[float], quick: bool, heard: Heard) -> dict[str, Any]:
         """Return what the tip in contact shows."""
         asked = "quick" if quick else "full", "touching:answer"
-        answer: dict[str, Any] = await self.session.ask(*asked, task, *state, quick, heard=heard)
+        answer: dict[str, Any] = await self.session.ask(*asked, lever, *at, quick, heard=heard)
         return answer
 
     def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:

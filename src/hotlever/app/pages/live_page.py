@@ -1,10 +1,10 @@
-"""What pages have in common whose numbers and plots follow sliders: see `LivePage`."""
+"""What pages have in common whose numbers and plots follow sliders."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol
 
 from nicegui import ui
@@ -15,6 +15,7 @@ from hotlever.app.pages.following import Follower, slider
 from hotlever.app.pages.frame import ErrorBanner, caption, number_shown, two_columns
 from hotlever.app.pages.page import Page, Work, outputs
 from hotlever.app.session import Session
+from hotlever.app.workers import Heard
 from hotlever.errors import HotleverError
 
 _LEAST_BIAS_V = 0.1
@@ -27,7 +28,97 @@ class Plots(Protocol):
         """Draw it."""
 
 
+# Title of a number, its form, and a factor; a form may name others of the same answer.
+Numbers = Mapping[str, tuple[str, str, float]]
+
+
 class LivePage(Page):
+    """A page that shows the state of a lever, which sliders move, in numbers and plots."""
+
+    #: What is shown of ``now`` in an answer, by its name there.
+    numbers: ClassVar[Numbers]
+
+    # --- for the page to say ----------------------------------------------------------------------
+
+    @abstractmethod
+    async def ask(self, lever: Any, at: Any, quick: bool, heard: Heard) -> dict[str, Any]:
+        """Return what a lever shows in a state, quickly or in full; `heard` is told meanwhile."""
+
+    @abstractmethod
+    def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
+        """Return what the numbers are of, and what else is said of an answer."""
+
+    async def shown(self, lever: Any, at: Any, quick: bool) -> None:
+        """Follow an answer that is shown."""
+
+    async def rested(self) -> None:
+        """Follow a lever that is shown in full."""
+
+    # --- what is shown ----------------------------------------------------------------------------
+
+    def show_live(self, plots: Callable[[], Plots]) -> None:
+        """Show numbers and plots here."""
+        with ui.row().classes("w-full items-end gap-6 numbers"):
+            titles = {key: title for key, (title, *_) in self.numbers.items()}
+            self._numbers = {key: number_shown(key, title) for key, title in titles.items()}
+        self._model = caption("starting").props("aria-live=polite")
+        self._remarks = ui.label().classes("text-sm remark")
+        with ui.column().classes("w-full gap-1") as self._drawn:
+            self._plots = plots()
+        # plots without data would be of nothing
+        self._drawn.set_visibility(False)
+        self._follower = Follower(self._model, self._show, self.rested)
+
+    def follow(self, lever: Any, at: Any) -> None:
+        """Have a state of a lever shown; only what is wanted last counts."""
+        self._follower.follow(lever, at)
+
+    async def _show(self, lever: Any, at: Any, quick: bool) -> bool:
+        notes = dict[str, None]()
+
+        def heard(kind: str, content: Any) -> None:
+            if kind == "note" and content:
+                notes[content] = None
+            elif kind == "progress" and not self._model.is_deleted:
+                if quick:
+                    self.blank()
+                label, done, total = content
+                self._model.set_text(f"{label}: {done} of {total}")
+
+        try:
+            answer = await self.ask(lever, at, quick, heard)
+        except HotleverError as error:
+            if not self._model.is_deleted:
+                self.blank()
+                self.banner.say(str(error))
+            return False
+        if self._model.is_deleted or (not quick and not self._follower.is_wanted(lever)):
+            return False  # the tab was closed meanwhile, or sliders have moved on
+        self.banner.clear()
+        for key, text in texts_of(answer["now"], self.numbers).items():
+            self._numbers[key].set_text(text)
+        model, remark = self.said(answer, quick)
+        self._model.set_text(model)
+        self._remarks.set_text("; ".join(filter(None, [remark, *notes])))
+        self._plots.show(answer)
+        if not self._drawn.visible:
+            self._drawn.set_visibility(True)
+            # what was hidden had no size that figures could be drawn for
+            resized = "setTimeout(() => window.dispatchEvent(new Event('resize')))"
+            self._drawn.client.run_javascript(resized)
+        await self.shown(lever, at, quick)
+        return True
+
+    def blank(self) -> None:
+        """Show no numbers where there are none: the last ones were of another state."""
+        for number in self._numbers.values():
+            number.set_text("–")
+        self._model.set_text("no state is shown")
+        self._remarks.set_text("")
+        self._drawn.set_visibility(False)
+
+
+class LiveTaskPage(LivePage):
     """A page whose task is shown at once, at a state that sliders move, and gives its table.
 
     Attributes
@@ -36,8 +127,6 @@ class LivePage(Page):
         What the probe's file says, or what is usual, of what can be chosen.
     """
 
-    #: Numbers that are shown: title, form, and factor, by their names in an answer.
-    numbers: ClassVar[dict[str, tuple[str, str, float]]]
     #: What is chosen of a state, beside the task, in the order in which it is asked for.
     state: ClassVar[tuple[str, ...]]
 
@@ -50,22 +139,12 @@ class LivePage(Page):
                 self.controls()
                 self._sliders = ui.column().classes("w-full gap-1")
             with right, ui.column().classes("w-full gap-3 parts"):
-                with ui.row().classes("w-full items-end gap-6 numbers"):
-                    self._numbers = {
-                        key: number_shown(key, title) for key, (title, *_) in self.numbers.items()
-                    }
-                self._model = caption("starting").props("aria-live=polite")
-                self._remarks = ui.label().classes("text-sm remark")
-                with ui.column().classes("w-full gap-1") as self._drawn:
-                    self._plots = plots()
-                # plots without data would be of nothing
-                self._drawn.set_visibility(False)
+                self.show_live(plots)
                 with ui.card().classes("w-full last").props("flat bordered"):
                     ui.label("Take it with you").classes("text-bold")
                     self.kind_buttons(lambda kind: self.run(self._writing(kind)), DrawnPage.kinds)
                     Work(session, self.name, self.give)
                     self.command()
-        self._follower = Follower(self._model, self._show)
 
     # --- for the page to say ----------------------------------------------------------------------
 
@@ -88,14 +167,6 @@ class LivePage(Page):
     def of_table(self, task: Task) -> dict[str, Any]:
         """Return the options that a table has more than the task."""
 
-    @abstractmethod
-    async def ask(self, task: Task, state: list[float], quick: bool, heard: Any) -> dict[str, Any]:
-        """Return what the lever shows in a state, of which ``now`` has the numbers."""
-
-    @abstractmethod
-    def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
-        """Return what the numbers are of, and what else is said of an answer."""
-
     # --- what is chosen ---------------------------------------------------------------------------
 
     async def open(self) -> None:
@@ -107,7 +178,7 @@ class LivePage(Page):
                 self.show_sliders()
             self._moved()
             return
-        self._blank()
+        self.blank()
 
     async def changed(self) -> None:
         """Show another probe, or another value of what is no slider."""
@@ -138,7 +209,7 @@ class LivePage(Page):
 
     def _moved(self) -> None:
         self.show_command()
-        self._follower.follow(self.of_lever(), [self.chosen[key] for key in self.state])
+        self.follow(self.of_lever(), [self.chosen[key] for key in self.state])
 
     def task(self) -> Task | None:
         """Return the task that writes the table."""
@@ -150,49 +221,16 @@ class LivePage(Page):
         options = {**task.options, **self.of_table(task), **files}
         return Task(task.command, task.files, options)
 
-    # --- what is shown ----------------------------------------------------------------------------
 
-    async def _show(self, task: Task, state: list[float], quick: bool) -> bool:
-        notes = dict[str, None]()
+def texts_of(now: Mapping[str, Any], numbers: Numbers) -> dict[str, str]:
+    """Return the texts of numbers of an answer.
 
-        def heard(kind: str, content: Any) -> None:
-            if kind == "note" and content:
-                notes[content] = None
-            elif kind == "progress" and not self._model.is_deleted:
-                self._blank()
-                label, done, total = content
-                self._model.set_text(f"{label}: {done} of {total}")
-
-        try:
-            answer = await self.ask(task, state, quick, heard)
-        except HotleverError as error:
-            if not self._model.is_deleted:
-                self._blank()
-                self.banner.say(str(error))
-            return False
-        if self._model.is_deleted or (not quick and not self._follower.is_wanted(task)):
-            return False
-        self.banner.clear()
-        now = answer["now"]
-        for key, (_, form, factor) in self.numbers.items():
-            number = now[key]
-            text = "none" if math.isnan(number) else form.format(factor * number)
-            self._numbers[key].set_text(text)
-        model, remark = self.said(answer, quick)
-        self._model.set_text(model)
-        self._remarks.set_text("; ".join(filter(None, [remark, *notes])))
-        self._plots.show(answer)
-        if not self._drawn.visible:
-            self._drawn.set_visibility(True)
-            # what was hidden had no size that figures could be drawn for
-            resized = "setTimeout(() => window.dispatchEvent(new Event('resize')))"
-            self._drawn.client.run_javascript(resized)
-        return True
-
-    def _blank(self) -> None:
-        """Show no numbers where there are none: the last ones were of another state."""
-        for number in self._numbers.values():
-            number.set_text("–")
-        self._model.set_text("no state is shown")
-        self._remarks.set_text("")
-        self._drawn.set_visibility(False)
+    Examples
+    --------
+    >>> texts_of({"tip_K": 612.34, "mean_K": float("nan")}, {"tip_K": ("tip", "{:.1f} K", 1.0)})
+    {'tip_K': '612.3 K'}
+    """
+    return {
+        key: "none" if math.isnan(now[key]) else form.format(factor * now[key], **now)
+        for key, (_, form, factor) in numbers.items()
+    }

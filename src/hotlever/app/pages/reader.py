@@ -9,9 +9,10 @@ from nicegui import ui
 from hotlever.app.jobs import Task
 from hotlever.app.pages.drawn import probe_files
 from hotlever.app.pages.frame import ErrorBanner
-from hotlever.app.pages.live_page import LivePage
+from hotlever.app.pages.live_page import LiveTaskPage
 from hotlever.app.pages.reader_plots import ReaderPlots
 from hotlever.app.session import Session
+from hotlever.app.workers import Heard
 
 #: Distances of a table that is written.
 _DISTANCES = 10
@@ -26,7 +27,7 @@ _MODEL = (
 )
 
 
-class ReaderPage(LivePage):
+class ReaderPage(LiveTaskPage):
     """One tab of the page."""
 
     name = "reader"
@@ -90,10 +91,10 @@ class ReaderPage(LivePage):
         """Return the bias of a table."""
         return {"bias": f"{self.chosen['bias']:g}:{self.chosen['bias']:g}:1"}
 
-    async def ask(self, task: Task, state: list[float], quick: bool, heard: Any) -> dict[str, Any]:
+    async def ask(self, lever: Task, at: list[float], quick: bool, heard: Heard) -> dict[str, Any]:
         """Return what the reader shows; levers are solved in one process, be it quick or not."""
         asked = "quick", "approaching:answer"
-        answer: dict[str, Any] = await self.session.ask(*asked, task, *state, heard=heard)
+        answer: dict[str, Any] = await self.session.ask(*asked, lever, *at, heard=heard)
         return answer
 
     def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:

@@ -3,29 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable
+from contextlib import suppress
 from typing import Any
 
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.beside import Beside
+from hotlever.app.pages.beside import NUMBERS, Beside, PlotsWithBeside
 from hotlever.app.pages.drawn import in_python, probe_files, settings, stem
 from hotlever.app.pages.frame import ErrorBanner, two_columns
-from hotlever.app.pages.page import Page, Work, outputs
+from hotlever.app.pages.live_page import LivePage
+from hotlever.app.pages.page import Work, outputs
 from hotlever.app.pages.pulses import Pulses
-from hotlever.app.pages.sliders import LiveView, Sliders
+from hotlever.app.pages.sliders import Sliders
 from hotlever.app.pages.small_signals import SmallSignals
 from hotlever.app.session import Session
+from hotlever.app.workers import Heard
+from hotlever.errors import HotleverError
 
 #: Biases of a sweep that is written.
 _BIASES = 49
+#: What is chosen of a lever, which has to be solved for it, and of a state.
+_STATE = ("probe", "changes"), ("bias", "most")
+#: What surrounds a lever: each combination gets a reduced lever of its own.
+_AROUND = {"medium", "surface_gap_um"}
+_NUMBERS = NUMBERS | {"knee": ("knee of the I-V curve", "{:.0f} K, {knee_V:.3f} V", 1.0)}
+_MODELS = {
+    "full lever": "full lever: the numbers of hotlever sweep",
+    "reduced lever": "moving: reduced lever, within some 0.1 K",
+    "coarse lever": "moving: coarse lever, within some 2 K",
+}
 _VIEWS = {"rest": "at a bias", "time": "in time", "signals": "small signals"}
 
 
-class SimulatePage(Page):
+class SimulatePage(LivePage):
     """One tab of the page."""
 
     name = "simulate"
+    numbers = _NUMBERS
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
@@ -38,7 +53,7 @@ class SimulatePage(Page):
                 view = ui.toggle(_VIEWS, value=self.chosen["view"])
                 view.props('aria-label="What is shown"').on_value_change(self._view)
                 with ui.column().classes("w-full gap-3 parts") as rest:
-                    self._live = LiveView(self)
+                    self.show_live(self._make_plots)
                     with ui.card().classes("w-full last").props("flat bordered"):
                         ui.label("Take it with you").classes("text-bold")
                         self.kind_buttons(lambda kind: self.run(self._sweep(kind)))
@@ -68,10 +83,57 @@ class SimulatePage(Page):
         ui.run_javascript("setTimeout(() => window.dispatchEvent(new Event('resize')))")
 
     def _moved(self) -> None:
-        self._live.follow(self._sliders.free)
+        self.follow(*({key: self.chosen[key] for key in keys} for keys in _STATE))
         self.show_command()
         self._pulses.show_command()
         self._signals.show_command()
+
+    # --- at a bias --------------------------------------------------------------------------------
+
+    def _make_plots(self) -> PlotsWithBeside:
+        self._beside = PlotsWithBeside(self)
+        return self._beside
+
+    def _asked(self, lever: dict[str, Any], at: dict[str, Any], quick: bool) -> dict[str, Any]:
+        """Return what `hotlever.app.live.answer` is asked of a lever."""
+        reduced = self.session.reduced.get(self._geometry(**lever), False)
+        return {**at, "quick": quick, "reduced": reduced}
+
+    async def ask(
+        self, lever: dict[str, Any], at: dict[str, Any], quick: bool, heard: Heard
+    ) -> dict[str, Any]:
+        """Return what a lever shows at a bias."""
+        asked = lever["probe"], lever["changes"], self._asked(lever, at, quick)
+        worker = "quick" if quick else "full"
+        answer: dict[str, Any] = await self.session.ask(worker, "live:answer", *asked, heard=heard)
+        return answer
+
+    def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
+        """Return of which lever the numbers are, and its notes."""
+        return _MODELS[answer["model"]], "; ".join(answer["now"]["notes"])
+
+    async def shown(self, lever: dict[str, Any], at: dict[str, Any], quick: bool) -> None:
+        """Show the lever beside."""
+        await self._beside.show_beside(self._asked(lever, at, quick))
+
+    def _geometry(self, probe: str | None, changes: dict[str, Any]) -> Any:
+        """Return what a reduced lever belongs to."""
+        free = self._sliders.free
+        fixed = {name: value for name, value in changes.items() if name not in free}
+        return probe, tuple(sorted(fixed.items(), key=str))
+
+    async def rested(self) -> None:
+        """Have the reduced lever of the geometry made, so that sliders are answered by it."""
+        probe, reduced = self.chosen["probe"], self.session.reduced
+        geometry = self._geometry(probe, self.chosen["changes"])
+        around = dict(geometry[1])
+        if not self._sliders.free or geometry in reduced or set(around) - _AROUND:
+            return
+        reduced[geometry] = False
+        with suppress(HotleverError):
+            reduced[geometry] = await self.session.ask("making", "live:prepare", probe, around)
+
+    # --- the table --------------------------------------------------------------------------------
 
     def task(self) -> Task:
         """Return the task that writes the table of a sweep."""
