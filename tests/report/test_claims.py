@@ -17,14 +17,20 @@ def page(coarse):
     return Findings(coarse)
 
 
+@pytest.fixture
+def quick_page(coarse):
+    return Findings(coarse, quick=True)
+
+
 def kinds(page):
     return [block["kind"] for block in page.blocks]
 
 
-def test_lines_above_the_knee_are_judged_by_the_paper_s_spread(page):
-    claims.linear_section(page, 10)
-    assert kinds(page)[:2] == ["figure", "text"]
-    straight, proportional = page.claims
+def test_lines_above_the_knee_are_judged_by_the_paper_s_spread(quick_page, monkeypatch):
+    monkeypatch.setattr(claims, "_EVERY", 10)
+    claims.linear_section(quick_page)
+    assert kinds(quick_page)[:2] == ["figure", "text"]
+    straight, proportional = quick_page.claims
     assert straight[2].startswith("holds within")
     assert proportional[2].startswith("does not hold here")
 
@@ -61,10 +67,11 @@ def test_parameters_are_judged_apart_from_the_doping(page, monkeypatch, scatter,
     assert "the paper's own levers 15%, with n_d held 9%" in claim[3]
 
 
-def test_k_with_a_surface_is_judged_by_what_the_best_one_leaves(page):
-    claims.one_sided_section(page, (1.0, np.inf))
-    assert set(kinds(page)) == {"figure", "table", "text"}
-    [claim] = page.claims
+def test_k_with_a_surface_is_judged_by_what_the_best_one_leaves(quick_page, monkeypatch):
+    monkeypatch.setattr(claims, "_FEW_GAPS_UM", (1.0, np.inf))
+    claims.one_sided_section(quick_page)
+    assert set(kinds(quick_page)) == {"figure", "table", "text"}
+    [claim] = quick_page.claims
     assert claim[2].startswith("does not hold here")
     assert "most at 1 µm" in claim[3]
 

@@ -10,7 +10,7 @@ from experiments import full_experiment
 from hotlever.estimation import Measurement, fit
 from hotlever.estimation.uncertainty import examine
 from hotlever.report.fit_pages import fit_page
-from hotlever.report.reproduce import LONG_SECTIONS, NEVER_SEEN, SECTIONS, inference
+from hotlever.report.reproduce import inference
 from hotlever.report.reproduce.findings import Findings
 from hotlever.studies.simulation_based_calibration import WAYS
 
@@ -47,13 +47,11 @@ def judged(monkeypatch):
     return asked
 
 
-@pytest.mark.parametrize(
-    ("section", "count"), [(inference.many_levers_section, 12), (inference.few_levers_section, 2)]
-)
-def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, section, count):
+@pytest.mark.parametrize(("quick", "count"), [(False, 12), (True, 2)])
+def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, quick, count):
     told = []
-    page = Findings(coarse, lambda done, total: told.append((done, total)))
-    section(page)
+    page = Findings(coarse, quick=quick, progress=lambda done, total: told.append((done, total)))
+    inference.levers_section(page)
     assert judged == [(n, law) for law in (False, True) for n in range(count)]
     assert told[-1] == (2 * count, 2 * count)
     why, same_law, other_law = (one["text"] for one in page.blocks if one["kind"] == "text")
@@ -67,12 +65,7 @@ def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, s
 
 def test_the_page_says_when_the_stated_errors_do_not_hold(coarse, judged):
     page = Findings(coarse)
-    inference.many_levers_section(page)
+    inference.levers_section(page)
     # a third of the made-up levers is off by three stated errors
     assert "do not cover this departure" in page.blocks[1]["text"]
     assert "67% in its 95 % band" in page.blocks[1]["text"]
-
-
-def test_the_quick_page_has_the_headings_of_the_long_one_in_the_same_order():
-    assert list(SECTIONS | LONG_SECTIONS)[: len(SECTIONS)] == list(SECTIONS)
-    assert SECTIONS[NEVER_SEEN] is not LONG_SECTIONS[NEVER_SEEN]

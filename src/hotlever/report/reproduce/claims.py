@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import xarray as xr
 
@@ -42,9 +40,9 @@ _SHARED = "mobility"
 _CLAIMED = 0.1
 
 
-def linear_section(page: Findings, every: int = 1) -> None:
+def linear_section(page: Findings) -> None:
     """How straight T(P) is above the knee, and what its slope follows."""
-    cases = dict(list(all_cases().items())[::every])
+    cases = dict(list(all_cases().items())[:: _EVERY if page.quick else 1])
     study = linear_branch_study(cases, progress=page.progress)
     regression, alone = (slope_regression(study, names) for names in (_EXPLAINED, _EXPLAINED[:1]))
     spread = paper.POWER_LAW_SPREAD_K
@@ -99,16 +97,10 @@ def _tabulate_slopes(page: Findings, solved: xr.Dataset) -> float:
     return float(most)
 
 
-def few_linear_section(page: Findings) -> None:
-    """The same of fewer levers."""
-    linear_section(page, _EVERY)
-
-
-def consistency_section(
-    page: Findings, first: int | None = None, errors: Sequence[str] = tuple(ERRORS)
-) -> None:
+def consistency_section(page: Findings) -> None:
     """The parameters of twins, each fitted by itself, beside those of the paper's levers."""
-    geometries = dict(list(GEOMETRIES.items())[:first])
+    errors = _FEW_ERRORS if page.quick else tuple(ERRORS)
+    geometries = dict(list(GEOMETRIES.items())[: _FIRST if page.quick else None])
     probe = page.lever.probe
     study = consistency_study(probe, geometries, errors, progress=page.progress)
     published = published_levers()
@@ -166,17 +158,13 @@ def _worst(shares: xr.DataArray) -> tuple[float, str]:
     return apart.max().item(), PARAMETERS[apart.idxmax("parameter").item()].symbol
 
 
-def few_consistency_section(page: Findings) -> None:
-    """The same of fewer levers, without errors of the model and with all."""
-    consistency_section(page, _FIRST, _FEW_ERRORS)
-
-
 def _shares(values: xr.DataArray) -> list[str]:
     return [f"{value:.1%}" if value > 0 else "" for value in values.values]
 
 
-def one_sided_section(page: Findings, gaps_um: Sequence[float] = GAPS_UM) -> None:
+def one_sided_section(page: Findings) -> None:
     """k with a surface below the lever."""
+    gaps_um = _FEW_GAPS_UM if page.quick else GAPS_UM
     study = one_sided_study(page.lever.probe, gaps_um, page.progress)
     names = ["free" if np.isinf(gap) else f"{gap:g} µm" for gap in study.gap_um.values]
     curves = {name: study.k.isel(gap_um=number) for number, name in enumerate(names)}
@@ -208,11 +196,6 @@ def one_sided_section(page: Findings, gaps_um: Sequence[float] = GAPS_UM) -> Non
         error=error.max().item(),
         spread=paper.POWER_LAW_SPREAD_K,
     )
-
-
-def few_one_sided_section(page: Findings) -> None:
-    """The same for fewer gaps."""
-    one_sided_section(page, _FEW_GAPS_UM)
 
 
 def radiation_section(page: Findings) -> None:

@@ -33,6 +33,8 @@ class Findings(Page):
     ----------
     lever : Lever
         The reference lever in vacuum, with the published option III.
+    quick : bool
+        Whether sections that take long are to be of fewer levers.
     progress : callable, optional
         For a section that takes long: called with its steps done and their number.
 
@@ -44,14 +46,17 @@ class Findings(Page):
         Where the paper says what, the verdict, and what was found in this run.
     """
 
-    def __init__(self, lever: Lever, progress: Progress | None = None) -> None:
+    def __init__(
+        self, lever: Lever, *, quick: bool = False, progress: Progress | None = None
+    ) -> None:
         super().__init__(
             "Joule-heated cantilever probes: the published results, computed",
             f"Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:{DOI}, with hotlever's "
             "reference probe, whose dimensions are inferred: no drawing of the published lever "
             "exists.",
         )
-        self.lever, self.air, self.progress = lever, lever.in_medium("air"), progress
+        self.lever, self.air = lever, lever.in_medium("air")
+        self.quick, self.progress = quick, progress
         self.claims: list[tuple[str, str, str, str]] = []
 
     @cached_property

@@ -155,17 +155,9 @@ def thermometer_section(page: Findings) -> None:
     page.claim("knee_by_raman", holds=explained < 0.25, gap=gap, left=left, explained=explained)
 
 
-def many_levers_section(page: Findings) -> None:
+def levers_section(page: Findings) -> None:
     """Levers with more physics than the model, calibrated from their I-V curve."""
-    _compare_ways(page, _MANY)
-
-
-def few_levers_section(page: Findings) -> None:
-    """The same with fewer levers."""
-    _compare_ways(page, _FEW)
-
-
-def _compare_ways(page: Findings, count: int) -> None:
+    count = _FEW if page.quick else _MANY
     page.say("levers", count=count)
     cases = [(number, law) for law in (_EQ8, tuple(DEPARTURES)) for number in range(count)]
     judged = concatenated(
