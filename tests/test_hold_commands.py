@@ -54,6 +54,13 @@ def test_a_controlled_step_tells_its_overshoot_and_draws_stable_gains(run, tmp_p
         assert text in drawn
 
 
+def test_an_overshoot_between_times_that_are_asked_for_is_not_told_as_none(run):
+    status, out, err = run("pulse", *CONTROL, "--at", "1us,60us")
+    assert (status, out.count("\n")) == (0, 3)
+    assert "tip, at the end" in err
+    assert "overshoot" not in err
+
+
 @pytest.mark.slow
 def test_a_loop_that_is_lost_is_told(run):
     status, _, err = run(

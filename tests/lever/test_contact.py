@@ -10,7 +10,7 @@ from taylor import remainder_orders
 from experiments import on_coarse_meshes
 from hotlever import Measurement, fit
 from hotlever.contact.law import INTERFACE
-from hotlever.errors import InputError
+from hotlever.errors import ComputationError, InputError
 from hotlever.figures import contact_overview
 from hotlever.lever import Lever
 from hotlever.lever.contact import (
@@ -28,6 +28,7 @@ from hotlever.probe import Probe
 from hotlever.probe.contact import OUT_OF_CONTACT
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.solid import SolidMeshOptions
+from hotlever.tasks.contacting import what_the_current_tells
 
 TIP = {"tip.height_um": 0.7, "tip.half_angle_deg": 20.0, "tip.apex_radius_um": 0.1}
 
@@ -117,6 +118,27 @@ def test_modes_in_time_are_the_full_lever(touching):
     assert few.equations.into_tip(few_state.x)[0].sum() == pytest.approx(
         touching.equations.into_tip(states[2].x)[0].sum(), rel=1e-3
     )
+
+
+def test_where_silicon_melts_what_was_reached_is_given(touching):
+    for follow, named in (
+        (lambda: sweep_in_contact(touching, [8.0, 40.0], sensitivities=False), "bias"),
+        (lambda: history_in_contact(touching, step(60.0)), "time"),
+    ):
+        with pytest.raises(ComputationError, match="melts") as caught:
+            follow()
+        assert caught.value.partial[named].size > 0
+        assert np.isfinite(caught.value.partial.current_change_mA).all()
+
+
+def test_what_the_current_tells_does_not_depend_on_its_sign(touching):
+    told = {}
+    for sign in (1.0, -1.0):
+        lever = touching.with_probe(touching.probe.with_(thermoelectric=True))
+        data = sweep_in_contact(lever, sign * np.array([4.0, 8.0]))
+        told[sign] = what_the_current_tells(data)
+    assert "best at 8 V: to 0.00" in told[1.0]
+    assert "best at -8 V: to 0.00" in told[-1.0]
 
 
 def test_a_pulse_is_cooler_in_contact(touching):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from copy import copy
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from hotlever.contact.law import INTERFACE, ContactLaw
 from hotlever.datasets import labelled
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.lever.lever import Lever, State
 from hotlever.lever.sensitivities import sensitivities_of
 from hotlever.lever.transient import Waveform, simulate
@@ -151,10 +152,13 @@ def sweep_in_contact(
     InputError
         If the tip touches nothing, or as `Lever.sweep`.
     BranchEndError, ComputationError
-        As `Lever.sweep`.
+        As `Lever.sweep`, of either; ``partial`` holds the dataset as far as both were followed.
     """
-    before = (free or out_of_contact(lever)).sweep(bias, progress=progress)
-    data = lever.sweep(bias, progress=progress)
+    above = free or out_of_contact(lever)
+    data, before, failure = _side_by_side(
+        lambda: lever.sweep(bias, progress=progress),
+        lambda data: above.sweep(data.bias_V.values, progress=progress),
+    )
     columns = _columns(lever, data.tip_K.values) | {
         "current_change_mA": data.current_mA.values - before.current_mA.values,
         "tip_change_K": data.tip_K.values - before.tip_K.values,
@@ -166,7 +170,7 @@ def sweep_in_contact(
         by = sensitivities_of(branch, reading.u[powered], lever.circuit, [INTERFACE])
         slope[powered] = by[0, :, 0] / law_of(lever).sum_by_interface
         columns["current_by_resistance"] = slope
-    return data.assign(labelled(columns).variables)
+    return _unless(failure, data.assign(labelled(columns).variables))
 
 
 def history_in_contact(
@@ -189,11 +193,33 @@ def history_in_contact(
         other ones.
     """
     law_of(lever)
-    data = simulate(lever, waveform, until_us, times_us, progress=progress)
-    free = simulate(out_of_contact(lever), waveform, until_us, data.time.values)
+    above = out_of_contact(lever)
+    data, free, failure = _side_by_side(
+        lambda: simulate(lever, waveform, until_us, times_us, progress=progress),
+        lambda data: simulate(above, waveform, until_us, data.time.values, progress=progress),
+    )
     change = data.current_mA.values - free.current_mA.values
     columns = _columns(lever, data.tip_K.values) | {"current_change_mA": change}
-    return data.assign(labelled(columns, "time").variables)
+    return _unless(failure, data.assign(labelled(columns, "time").variables))
+
+
+def _side_by_side(
+    touching: Callable[[], xr.Dataset], free: Callable[[xr.Dataset], xr.Dataset]
+) -> tuple[xr.Dataset, xr.Dataset, ComputationError | None]:
+    """Return a lever in contact and out of it where both were followed, and what ended that."""
+    data, failure = as_far_as_possible(touching)
+    before, ended = as_far_as_possible(lambda: free(data))
+    (along,) = before.tip_K.dims
+    both = np.isin(data[along].values, before[along].values)
+    return data.isel({along: both}), before, ended or failure
+
+
+def _unless(failure: ComputationError | None, reached: xr.Dataset) -> xr.Dataset:
+    """Return what was reached, or raise the failure with it."""
+    if failure is None:
+        return reached
+    failure.partial = reached
+    raise failure
 
 
 def _columns(lever: Lever, tip_K: Array) -> dict[str, Any]:

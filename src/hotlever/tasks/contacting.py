@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hotlever.datasets import csv_text, write_dataset
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, as_far_as_possible, shown
 from hotlever.probe.contact import interface_of, length_um, parsed_layers
 from hotlever.probe.tip import EXAMPLE
 from hotlever.tasks.files import draw
@@ -28,7 +29,13 @@ _CURRENT_KNOWN = 1e-4
 
 
 def touch(reporter: Reporter, request: ContactRequest) -> None:
-    """Solve a lever in contact over a range of bias, or in time."""
+    """Solve a lever in contact over a range of bias, or in time.
+
+    Raises
+    ------
+    ComputationError
+        If it has no state at some of them; what was reached is written.
+    """
     from hotlever.lever.contact import (
         CONTACT_COLUMNS,
         HISTORY_COLUMNS,
@@ -47,12 +54,14 @@ def touch(reporter: Reporter, request: ContactRequest) -> None:
     biases = parse_bias(request.bias, probe.lowest_bias_V)
     lever = make_lever(reporter, probe)
     with reporter.progress("contact") as update:
-        options: Any = {"progress": update}
         if waveform is None:
-            data, columns = sweep_in_contact(lever, biases, **options), CONTACT_COLUMNS
+            columns, solve = CONTACT_COLUMNS, partial(sweep_in_contact, lever, biases)
         else:
             times = waveform, request.end_us, request.times_us
-            data, columns = history_in_contact(lever, *times, **options), HISTORY_COLUMNS
+            columns, solve = HISTORY_COLUMNS, partial(history_in_contact, lever, *times)
+        data, failure = as_far_as_possible(lambda: solve(progress=update))
+    if failure is not None and not data.tip_K.size:
+        raise failure
     reporter.note(*filter(None, data.attrs["notes"].split("\n")))
     if waveform is None and (told := what_the_current_tells(data)):
         reporter.note(told)
@@ -62,6 +71,8 @@ def touch(reporter: Reporter, request: ContactRequest) -> None:
         draw(request.plot, lambda figures: figures.contact_overview(data, probe))
     if request.output is None:
         reporter.give(csv_text(data, columns))
+    if failure is not None:
+        raise failure
 
 
 def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
@@ -111,7 +122,7 @@ def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
 def what_the_current_tells(data: xr.Dataset) -> str:
     """Say how well the sum of resistances is known by the current, where it tells most of it."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        error = _CURRENT_KNOWN * data.current_mA / np.abs(data.current_by_resistance)
+        error = _CURRENT_KNOWN * np.abs(data.current_mA / data.current_by_resistance)
         whole = data.tip_K_per_mW + data.interface_K_per_mW + data.spreading_K_per_mW
         relative = (error / whole).values
     if not np.isfinite(relative).any():

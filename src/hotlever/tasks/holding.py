@@ -80,8 +80,8 @@ class Control:
             "is held: beyond a highest resistance a lever only gets hotter with these gains"
         ]
 
-    def rows(self, history: xr.Dataset) -> list[list[str]]:
-        """Return rows that say what the controller does."""
+    def rows(self, history: xr.Dataset, *, resolved: bool) -> list[list[str]]:
+        """Return rows that say what the controller does: of a resolved history its overshoot."""
         time, ratio = self.settling
         way, tip = self.end.tip_K - self.start.tip_K, history.tip_K.values
         over = float(np.max(np.sign(way) * (tip - self.end.tip_K)))
@@ -89,7 +89,7 @@ class Control:
         kind = "time constant" if time > 0.0 else "grows by e in"
         return [
             ["tip, at rest before and after", f"{self.start.tip_K:.1f} K, {self.end.tip_K:.1f} K"],
-            ["tip, overshoot", told],
+            *([["tip, overshoot", told]] if resolved else []),
             ["tip, at the end", f"{tip[-1]:.1f} K at {history.time[-1].item():.4g} µs"],
             ["closed loop", f"{kind} {abs(time):.3g} µs, damping ratio {ratio:.2g}"],
         ]

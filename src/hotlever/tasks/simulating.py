@@ -87,13 +87,14 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
             curve = simulate(lever, waveform, until, times, **options)
         except HistoryEndError as error:
             curve, failure = error.partial, error
+    resolved = times is None
     if ends and held is None:
-        curve = with_times(curve, ends[0], ends[-1], resolved=times is None)
+        curve = with_times(curve, ends[0], ends[-1], resolved=resolved)
     data = curve.isel(time=slice(None, None, per_step))
     reporter.note(*filter(None, data.attrs["notes"].split("\n")))
     if held is not None:
         reporter.note(*held.notes(curve))
-    reporter.tell_table(_times(data) if held is None else held.rows(curve))
+    reporter.tell_table(_times(data) if held is None else held.rows(curve, resolved=resolved))
     with outputs.together():
         if request.output is not None:
             write_history(data, request.output)
