@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import tomllib
 from pathlib import Path
@@ -50,3 +51,22 @@ def test_the_citation_is_of_this_version_and_licence():
     assert citation["license"] == project["license"]
     assert citation["title"] == project["name"]
     assert citation["abstract"] == project["description"]
+
+
+def test_no_name_in_the_code_is_one_that_fits_anything():
+    vague = {"found", "known", "one", "thing", "things", "stuff"}
+    bound = []
+    for path in (ROOT / "src" / "hotlever").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            match node:
+                case ast.Name(id=name, ctx=ast.Store()) | ast.arg(arg=name):
+                    pass
+                case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+                    pass
+                case ast.Attribute(attr=name, ctx=ast.Store()):
+                    pass
+                case _:
+                    continue
+            if name.strip("_") in vague:
+                bound.append(f"{path.relative_to(ROOT)}:{node.lineno}: {name}")
+    assert bound == []

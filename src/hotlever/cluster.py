@@ -128,11 +128,11 @@ def _connected(address: str, where: str) -> Iterator[Client]:
         except TimeoutError as error:
             raise InputError(f"{where}: the scheduler has no workers") from error
         versions = client.run(_version, on_error="return")
-        for worker, found in versions.items():
-            if found != __version__:
-                found = found if isinstance(found, str) else "missing"
+        for worker, version in versions.items():
+            if version != __version__:
+                version = version if isinstance(version, str) else "missing"
                 raise InputError(
-                    f"{where}: at worker {worker} hotlever is {found}, expected {__version__}"
+                    f"{where}: at worker {worker} hotlever is {version}, expected {__version__}"
                 )
         yield client
 

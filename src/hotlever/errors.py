@@ -77,7 +77,7 @@ def as_far_as_possible(work: Callable[[], Any]) -> tuple[Any, ComputationError |
         return error.partial, error
 
 
-def quoted(found: object) -> str:
+def quoted(value: object) -> str:
     """Return what was found as an error quotes it: the beginning of what is long.
 
     Examples
@@ -86,9 +86,9 @@ def quoted(found: object) -> str:
     "'aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa…"
     """
     try:
-        text = repr(found)
+        text = repr(value)
     except (ValueError, RecursionError):
-        return f"a very long {type(found).__name__}"
+        return f"a very long {type(value).__name__}"
     return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 2]}…"
 
 
@@ -106,19 +106,19 @@ def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") 
     >>> str(unknown_name("parameter", "c_kapa", ["c_kappa", "delta"]))
     "unknown parameter 'c_kapa': did you mean 'c_kappa'? (expected one of: c_kappa, delta)"
     """
-    known = list(choices)
+    names = list(choices)
     # of longer names the last word may be meant, though the whole is less alike than others are
-    ends = [other for other in known if other.endswith(f".{name}")]
+    ends = [other for other in names if other.endswith(f".{name}")]
     # of names that are less alike, one that begins as it does is meant, not any other
-    alike = difflib.get_close_matches(name[:_QUOTED], known, n=_NEAREST, cutoff=0.5)
-    near = difflib.get_close_matches(name[:_QUOTED], known, n=1)
+    alike = difflib.get_close_matches(name[:_QUOTED], names, n=_NEAREST, cutoff=0.5)
+    near = difflib.get_close_matches(name[:_QUOTED], names, n=1)
     near = near or [other for other in alike if other[:1].lower() == name[:1].lower()]
-    if len(known) > _MOST_CHOICES:
-        nearest = difflib.get_close_matches(name[:_QUOTED], known, n=_NEAREST, cutoff=0.0)
+    if len(names) > _MOST_CHOICES:
+        nearest = difflib.get_close_matches(name[:_QUOTED], names, n=_NEAREST, cutoff=0.0)
         nearest = list(dict.fromkeys([*ends, *nearest]))[:_NEAREST]
-        known = [*nearest, f"and {len(known) - len(nearest)} more"]
+        names = [*nearest, f"and {len(names) - len(nearest)} more"]
     hint = f": did you mean '{near[0]}'?" if near else ""
     prefix = f"{where}: " if where else ""
     return InputError(
-        f"{prefix}unknown {kind} {quoted(name)}{hint} (expected one of: {', '.join(known)})"
+        f"{prefix}unknown {kind} {quoted(name)}{hint} (expected one of: {', '.join(names)})"
     )

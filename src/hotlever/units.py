@@ -176,7 +176,7 @@ def _product(text: str) -> tuple[dict[str, int], float] | None:
         if rest or "/" in part:
             return None
         for symbol, exponent in _FACTOR.findall(part):
-            found = next(
+            match = next(
                 (
                     (_FACTORS[symbol[len(prefix) :]], power)
                     for prefix, power in _PREFIXES.items()
@@ -184,11 +184,11 @@ def _product(text: str) -> tuple[dict[str, int], float] | None:
                 ),
                 None,
             )
-            if found is None:
+            if match is None:
                 return None
-            (of, one), power = found
+            (of, factor), power = match
             times = sign * int(exponent or 1)
-            scale *= (one * 10.0**power) ** times
+            scale *= (factor * 10.0**power) ** times
             for name, each in of.items():
                 powers[name] = powers.get(name, 0) + times * each
     return {name: power for name, power in powers.items() if power}, scale

@@ -84,9 +84,9 @@ class BaseLine:
             )
         return line
 
-    def seen(self, places: Array) -> Array:
+    def seen(self, points: Array) -> Array:
         """Return places (n, 2) by their distances along the lever and across it (µm)."""
-        return (places - self.origin) @ np.stack([self.along, self.across], axis=1)
+        return (points - self.origin) @ np.stack([self.along, self.across], axis=1)
 
     def placed(self, corners: Array) -> Array:
         """Return points (..., 3), given along, across and up, in space."""

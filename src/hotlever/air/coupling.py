@@ -245,7 +245,7 @@ class _Directions:
         self._near, self._lost, self._sampled = near, lost, sampled
         # per direction: its image between the sites (orthonormal), and the change of x
         self._images = self._changes = np.empty((0, 0))
-        self._known = 0
+        self._directions = 0
 
     def solve(self, right_hand_side: Array) -> Array:
         """Solve for one right-hand side."""
@@ -254,17 +254,17 @@ class _Directions:
         goal = _TOLERANCE * np.linalg.norm(residual)
         used = restarts = 0
         while True:
-            if self._known:
-                images = self._images[used : self._known]
+            if self._directions:
+                images = self._images[used : self._directions]
                 shares = images @ residual
-                x += shares @ self._changes[used : self._known]
+                x += shares @ self._changes[used : self._directions]
                 residual = residual - shares @ images
-                used = self._known
+                used = self._directions
             if not np.linalg.norm(residual) > goal:
                 return x
             if used == _MOST_DIRECTIONS:
                 # those of many other right-hand sides fill the memory; begin again
-                used, self._known, restarts = 0, 0, restarts + 1
+                used, self._directions, restarts = 0, 0, restarts + 1
             if restarts > _MOST_RESTARTS:
                 raise ComputationError(
                     f"a linear system in air was not solved with {restarts} times "
@@ -273,19 +273,19 @@ class _Directions:
             self._add(residual)
 
     def _add(self, direction: Array) -> None:
-        known = self._known
+        count = self._directions
         change = -self._near(self._lost(direction))
         image = direction - self._sampled(change)
         if not self._images.size:
             # only one of the two systems may ever be asked for
             self._images = np.empty((_MOST_DIRECTIONS, image.size))
             self._changes = np.empty((_MOST_DIRECTIONS, change.size))
-        shares = self._images[:known] @ image
-        image = image - shares @ self._images[:known]
-        change = change - shares @ self._changes[:known]
+        shares = self._images[:count] @ image
+        image = image - shares @ self._images[:count]
+        change = change - shares @ self._changes[:count]
         length = np.linalg.norm(image)
-        self._images[known], self._changes[known] = image / length, change / length
-        self._known += 1
+        self._images[count], self._changes[count] = image / length, change / length
+        self._directions += 1
 
 
 def _columnwise(matrix: Any, x: Array) -> Array:

@@ -130,12 +130,12 @@ class _Outline:
             self._fine.append((base, fine * options.tip * cone.base_radius_um))
         self._edges, self._corners = self._exposed(layout)
 
-    def _seen(self, places: object) -> Array:
-        return (np.asarray(places) - self._origin) @ self._axes.T
+    def _seen(self, points: object) -> Array:
+        return (np.asarray(points) - self._origin) @ self._axes.T
 
-    def on_the_lever(self, places: Array) -> Array:
+    def on_the_lever(self, points: Array) -> Array:
         """Return places (..., 2) of the outline in the coordinates of the layout."""
-        return places @ self._axes + self._origin
+        return points @ self._axes + self._origin
 
     def _exposed(self, layout: Layout) -> tuple[list[Array], Array]:
         """Return the edges that no terminal holds, and the sharp corners between two of them."""

@@ -107,8 +107,8 @@ class Access:
     async def _introduced(self, request: Request) -> Response | None:
         """Return the answer to who brings the token or a password."""
         if self._password is None:
-            known = _same(request.query_params.get("token", ""), self._token)
-            return self._let_in(request.scope["path"]) if known else None
+            is_token = _same(request.query_params.get("token", ""), self._token)
+            return self._let_in(request.scope["path"]) if is_token else None
         if (request.method, request.scope["path"]) != ("POST", "/enter"):
             return None
         content = b""

@@ -100,12 +100,12 @@ def with_value(text: str, section: Section, key: str, value: Any) -> str:
     return _text(_after(entries, alike[-1] if alike else None, head, new))
 
 
-def same(one: str, other: str) -> bool:
+def same(first: str, second: str) -> bool:
     """Return whether two probe files say the same."""
     try:
-        return tomllib.loads(one) == tomllib.loads(other)
+        return tomllib.loads(first) == tomllib.loads(second)
     except ValueError:
-        return one == other
+        return first == second
 
 
 def _after(entries: list[_Entry], last: _Entry | None, *new: _Entry) -> list[_Entry]:
@@ -153,7 +153,7 @@ def with_material_renamed(text: str, old: str, new: str) -> str:
         elif entry.section[:1] == ("layers",) and not entry.is_header:
             made_of = rf"""(\bmaterial\s*=\s*)(["']){re.escape(old)}\2"""
             entry.lines = [
-                re.sub(made_of, lambda found: found[1] + as_toml(new), line) for line in entry.lines
+                re.sub(made_of, lambda match: match[1] + as_toml(new), line) for line in entry.lines
             ]
     for layer in expected.get("layers", {}).values():
         if isinstance(layer, dict) and layer.get("material") == old:
@@ -241,11 +241,11 @@ def _names(text: str) -> set[str]:
 
 
 def _free(name: str, taken: set[str]) -> str:
-    number, found = 1, name
-    while found in taken:
+    number, free = 1, name
+    while free in taken:
         number += 1
-        found = f"{name}-{number}"
-    return found
+        free = f"{name}-{number}"
+    return free
 
 
 def _with_drawn(text: str, name: str, drawn: Any, material: str, thickness: float | None) -> str:

@@ -136,8 +136,8 @@ def _card(path: Section, section: Mapping[str, Any]) -> dict[str, Any]:
         field = kind.model_fields[key]
         default = usual.get(key, field.default if isinstance(field.default, float) else "")
         meaning = field.description or ""
-        one = _field(path, key, section, _number(default), meaning)
-        shown.append({**one, "used": key not in useless or key in section or not given})
+        field_shown = _field(path, key, section, _number(default), meaning)
+        shown.append({**field_shown, "used": key not in useless or key in section or not given})
     named = names_stated({key: value for key, value in given.items() if key in STATED})
     for key in sorted({*named, *section} - kind.model_fields.keys()):
         shown.append(_field(path, key, section, "", f"{key}, a number in a formula"))

@@ -206,19 +206,19 @@ def _record(chosen: Mapping[str, Any]) -> Record:
     return {page: others for page, others in record.items() if others}
 
 
-def _differing(one: Record, other: Record) -> set[str]:
+def _differing(first: Record, second: Record) -> set[str]:
     """Return what differs between two records, in words: the page, and what of it."""
     return {
         f"{page}, {key.replace('_', ' ')}"
-        for page in {*one, *other}
-        for key in _keys(one.get(page, {}), other.get(page, {}))
+        for page in {*first, *second}
+        for key in _keys(first.get(page, {}), second.get(page, {}))
     }
 
 
-def _keys(one: Mapping[str, Any], other: Mapping[str, Any]) -> Iterator[str]:
+def _keys(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[str]:
     """Return the keys of different values, those of values that are themselves of several."""
-    for key in {*one, *other}:
-        mine, others = one.get(key), other.get(key)
+    for key in {*first, *second}:
+        mine, others = first.get(key), second.get(key)
         if key in _OF_FILES:
             continue
         if key == "changes":

@@ -301,7 +301,7 @@ def _at_fault(
     from hotlever.probe.drawing.outlines import DrawingError
 
     if isinstance(error, DrawingError):
-        made = figures.outlines_drawing(error.outlines, fault=fault, place=error.place)
+        made = figures.outlines_drawing(error.outlines, fault=fault, fault_at=error.place)
         return {"figure": _svg(made), "fault": fault}
     try:
         # a section may hold anything
@@ -326,9 +326,9 @@ def _impossible(values: Mapping[str, Any], fault: str) -> Figure:
         raise ValueError(fault)
     parts = {word.partition("_")[0] for word in words}
     wrong = next((region for region in regions if region.name.partition(" ")[0] in parts), None)
-    place = None if wrong is None else np.mean(wrong.rings[0], axis=0).tolist()
+    fault_at = None if wrong is None else np.mean(wrong.rings[0], axis=0).tolist()
     outlines = {region.name: region.rings for region in regions}
-    return figures.outlines_drawing(outlines, fault=fault, place=place)
+    return figures.outlines_drawing(outlines, fault=fault, fault_at=fault_at)
 
 
 #: Pages of results, whose figures may be asked for as files; the latest last.

@@ -34,7 +34,9 @@ def names(report: Report, folders: Sequence[str]) -> list[str]:
         with suppress(InputError):
             for file, _ in spectrum_files([Path(name)]):
                 with suppress(InputError, OSError):
-                    spectra += (f"{name}/{one}" for one in _names(file, file.stat().st_mtime))
+                    spectra += (
+                        f"{name}/{spectrum}" for spectrum in _names(file, file.stat().st_mtime)
+                    )
     return spectra
 
 

@@ -127,11 +127,11 @@ def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Pri
 
 
 def _same_data(first: Measurement, second: Measurement) -> bool:
-    one, other = (
+    columns, others = (
         (data.bias_V, data.observable("current"), data.observable("bridge"))
         for data in (first, second)
     )
-    return np.array_equal(one, other, equal_nan=True)
+    return np.array_equal(columns, others, equal_nan=True)
 
 
 # --- the calibration of an estimated lever ------------------------------------------------------

@@ -117,9 +117,9 @@ def _tip_at(calibration: Calibration, at: Setting) -> dict[str, float]:
     """Return the tip temperature with its errors (K); NaN where there is none."""
     by_bias = at.along == "bias_V"
     rows = calibration.table if by_bias else calibration.heating
-    known = calibration.describes_data and (by_bias or calibration.power_law is not None)
+    is_stated = calibration.describes_data and (by_bias or calibration.power_law is not None)
     return {
-        name: float(interpolated(rows, at.value, at.along, name)) if known else np.nan
+        name: float(interpolated(rows, at.value, at.along, name)) if is_stated else np.nan
         for name in ("tip_K", *STATED)
     }
 

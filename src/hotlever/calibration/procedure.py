@@ -169,8 +169,8 @@ def _in_either(result: Calibration, other: Calibration) -> Calibration:
         choices[name] = error_of_choice(columns[name], others[name])
         columns[error] = np.hypot(columns[error], choices[name])
     parts, of_apex = (
-        known and known | {"medium": choices[name]}
-        for known, name in (
+        budget and budget | {"medium": choices[name]}
+        for budget, name in (
             (budget_of(result.table), "tip_K"),
             (budget_of(result.table, BUDGETS[1]), "apex_K"),
         )

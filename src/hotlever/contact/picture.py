@@ -133,8 +133,8 @@ def _slices(heights: Array, halves: Array, T: Array) -> list[tuple[Corners, floa
         lower = min(number + 2, heights.size - 1)
         (high, low), (wide, narrow) = heights[[number, lower]], halves[[number, lower]]
         corners = [(-wide, high), (wide, high), (narrow, low), (-narrow, low)]
-        place = [(float(x), float(y)) for x, y in corners]
-        slices.append((place, float(T[number : number + 2].mean())))
+        outline = [(float(x), float(y)) for x, y in corners]
+        slices.append((outline, float(T[number : number + 2].mean())))
     return slices
 
 

@@ -157,13 +157,13 @@ class ExperimentAtRest:
         fast, probe = at.linearised.branch, at.probe
         equations = self.full.equations(probe, self.names)
         u, x = self.fast.full_states(fast, equations, self.reach(probe))
-        by_fast, places = at.linearised.shown_at(u), fast.parametrisation
+        by_fast, parametrisation = at.linearised.shown_at(u), fast.parametrisation
         values = np.zeros(by_fast.shape[:2])
         values[:, :TIP_RISE] = equations.observed(x).T - fast.curve(u)[:, :TIP_RISE]
         values[:, TIP_RISE] = equations.space.tip_rise(x) - fast.rise(u)
         slopes = np.zeros(by_fast.shape)
         if self.first_order:
-            constraint = places.constraint(u)
+            constraint = parametrisation.constraint(u)
             slopes = by_parameter(equations, x, self.names, constraint=constraint) - by_fast
         if fast.starts_cold:
             # without power nothing is lacking

@@ -106,15 +106,15 @@ class Estimate:
         """What is known of its parameters, and of any quantity of it."""
         return Posterior(self.objective, self.prediction)
 
-    def priors(self, known: Mapping[str, Prior]) -> dict[str, PriorUse]:
+    def priors(self, before: Mapping[str, Prior]) -> dict[str, PriorUse]:
         """Return what was known before, and what the data made of it."""
         names = self.options.varied
         values = self.probe.values(names).tolist()
         spreads = np.sqrt(np.diag(self.posterior.covariance)).tolist()
         used = {
-            name: known[name].used(value, spread)
+            name: before[name].used(value, spread)
             for name, value, spread in zip(names, values, spreads, strict=True)
-            if name in known
+            if name in before
         }
         for error in self.residuals.common:
             size, left = self.posterior.moved[error.name]

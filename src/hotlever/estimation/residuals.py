@@ -143,8 +143,8 @@ class Residuals:
     def different(self) -> int:
         """How many of them are at different places: the same again tells of noise only."""
         distance = np.zeros(self.along.size) if self.distance_um is None else self.distance_um
-        places = np.stack([self.along, distance])
-        return sum(np.unique(places[:, row], axis=1).shape[1] for row in self.present)
+        settings = np.stack([self.along, distance])
+        return sum(np.unique(settings[:, row], axis=1).shape[1] for row in self.present)
 
     @property
     def data_weights(self) -> Array:

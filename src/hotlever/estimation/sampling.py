@@ -290,9 +290,9 @@ def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> x
         sampler=f"emcee {emcee.__version__}",
         lever=fit.probe.title,
     )
-    for name, known in parameters_of(fit.probe).items():
+    for name, parameter in parameters_of(fit.probe).items():
         if name in fit.names:
-            data[name].attrs = {"units": known.unit, "long_name": known.meaning}
+            data[name].attrs = {"units": parameter.unit, "long_name": parameter.meaning}
     return data
 
 

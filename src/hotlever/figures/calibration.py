@@ -174,9 +174,9 @@ def judged_calibrations(judged: xr.Dataset) -> Figure:
             label = "another law" if law else "mobility of Eq. 8"
             by_way.plot([], [], "o", label=label, **{**marks, "ls": "none"})
             for errors in ratio.values[other == law]:
-                known = errors[np.isfinite(errors)]
-                share = np.linspace(0.0, 1.0, known.size)
-                by_bias.plot(share, known, color=_BY_WAY[0], ls=marks["ls"], lw=0.9)
+                finite = errors[np.isfinite(errors)]
+                share = np.linspace(0.0, 1.0, finite.size)
+                by_bias.plot(share, finite, color=_BY_WAY[0], ls=marks["ls"], lw=0.9)
             by_bias.plot([], [], color=_BY_WAY[0], ls=marks["ls"], label=label)
         by_bias.axhline(0.0, color=BLACK, lw=0.8)
         by_bias.set(xlim=(0, 1), xlabel="bias V$_b$ (above 400 K)")

@@ -91,7 +91,7 @@ def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: floa
     """
     ours, theirs = 100 * largest_deviation(study), 100 * largest_deviation(published)
     symbols = [parameter_label(name)[0].partition(" (")[0] for name in study.parameter.values]
-    place = np.arange(len(symbols))
+    position = np.arange(len(symbols))
     with figure(8.4, 3.6, 1, study.sizes["doping"], letters=True, sharey=True) as (made, panels):
         for axes, doping in zip(np.atleast_1d(panels), study.doping.values, strict=True):
             columns = [
@@ -103,10 +103,10 @@ def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: floa
             for (name, values), colour, aside in zip(columns, colours, beside_each, strict=True):
                 style: Any = {"ls": "none", "marker": "_" if colour == BLACK else "o"}
                 axes.plot(
-                    place + aside, values.where(values > 0), color=colour, label=name, **style
+                    position + aside, values.where(values > 0), color=colour, label=name, **style
                 )
             axes.axhline(100 * claimed, color=ORANGE, ls=":")
-            axes.set_xticks(place, symbols)
+            axes.set_xticks(position, symbols)
             axes.set_title(str(doping), loc="center")
             axes.set_ylim(0.0, None)
         np.atleast_1d(panels)[0].set(ylabel="largest distance from the mean (%)")
@@ -179,15 +179,17 @@ def thermoelectric_shift(shift: xr.Dataset, other: xr.Dataset | None = None) -> 
         The same of a lever with carriers of the other sign.
     """
     by_heat = shift.share_nm.sum("side").sel(polarity=1)
-    with figure(7.6, 3.4, 1, 2, letters=True) as (made, (place, moved)):
-        place.plot(shift.bias, shift.plain_um, ":", color=BLACK, label="without thermoelectricity")
+    with figure(7.6, 3.4, 1, 2, letters=True) as (made, (position, moved)):
+        position.plot(
+            shift.bias, shift.plain_um, ":", color=BLACK, label="without thermoelectricity"
+        )
         for polarity, mark, colour in ((1, "o-", BLUE), (-1, "s-", ORANGE)):
             label = f"{'positive' if polarity > 0 else 'negative'} bias"
             at_um = shift.at_um.sel(polarity=polarity)
-            place.plot(shift.bias, at_um, mark, color=colour, label=label)
-        place.axhline(0.0, color=BLACK, lw=0.6)
-        place.set(xlabel="size of the bias (V)", ylabel="hot spot: supply ←   (µm)   → ground")
-        place.legend()
+            position.plot(shift.bias, at_um, mark, color=colour, label=label)
+        position.axhline(0.0, color=BLACK, lw=0.6)
+        position.set(xlabel="size of the bias (V)", ylabel="hot spot: supply ←   (µm)   → ground")
+        position.legend()
         whole = shift.moved_nm.sel(polarity=1)
         moved.plot(shift.bias, whole, "o-", color=BLUE, label="all")
         for heat, colour in (("Peltier", VERMILION), ("Thomson", GREEN)):

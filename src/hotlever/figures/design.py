@@ -72,11 +72,11 @@ def _map(data: xr.Dataset, labels: dict[str, str]) -> Figure:
 
 def _contours(made: Figure, axes: Axes, values: xr.DataArray, label: str) -> None:
     up, across = (values[name].values for name in values.dims)
-    known = np.isfinite(values.values)
+    is_known = np.isfinite(values.values)
     hatched: Any = {"hatch": "////", "cmap": ListedColormap(["white"]), "edgecolor": "0.6"}
-    missing = np.ma.masked_where(known, np.zeros(known.shape))
+    missing = np.ma.masked_where(is_known, np.zeros(is_known.shape))
     axes.pcolor(across, up, missing, shading="nearest", lw=0.0, **hatched)
-    if np.ptp(values.values[known]) > 0.0:
+    if np.ptp(values.values[is_known]) > 0.0:
         shown: Any = {"levels": _LEVELS}
         filled = axes.contourf(across, up, values.values, **shown)
         lines = axes.contour(across, up, values.values, colors="white", linewidths=0.7, **shown)
@@ -133,9 +133,9 @@ def design_optimum(optimum: Optimum) -> Figure:
             shown = solved.branch.shown(u)
             curves.plot(shown["lever_V"], shown["current_mA"], color=colour, label=name)
             marks = {"working point": (solved.u, "o"), "knee": (solved.branch.knee_u, "^")}
-            for label, (place, mark) in marks.items():
-                if place is not None:
-                    at = solved.branch.point(place)
+            for label, (at_u, mark) in marks.items():
+                if at_u is not None:
+                    at = solved.branch.point(at_u)
                     curves.plot(
                         at.lever_V, at.current_mA, mark, color=colour, label=f"{name}, {label}"
                     )

@@ -119,7 +119,7 @@ def outlines_drawing(
     *,
     tip: tuple[float, float] | None = None,
     fault: str = "",
-    place: tuple[float, float] | None = None,
+    fault_at: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw outlines by what they are, the largest at the bottom.
 
@@ -131,7 +131,7 @@ def outlines_drawing(
     tip : tuple of float, optional
     fault : str
         What is wrong, told above the drawing.
-    place : tuple of float, optional
+    fault_at : tuple of float, optional
         Where it is wrong: marked.
     """
     rings = {name: [np.array(ring) for ring in group] for name, group in outlines.items() if group}
@@ -148,11 +148,11 @@ def outlines_drawing(
         if tip is not None:
             axes.plot(*tip, marker="^", color=BLACK, ls="none", label="tip")
         points = np.concatenate([ring for group in rings.values() for ring in group])
-        if place is not None:
-            points = np.vstack([points, place])
+        if fault_at is not None:
+            points = np.vstack([points, fault_at])
             ring: Any = {"mec": VERMILION, "mfc": "none", "ms": 18, "mew": 2, "ls": "none"}
-            axes.plot(*place, marker="o", label="at fault", **ring)
-            axes.plot(*place, marker="+", color=VERMILION, ms=8, mew=1.5)
+            axes.plot(*fault_at, marker="o", label="at fault", **ring)
+            axes.plot(*fault_at, marker="+", color=VERMILION, ms=8, mew=1.5)
         low, high = points.min(axis=0), points.max(axis=0)
         margin = 1.5 * _MARGIN * max(high - low)
         _plane(axes, low - margin, high + margin)

@@ -82,8 +82,8 @@ def data_and_model(
             if band is not None and name == "tip":
                 _tip_in_time(upper, band)
             else:
-                known = model.dropna(along, subset=[column])
-                curve(upper, known, along, column, color=BLUE, label="model")
+                complete = model.dropna(along, subset=[column])
+                curve(upper, complete, along, column, color=BLUE, label="model")
             if seen:
                 points = {**MEASURED, "ms": 2.5, "zorder": 1} if in_time else MEASURED
                 curve(upper, measured, along, column, **points)

@@ -111,7 +111,7 @@ def iv_curves(
             axes.annotate(point.name, (point.lever_V, point.current_mA), fontsize=8, **at)
         shown = [*sweeps.values(), *([] if measured is None else [measured])]
         volts, currents = (
-            np.concatenate([one[name].values for one in shown])
+            np.concatenate([data[name].values for data in shown])
             for name in ("lever_V", "current_mA")
         )
         axes.set(xlim=from_zero(volts), ylim=from_zero(currents))

@@ -56,8 +56,8 @@ def thermometry(
         return made
     if series:
         stated = {point.file: point.temperature_K for point in calibration.points}
-        known = [line for line in series if line.spectrum.name in stated]
-        heated = [(stated[line.spectrum.name], line) for line in known]
+        with_temperature = [line for line in series if line.spectrum.name in stated]
+        heated = [(stated[line.spectrum.name], line) for line in with_temperature]
         heated.sort(key=lambda pair: pair[0])
         stacked = [(f"{temperature:.0f} K", line) for temperature, line in heated]
     else:

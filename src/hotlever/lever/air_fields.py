@@ -77,8 +77,8 @@ class AirFields:
         """Return the heat (mW) that each region of the layout loses to the air."""
         heat = self._air.operator.matrix @ self._theta(state)
         sites, regions = self._air.operator.sites, self._lever.space.mesh.layout.regions
-        places = shapely.points(sites)
-        away = [shapely.distance(places, Polygon(part.outline, part.holes)) for part in regions]
+        points = shapely.points(sites)
+        away = [shapely.distance(points, Polygon(part.outline, part.holes)) for part in regions]
         region = np.argmin(away, axis=0)
         return {part.name: float(heat[region == k].sum()) for k, part in enumerate(regions)}
 

@@ -60,8 +60,8 @@ class Branch(SolvedStates):
 
     Attributes
     ----------
-    places : Parametrisation, optional
-        Of a lever that does not start cold: what the places u of similar levers have in common, if
+    stated_parametrisation : Parametrisation, optional
+        Of a lever that does not start cold: what the points u of similar levers have in common, if
         they are not lines across this branch itself.
 
     Examples
@@ -72,7 +72,7 @@ class Branch(SolvedStates):
     (900, [2.02, 2.6])
     """
 
-    places: Parametrisation | None = None
+    stated_parametrisation: Parametrisation | None = None
 
     @classmethod
     def of_roots(
@@ -80,11 +80,11 @@ class Branch(SolvedStates):
         equations: LeverEquations,
         u: Array,
         roots: NewtonResult,
-        places: Parametrisation = NATURAL,
+        parametrisation: Parametrisation = NATURAL,
     ) -> Branch:
-        """Return the branch of states that were found at some places u, and differentiate them."""
-        along = equations.along(roots.x, roots.factors, places.constraint(u))
-        rate = places.rate(u, equations.space, roots.x)
+        """Return the branch of states that were found at some points u, and differentiate them."""
+        along = equations.along(roots.x, roots.factors, parametrisation.constraint(u))
+        rate = parametrisation.rate(u, equations.space, roots.x)
         return cls.of(equations, u, roots.x, rate * along)
 
     @classmethod
@@ -93,12 +93,12 @@ class Branch(SolvedStates):
         equations: LeverEquations,
         u: Array,
         roots: NewtonResult,
-        places: Parametrisation = NATURAL,
+        parametrisation: Parametrisation = NATURAL,
     ) -> Branch:
-        """Return the same, beginning without power if their places do."""
-        branch = cls.of_roots(equations, u, roots, places)
-        if places is not NATURAL:
-            return replace(branch, places=places)
+        """Return the same, beginning without power if their points do."""
+        branch = cls.of_roots(equations, u, roots, parametrisation)
+        if parametrisation is not NATURAL:
+            return replace(branch, stated_parametrisation=parametrisation)
         cold = cls.cold(equations, equations.cold()[0])
         below, above = branch.among(u < 0.0), branch.among(u > 0.0)
         return below.followed_by(cold).followed_by(above)
@@ -112,10 +112,10 @@ class Branch(SolvedStates):
 
     @cached_property
     def parametrisation(self) -> Parametrisation:
-        """What a place on the branch of a similar lever has in common with one on this."""
+        """What a point on the branch of a similar lever has in common with one on this."""
         if self.starts_cold:
             return NATURAL
-        return self.places or PseudoArclength(self.path)
+        return self.stated_parametrisation or PseudoArclength(self.path)
 
     @cached_property
     def path(self) -> Piecewise:
@@ -134,11 +134,11 @@ class Branch(SolvedStates):
         return float(self.tip_K(self.end_u))
 
     def tip_K(self, u: ArrayLike) -> Array:
-        """Return tip temperatures (K) at some places of the branch."""
+        """Return tip temperatures (K) at some points of the branch."""
         return self.base_temperature_K + self.rise(np.asarray(u, dtype=float))
 
     def rise(self, u: Array) -> Array:
-        """Return rises of the tip (K) at some places of the branch."""
+        """Return rises of the tip (K) at some points of the branch."""
         return np.asarray(self.curve(u)[..., TIP_RISE])
 
     def u_at(self, tip_K: ArrayLike) -> Array:
@@ -147,7 +147,7 @@ class Branch(SolvedStates):
         inside = (rise >= 0) & (rise <= self.end_u**2 * (1 + 1e-12))
         u = np.sqrt(np.where(inside, np.maximum(rise, 0.0), np.nan))
         for _ in range(_CORRECTIONS):
-            # before the first state places may differ from the root of the rise
+            # before the first state points may differ from the root of the rise
             slope = self.curve(u, 1)[..., TIP_RISE]
             u = u - np.divide(self.rise(u) - rise, slope, out=np.zeros_like(u), where=slope > 0)
         return np.asarray(u)

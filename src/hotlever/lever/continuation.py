@@ -192,7 +192,7 @@ class NaturalContinuation(Continuation):
         u = float(self._branch.u[-1])
         last = _AFTER_STEP_K if u in self._bends else self._step
         # A leg may get hotter faster than the tip. Steps are halved then, not scaled, so that
-        # branches of similar levers still have most of their places in common.
+        # branches of similar levers still have most of their points in common.
         slopes = self._equations.space.rises(self._branch.slopes[:, -1:])
         faster = max(1.0, float(slopes.max()) / (2.0 * u) / _MUCH_FASTER)
         longest = _STEP_K / 2.0 ** np.ceil(np.log2(faster))
@@ -253,7 +253,7 @@ class ArclengthContinuation(Continuation):
         space, at = equations.space, np.array([u])
         origin = in_plane(space, branch.x[:, -1:])[0]
         lines = PseudoArclength.across_tangent(float(branch.u[-1]), origin, tangent)
-        roots = solve_at(equations, at, guess, _OPTIONS, places=lines)
+        roots = solve_at(equations, at, guess, _OPTIONS, parametrisation=lines)
         slope = equations.along(roots.x, roots.factors, lines.constraint(at))
         # by the length of the curve, not by that of its tangent
         slope = slope / np.linalg.norm(in_plane(space, slope))
@@ -310,21 +310,21 @@ def without_bias(equations: LeverEquations) -> Array:
     return x
 
 
-def at_places_of(similar: Branch, branch: Branch) -> Branch:
-    """Return a branch with its states at the places of a similar one, and their u.
+def at_points_of(similar: Branch, branch: Branch) -> Branch:
+    """Return a branch with its states at the points of a similar one, and their u.
 
-    Of a lever that starts cold it is returned as it is: its own places are as good.
+    Of a lever that starts cold it is returned as it is: its own points are as good.
 
     Raises
     ------
     NewtonError
         If a state was not found.
     """
-    equations, places = branch.equations, similar.parametrisation
+    equations, parametrisation = branch.equations, similar.parametrisation
     if branch.starts_cold:
         return branch
     u = np.linspace(branch.u[0], branch.u[-1], _LOOKED_AT * branch.u.size)
     away = branch.path(u) - similar.path(similar.u)[:, None]
     nearest = branch.states(u[np.argmin((away**2).sum(axis=-1), axis=1)])
-    roots = solve_at(equations, similar.u, nearest, _OPTIONS, places=places)
-    return Branch.whole(equations, similar.u, roots, places)
+    roots = solve_at(equations, similar.u, nearest, _OPTIONS, parametrisation=parametrisation)
+    return Branch.whole(equations, similar.u, roots, parametrisation)

@@ -125,9 +125,9 @@ class FullSpace(Space):
 
     def _sampled_sum(self, nodes: Index) -> Array:
         """Return values and slopes of the sum of some nodes' functions."""
-        ones = np.zeros(self.elements.size)
-        ones[nodes] = 1.0
-        return np.asarray(self.elements.sampling @ ones)
+        indicator = np.zeros(self.elements.size)
+        indicator[nodes] = 1.0
+        return np.asarray(self.elements.sampling @ indicator)
 
     def nodal(
         self, x: Array, base_temperature_K: float, end_rises: Mapping[str, float] | None = None
@@ -156,12 +156,12 @@ class FullSpace(Space):
         return x
 
     def rises(self, x: Array) -> Array:
-        """Return the free rises of the temperature (K), (places, n), of states."""
+        """Return the free rises of the temperature (K), (nodes, n), of states."""
         return x[self.is_temperature]
 
-    def rise_at(self, places: Array, x: Array) -> Array:
-        """Return the rise of the temperature (K) at places (k, 2) in states, (k, n)."""
-        return np.asarray(self.elements.interpolation(places)[0] @ self.nodal_rises(x))
+    def rise_at(self, points: Array, x: Array) -> Array:
+        """Return the rise of the temperature (K) at points (k, 2) in states, (k, n)."""
+        return np.asarray(self.elements.interpolation(points)[0] @ self.nodal_rises(x))
 
     @property
     def full(self) -> FullSpace:
@@ -188,8 +188,8 @@ class FullSpace(Space):
     def _losses_at(self, name: str) -> csr_matrix:
         """Return the matrix from slopes of what leaves at the rim or footprint to the entries."""
         if name not in self._losses:
-            places: FacetPoints = getattr(self, name).places
-            self._losses[name] = self._jacobian.of_losses(places.elements, places.shares)
+            facets: FacetPoints = getattr(self, name).facet_points
+            self._losses[name] = self._jacobian.of_losses(facets.elements, facets.shares)
         return self._losses[name]
 
     # --- the air ----------------------------------------------------------------------------------

@@ -97,9 +97,9 @@ def with_meanings(
     for name, monitor in probe.monitors.items():
         dimensions: tuple[str, ...] = (along,)
         if monitor.line_um is not None:
-            dimensions, (first, *_) = (along, name), monitor.places
+            dimensions, (first, *_) = (along, name), monitor.positions
             meaning = {"units": "µm", "long_name": f"distance from the start of {name}"}
-            coordinates[name] = name, np.linalg.norm(monitor.places - first, axis=1), meaning
+            coordinates[name] = name, np.linalg.norm(monitor.positions - first, axis=1), meaning
         for unit, what in _SHOWN.items():
             meaning = {"units": unit, "long_name": f"{what} {monitor}"}
             variables[f"{name}_{unit}"] = dimensions, columns[f"{name}_{unit}"], meaning
@@ -124,8 +124,8 @@ def _weights(full: FullSpace, monitor: Monitor, unit: str) -> _Weights:
     if monitor.region is not None:
         here = counts & np.isin(full.mesh.region, layout.named(monitor.region))
         return _mean(elements, here)
-    there = on_lever(layout, monitor.places)
-    at, element = elements.interpolation(monitor.places[there])
+    there = on_lever(layout, monitor.positions)
+    at, element = elements.interpolation(monitor.positions[there])
     # rows without weights where there is no lever
     rows = at.data, at.indices, np.append(0, np.cumsum(there)) * elements.dofs.shape[1]
     there[there] = counts[element]

@@ -120,9 +120,9 @@ def _of_film(film: PlacedFilm | RimFilm, movement: Movement, body: Array, region
 def _of_rim(space: FullSpace, movement: Movement) -> tuple[Array, ...]:
     """Return how surface at the points of a rim grows, over their weights (as its heights)."""
     longer, velocity = _along_rim(space, movement)
-    places = space.rim.places
-    body = _thickening(space.mesh.layout, movement, places.positions, velocity)
-    region = space.mesh.region[places.elements]
+    points = space.rim.facet_points
+    body = _thickening(space.mesh.layout, movement, points.positions, velocity)
+    region = space.mesh.region[points.elements]
     return tuple(
         longer[film.points, None] * film.height_um + _of_film(film, movement, body, region)
         for film in space.rim.films
@@ -131,13 +131,13 @@ def _of_rim(space: FullSpace, movement: Movement) -> tuple[Array, ...]:
 
 def _along_rim(space: FullSpace, movement: Movement) -> tuple[Array, Array]:
     """Return how edges of the rim grow, relative, and the velocity, at its points."""
-    mesh, places = space.mesh.elements, space.rim.places
-    vertices = mesh.facets[:, places.facets]
+    mesh, points = space.mesh.elements, space.rim.facet_points
+    vertices = mesh.facets[:, points.facets]
     start, end = mesh.p[:, vertices].swapaxes(0, 1)
     moved, rate = movement.velocity[:, vertices].swapaxes(0, 1)
     side, stretch = end - start, rate - moved
     square = (side**2).sum(axis=0)
-    share = ((places.positions - start) * side).sum(axis=0) / square
+    share = ((points.positions - start) * side).sum(axis=0) / square
     return (side * stretch).sum(axis=0) / square, moved + share * stretch
 
 

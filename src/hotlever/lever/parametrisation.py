@@ -1,8 +1,8 @@
-"""Parametrisations of a lever's curve: which constraint selects the state at each of its places.
+"""Parametrisations of a lever's curve: which constraint selects the state at each of its points.
 
 A constraint is a line in the plane of tip temperature and lever voltage, and its state is the one
 on that line. A lever that starts cold has one state at each tip temperature: its natural parameter.
-Another one is warm without a bias and may cool at first; its places are lines across a curve
+Another one is warm without a bias and may cool at first; its points are lines across a curve
 (pseudo-arclength; H. B. Keller, in Applications of Bifurcation Theory, 359 (1977)), its own or that
 of a similar lever, so that the states of both can be compared.
 """
@@ -31,7 +31,7 @@ def in_plane(space: Space, x: Array) -> Array:
 
 
 class Parametrisation(Protocol):
-    """The constraints of the places u (n,) of a branch."""
+    """The constraints of the points u (n,) of a branch."""
 
     def constraint(self, u: Array) -> Constraint:
         """Return the constraint of each place."""
@@ -47,10 +47,10 @@ class Parametrisation(Protocol):
 
 
 class Natural:
-    """The places of a lever that starts cold: u = √(T_tip − T_base), negative with the bias.
+    """The points of a lever that starts cold: u = √(T_tip − T_base), negative with the bias.
 
     With thermoelectricity the temperature begins in proportion to the bias, not to its square: the
-    places between the cold state and the next are those of the smooth curve through both.
+    points between the cold state and the next are those of the smooth curve through both.
     """
 
     def constraint(self, u: Array) -> Constraint:
@@ -129,9 +129,9 @@ def solve_at(
     guess: Array,
     options: NewtonOptions,
     factors: Factors | None = None,
-    places: Parametrisation = NATURAL,
+    parametrisation: Parametrisation = NATURAL,
 ) -> NewtonResult:
-    """Find the states at some places u, (size + 1, n), from guesses of them.
+    """Find the states at some points u, (size + 1, n), from guesses of them.
 
     The factors may be those of states nearby.
 
@@ -140,7 +140,7 @@ def solve_at(
     NewtonError
         If a state was not found.
     """
-    problem = Constrained(equations, places.constraint(u), places.values(u))
+    problem = Constrained(equations, parametrisation.constraint(u), parametrisation.values(u))
     return find_roots(problem, guess, options, factors)
 
 

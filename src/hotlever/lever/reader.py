@@ -327,10 +327,10 @@ def best_bias(
         same = (slopes > 0).all() or (slopes < 0).all()
         return max(signal.resolution_nm_per_rtHz for signal in signals) if same else np.inf
 
-    found = np.array([resolution(value) for value in tried.tolist()])
-    if not np.isfinite(found).any():
+    resolutions = np.array([resolution(value) for value in tried.tolist()])
+    if not np.isfinite(resolutions).any():
         raise ComputationError(f"no bias up to {highest_V:g} V resolves all distances")
-    best = int(found.argmin())
+    best = int(resolutions.argmin())
     low, high = tried[max(best - 1, 0)], tried[min(best + 1, _TRIED - 1)]
     around = np.linspace(low, high, 2 * _REFINED + 1)
     finer = [resolution(value) for value in around.tolist()]
@@ -354,9 +354,9 @@ def check_distances(probe: Probe, distance_um: Array) -> None:
         raise InputError("[contact]: the tip touches a sample, expected a lever above a surface")
     height = 0.0 if probe.tip is None else probe.tip.height_um
     if not distance_um.size or not (distance_um > height).all():
-        found = f"{distance_um.min():g} µm" if distance_um.size else "none"
+        stated = f"{distance_um.min():g} µm" if distance_um.size else "none"
         least = "above 0" if probe.tip is None else f"above the tip's height, {height:g} µm"
-        raise InputError(f"found a distance of {found}, expected distances {least}")
+        raise InputError(f"found a distance of {stated}, expected distances {least}")
 
 
 def _checked(probe: Probe, bias: ArrayLike) -> Array:

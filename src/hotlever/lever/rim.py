@@ -64,7 +64,7 @@ class Rim:
     weights: Array
     films: tuple[RimFilm, ...]
     end_tests: Mapping[str, Array]
-    places: FacetPoints
+    facet_points: FacetPoints
 
     @classmethod
     def of(
@@ -88,18 +88,18 @@ class Rim:
         """
         ends = np.concatenate(list(mesh.terminal_facets.values()))
         facets = np.setdiff1d(mesh.elements.boundary_facets(), ends)
-        places = elements.on_facets(facets)
-        nodes = elements.dofs[places.elements]
+        points = elements.on_facets(facets)
+        nodes = elements.dofs[points.elements]
         tests = {
-            name: np.where(np.isin(nodes, of_end), places.shares, 0.0).sum(axis=1)
+            name: np.where(np.isin(nodes, of_end), points.shares, 0.0).sum(axis=1)
             for name, of_end in end_nodes.items()
         }
         return cls(
-            _values(places, elements, selection),
-            places.weights[:, None],
-            _films(mesh.layout, mesh.region[places.elements], places.positions),
+            _values(points, elements, selection),
+            points.weights[:, None],
+            _films(mesh.layout, mesh.region[points.elements], points.positions),
             tests,
-            places,
+            points,
         )
 
     @classmethod
@@ -117,8 +117,8 @@ class Rim:
         positions = np.hstack([flat, bottom])
         element, shares, _ = elements.at_points(positions)
         share = np.repeat(weights / (2.0 * _AROUND), _AROUND)
-        places = FacetPoints(np.empty(0, dtype=np.intp), element, shares, share, positions.T)
-        return cls(_values(places, elements, selection), share[:, None], (), {}, places)
+        facet_points = FacetPoints(np.empty(0, dtype=np.intp), element, shares, share, positions.T)
+        return cls(_values(facet_points, elements, selection), share[:, None], (), {}, facet_points)
 
     def reduced(self, modes: Array) -> Rim:
         """Return the same for states that are combinations of modes (modes, size + 1)."""
@@ -129,8 +129,8 @@ class Rim:
     def nothing(cls, size: int) -> Rim:
         """Return that of a lever of so many free values whose rim radiates nothing."""
         none, point = np.empty(0, dtype=np.intp), np.empty((0, 1))
-        places = FacetPoints(none, none, point, point[:, 0], point.T)
-        return cls(LinearMap(csr_matrix((0, size + 1)), 1), point, (), {}, places)
+        facet_points = FacetPoints(none, none, point, point[:, 0], point.T)
+        return cls(LinearMap(csr_matrix((0, size + 1)), 1), point, (), {}, facet_points)
 
     def rise(self, x: Array) -> Array:
         """Return the rise of the temperature (K) at the points, (points, ...)."""
@@ -148,12 +148,12 @@ class Rim:
         return np.asarray(sum(self.end_tests.values(), start=np.zeros(len(self.weights))))
 
 
-def _values(places: FacetPoints, elements: FiniteElements, selection: csr_matrix) -> LinearMap:
+def _values(points: FacetPoints, elements: FiniteElements, selection: csr_matrix) -> LinearMap:
     """Return the map from unknowns to the temperature at some points."""
-    nodes = elements.dofs[places.elements]
+    nodes = elements.dofs[points.elements]
     rows = np.broadcast_to(np.arange(len(nodes))[:, None], nodes.shape)
     shape = (len(nodes), elements.size)
-    sampling = csr_matrix((places.shares.ravel(), (rows.ravel(), nodes.ravel())), shape=shape)
+    sampling = csr_matrix((points.shares.ravel(), (rows.ravel(), nodes.ravel())), shape=shape)
     return LinearMap(sampling @ selection, 1)
 
 

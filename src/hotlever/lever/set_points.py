@@ -150,10 +150,10 @@ def hold(
     if not wanted.size or not (np.isfinite(wanted) & (wanted > 0.0)).all():
         raise InputError(f"held {held}: expected finite set points above 0 {HELD[held].unit}")
     branch, failure = as_far_as_possible(lambda: lever.branch(np.inf, progress))
-    found = _Along(lever, branch, HELD[held]).held_at(wanted)
+    held_states = _Along(lever, branch, HELD[held]).held_at(wanted)
     if failure is not None:
-        found.data.attrs["notes"] += f"\nno hotter state was looked for: {failure}"
-    return found
+        held_states.data.attrs["notes"] += f"\nno hotter state was looked for: {failure}"
+    return held_states
 
 
 class _Along:

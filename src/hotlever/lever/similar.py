@@ -7,7 +7,7 @@ from typing import Protocol, Self
 
 from hotlever.air.coupling import AirLoss
 from hotlever.lever.branch import Branch, Reach
-from hotlever.lever.continuation import at_places_of, continued
+from hotlever.lever.continuation import at_points_of, continued
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
@@ -100,7 +100,7 @@ class SimilarLevers:
         self, branch: Branch, equations: LeverEquations, reach: Reach
     ) -> tuple[Array, Array]:
         """See `BranchSolver`."""
-        other = at_places_of(branch, continued(equations, reach))
+        other = at_points_of(branch, continued(equations, reach))
         return other.u[other.solved], other.x[:, other.solved]
 
     def tip_error_K(self, probe: Probe, branch: Branch) -> float:
@@ -156,8 +156,8 @@ class SimilarLevers:
         if near is None:
             branch = continued(equations, reach)
         else:
-            places, solved = near.branch.parametrisation, near.branch.solved
+            parametrisation, solved = near.branch.parametrisation, near.branch.solved
             u, guess = near.branch.u[solved], near.states(probe)[:, solved]
-            roots = solve_at(equations, u, guess, NewtonOptions(), near.factors, places)
-            branch = Branch.whole(equations, u, roots, places)
+            roots = solve_at(equations, u, guess, NewtonOptions(), near.factors, parametrisation)
+            branch = Branch.whole(equations, u, roots, parametrisation)
         return Linearised.of(probe, names, branch, reach)

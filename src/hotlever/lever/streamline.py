@@ -63,8 +63,8 @@ def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
     try:
         direction(start)
     except InputError:
-        places = elements.positions.T[np.repeat(space.conducting, elements.per_element)]
-        start = places[np.argmin(np.linalg.norm(places - start, axis=1))]
+        positions = elements.positions.T[np.repeat(space.conducting, elements.per_element)]
+        start = positions[np.argmin(np.linalg.norm(positions - start, axis=1))]
     points = np.array([*[*followed(start, -1.0)][::-1], start, *followed(start, 1.0)])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return points, np.concatenate([[0.0], np.cumsum(lengths)])

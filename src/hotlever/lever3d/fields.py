@@ -44,9 +44,9 @@ def _(lever: SolidLever, cuts: int = 1) -> Surface:
     facets = mesh.facets[:, mesh.boundary_facets()]
     height = mesh.p[2, facets].min(axis=0)
     vertices, triangles = np.unique(facets[:, height == height.max()], return_inverse=True)
-    ones = np.ones(vertices.size), elements.basis.nodal_dofs[0, vertices]
+    indicator = np.ones(vertices.size), elements.basis.nodal_dofs[0, vertices]
     rows = np.arange(vertices.size + 1)
-    sampling = csr_matrix((*ones, rows), shape=(vertices.size, elements.size))
+    sampling = csr_matrix((*indicator, rows), shape=(vertices.size, elements.size))
     return Surface(mesh.p[:2, vertices].T, triangles.reshape(3, -1).T, sampling)
 
 

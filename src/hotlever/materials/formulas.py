@@ -59,10 +59,10 @@ class Expression(NamedTuple):
 
         They are not finite where the formula divides by nothing or overflows.
         """
-        known: dict[str, Dual] = {TEMPERATURE: (T, {TEMPERATURE: 1.0})}
-        known |= {name: (np.float64(parameters[name]), {name: 1.0}) for name in self.names}
+        values: dict[str, Dual] = {TEMPERATURE: (T, {TEMPERATURE: 1.0})}
+        values |= {name: (np.float64(parameters[name]), {name: 1.0}) for name in self.names}
         with np.errstate(all="ignore"):
-            value, by = _value(self.tree, known)
+            value, by = _value(self.tree, values)
         names = (TEMPERATURE, *self.names)
         whole = {name: np.broadcast_to(by.get(name, 0.0), T.shape) for name in names}
         return np.broadcast_to(value, T.shape), whole
@@ -99,8 +99,8 @@ def parsed(text: str) -> Expression:
             warnings.simplefilter("ignore")
             tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        place = getattr(error, "offset", None)
-        where = f"character {place}: " if place else ""
+        offset = getattr(error, "offset", None)
+        where = f"character {offset}: " if offset else ""
         raise ValueError(
             f"{where}not a formula, expected one of T such as 1.5 * (T/300)**-1.2, or the name "
             "of a table's file that ends in .csv, .txt, .tsv or .dat"
@@ -115,21 +115,21 @@ def parsed(text: str) -> Expression:
 def _check(node: ast.AST, names: dict[str, None], text: str, depth: int, steps: list[int]) -> None:
     """Refuse what no formula has; collect the names of parameters."""
     steps[0] += 1
-    place = f"character {getattr(node, 'col_offset', 0) + 1}"
+    where = f"character {getattr(node, 'col_offset', 0) + 1}"
     if depth > _DEEPEST or steps[0] > _MOST_STEPS:
         raise ValueError(
-            f"{place}: nested too deeply or too long, expected at most {_DEEPEST} levels and "
+            f"{where}: nested too deeply or too long, expected at most {_DEEPEST} levels and "
             f"{_MOST_STEPS} steps"
         )
     inner: list[ast.expr]
     match node:
         case ast.Constant(value=value) if type(value) in (int, float):
             if not abs(_number(value)) < np.inf:
-                raise ValueError(f"{place}: the number is too large")
+                raise ValueError(f"{where}: the number is too large")
             return
         case ast.Name(id=name):
             if name in FUNCTIONS:
-                raise ValueError(f"{place}: {name} is a function, expected {name}(…)")
+                raise ValueError(f"{where}: {name} is a function, expected {name}(…)")
             if name not in TAKEN:
                 names[name] = None
             return
@@ -138,20 +138,20 @@ def _check(node: ast.AST, names: dict[str, None], text: str, depth: int, steps: 
         case ast.BinOp(op=op) if type(op) in _OPERATORS:
             inner = [node.left, node.right]
         case ast.BinOp(op=ast.BitXor()):
-            place = f"character {(node.left.end_col_offset or 0) + 1}"
-            raise ValueError(f"{place}: ^ is no power, expected **")
+            where = f"character {(node.left.end_col_offset or 0) + 1}"
+            raise ValueError(f"{where}: ^ is no power, expected **")
         case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]):
             if name not in FUNCTIONS:
-                raise ValueError(f"{place}: {unknown_name('function', name, FUNCTIONS)}")
+                raise ValueError(f"{where}: {unknown_name('function', name, FUNCTIONS)}")
             inner = [argument]
         case ast.Tuple():
-            raise ValueError(f"{place}: found a comma, expected decimal points")
+            raise ValueError(f"{where}: found a comma, expected decimal points")
         case _:
             part = (
                 shown(ast.get_source_segment(text, node) or text) if hasattr(node, "lineno") else ""
             )
             raise ValueError(
-                f"{place}: '{part}' cannot be in a formula, expected numbers, T, parameters, "
+                f"{where}: '{part}' cannot be in a formula, expected numbers, T, parameters, "
                 f"+ - * / ** ( ) and {', '.join(FUNCTIONS)}"
             )
     for each in inner:
@@ -166,29 +166,29 @@ def _number(value: Any) -> float:
         return np.inf
 
 
-def _value(node: ast.AST, known: Mapping[str, Dual]) -> Dual:
+def _value(node: ast.AST, values: Mapping[str, Dual]) -> Dual:
     """Evaluate a checked tree and its derivatives."""
     match node:
         case ast.Constant(value=value):
             return np.float64(_number(value)), {}
         case ast.Name(id=name):
-            return known[name] if name in known else (np.float64(CONSTANTS[name]), {})
+            return values[name] if name in values else (np.float64(CONSTANTS[name]), {})
         case ast.UnaryOp(op=op, operand=operand):
-            x, dx = _value(operand, known)
+            x, dx = _value(operand, values)
             return (x, dx) if isinstance(op, ast.UAdd) else (-x, _chain((-1.0, dx)))
         case ast.BinOp(op=op, left=left, right=right):
-            return _binary(type(op), _value(left, known), _value(right, known))
+            return _binary(type(op), _value(left, values), _value(right, values))
         case ast.Call(func=ast.Name(id=name), args=[argument]):
             function, derivative = FUNCTIONS[name]
-            x, dx = _value(argument, known)
+            x, dx = _value(argument, values)
             y = function(x)
             return y, _chain((derivative(x, y), dx)) if dx else {}
     raise AssertionError(f"{node} was not checked")
 
 
-def _binary(operator: type, one: Dual, other: Dual) -> Dual:
+def _binary(operator: type, first: Dual, second: Dual) -> Dual:
     """Return the sum, difference, product, quotient or power of two steps."""
-    (x, dx), (y, dy) = one, other
+    (x, dx), (y, dy) = first, second
     if operator is ast.Add:
         return x + y, _chain((1.0, dx), (1.0, dy))
     if operator is ast.Sub:

@@ -240,8 +240,8 @@ class Kind(Record):
                     for own, others in cls.of_numbers.items()
                     if name in (*others, f"{own}_scale")
                 )
-                found = "a law" if name in cls.of_numbers[other] else "no law"
-                raise ValueError(f"{name} means nothing where {other} is {found}, expected none")
+                stated = "a law" if name in cls.of_numbers[other] else "no law"
+                raise ValueError(f"{name} means nothing where {other} is {stated}, expected none")
         scales = {
             f"{name}_scale": 1.0
             for name in cls.of_numbers

@@ -32,12 +32,14 @@ def monotone_cubic(x: Array, y: Array) -> Piecewise:
     slopes = np.full(x.size, rise[0])
     if x.size > 2:
         left, right = rise[:-1], rise[1:]
-        one, other = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
+        weight_left, weight_right = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
         same = left * right > 0.0
         safe_left, safe_right = np.where(same, left, 1.0), np.where(same, right, 1.0)
         with np.errstate(over="ignore"):
             # beside a rise of next to nothing the curve is level
-            harmonic = (one + other) / (one / safe_left + other / safe_right)
+            harmonic = (weight_left + weight_right) / (
+                weight_left / safe_left + weight_right / safe_right
+            )
         slopes[1:-1] = np.where(same, harmonic, 0.0)
         slopes[0] = _end(h[0], h[1], rise[0], rise[1])
         slopes[-1] = _end(h[-1], h[-2], rise[-1], rise[-2])

@@ -147,10 +147,10 @@ class StatedLaw(ABC):
         if not wrong.any():
             return ""
         first = int(wrong.argmax())
-        found = value[first] if not low <= value[first] <= high else by["T"][first]
-        kind = "" if found == value[first] else "a slope of "
+        wrong_value = value[first] if not low <= value[first] <= high else by["T"][first]
+        kind = "" if wrong_value == value[first] else "a slope of "
         return (
-            f"is {kind}{with_unit(f'{found:.4g}', unit)} at {T[first]:.4g} K, expected "
+            f"is {kind}{with_unit(f'{wrong_value:.4g}', unit)} at {T[first]:.4g} K, expected "
             f"{low:.4g} to {high:.4g} from {T[0]:.4g} to {T[-1]:.4g} K"
         )
 

@@ -69,11 +69,11 @@ def file_columns(
             with suppress(InputError):
                 symbols[table.index(heading)] = quantity_of(told, assigned=True) or ""
     headings = [name.casefold() for name in table.names]
-    found = []
+    shown_columns = []
     for index, heading in enumerate(table.names[:_MOST]):
         is_alone = bool(heading) and headings.count(heading.casefold()) == 1 and "=" not in heading
         cells = tuple(shown(row[index]) for row in table.rows[:_CELLS])
         name = heading if is_alone and not heading.isdecimal() else str(index + 1)
         unit = name_and_unit(heading)[1] or ""
-        found.append(FileColumn(heading, unit, name, cells, symbols.get(index, "")))
-    return found
+        shown_columns.append(FileColumn(heading, unit, name, cells, symbols.get(index, "")))
+    return shown_columns

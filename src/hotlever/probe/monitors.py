@@ -42,7 +42,7 @@ class Monitor(Record):
 
     Examples
     --------
-    >>> Monitor(line_um=[[0, 0], [40, 0]], points=3).places.tolist()
+    >>> Monitor(line_um=[[0, 0], [40, 0]], points=3).positions.tolist()
     [[0.0, 0.0], [20.0, 0.0], [40.0, 0.0]]
     """
 
@@ -70,7 +70,7 @@ class Monitor(Record):
         return self.line_um or (() if self.point_um is None else (self.point_um,))
 
     @property
-    def places(self) -> Array:
+    def positions(self) -> Array:
         """The points (µm), shape (n, 2); none of a region."""
         if self.line_um is not None:
             return np.linspace(*self.line_um, self.points or _POINTS)
@@ -160,9 +160,9 @@ def _seen_from_above(layout: Layout) -> BaseGeometry:
     )
 
 
-def on_lever(layout: Layout, places: Array | Sequence[Place]) -> Mask:
-    """Return which places (n, 2) are on a lever, as far as rounding tells, (n,)."""
+def on_lever(layout: Layout, points: Array | Sequence[Place]) -> Mask:
+    """Return which points (n, 2) are on a lever, as far as rounding tells, (n,)."""
     import shapely
 
-    away = shapely.distance(_seen_from_above(layout), shapely.points(np.asarray(places)))
+    away = shapely.distance(_seen_from_above(layout), shapely.points(np.asarray(points)))
     return np.asarray(away <= _ON_IT)

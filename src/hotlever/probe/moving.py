@@ -102,7 +102,7 @@ class MovingMesh:
     def __init__(self, mesh: ProbeMesh, probe: ProbeParts) -> None:
         self._mesh, self._probe = mesh, probe
         corners = _corners(mesh.layout)
-        self._places, which = np.unique(corners.round(6), axis=0, return_inverse=True)
+        self._positions, which = np.unique(corners.round(6), axis=0, return_inverse=True)
         self._which = which.ravel()
 
     def movement(self, probe: ProbeParts, name: str) -> Movement:
@@ -163,16 +163,16 @@ class MovingMesh:
         from skfem import CellBasis, ElementTriP1
         from skfem.models.poisson import laplace
 
-        points, places = self._mesh.elements.p, self._places.T
-        shares = np.zeros((points.shape[1], len(self._places)))
+        points, positions = self._mesh.elements.p, self._positions.T
+        shares = np.zeros((points.shape[1], len(self._positions)))
         held = np.zeros(points.shape[1], dtype=bool)
         for region in self._mesh.layout.regions:
             for start, end in region.edges:
                 along, near = on_line(start, end, points)
-                knots, on = on_line(start, end, places)
+                knots, on = on_line(start, end, positions)
                 order = np.flatnonzero(on)[np.argsort(knots[on])]
-                for corner, one in zip(order, np.eye(order.size), strict=True):
-                    shares[near, corner] = np.interp(along[near], knots[order], one)
+                for corner, basis in zip(order, np.eye(order.size), strict=True):
+                    shares[near, corner] = np.interp(along[near], knots[order], basis)
                 held |= near
         stiffness = laplace.assemble(CellBasis(self._mesh.elements, ElementTriP1())).tocsc()
         inside = np.flatnonzero(~held)

@@ -12,7 +12,7 @@ from hotlever.records import Record
 def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
     """Return a probe in words, with the number of triangles of its mesh; `name` heads them."""
     circuit, silicon, layout = probe.circuit, probe.heater_silicon, mesh.layout
-    x, y = (place + 0.0 for place in layout.tip)  # no -0
+    x, y = (coordinate + 0.0 for coordinate in layout.tip)  # no -0
     values = {key: getattr(probe.shape, key) for key in probe.shape.description()}
     dimensions = [
         f"  {key:<22} {values[key]:>8{'g' if isinstance(values[key], float) else ''}}  {text}"

@@ -242,8 +242,8 @@ def calibrate_raman(
         raise InputError("calibration: every line position needs a standard error above 0")
     reference, law = _fit_anharmonic(temperature, centre, stderr, room)
     shift, above_room = centre - reference, temperature - room
-    columns, ones = np.vander(shift, 2), np.ones_like(shift)
-    (slope, constant), covariance, variance = _least_squares(columns, above_room, ones)
+    columns, unit_weights = np.vander(shift, 2), np.ones_like(shift)
+    (slope, constant), covariance, variance = _least_squares(columns, above_room, unit_weights)
     if not slope < 0.0:
         raise InputError(
             f"calibration: the line moves by {1 / slope if slope else 0.0:+.4f} cm⁻¹/K with "

@@ -104,7 +104,7 @@ def _time_constants(page: Page, lever: Lever, biases: list[float]) -> None:
         slowest = [constants.time_constant_us.values[index, 0] for constants in columns.values()]
         around = [times.heating_us.values[index], times.cooling_us.values[index]]
         tip = times.tip_K.values[index]
-        rows.append([f"{bias:g}", f"{tip:.0f}", *(f"{one:.1f}" for one in (*slowest, *around))])
+        rows.append([f"{bias:g}", f"{tip:.0f}", *(f"{time:.1f}" for time in (*slowest, *around))])
     held = [f"{source} held" for source in columns]
     page.table(
         ["bias (V)", "tip (K)", *held, "heating", "cooling"],
@@ -126,9 +126,9 @@ def _small_signals(page: Page, lever: Lever, biases: list[float]) -> None:
 def _harmonics(page: Page, lever: Lever, biases: list[float]) -> None:
     bias = biases[1]
     drive = _DRIVE * bias
-    found = harmonics(lever, bias, drive, _FREQUENCIES)
+    harmonic_voltages = harmonics(lever, bias, drive, _FREQUENCIES)
     page.figure(
         "harmonics",
-        figures.harmonics(found),
+        figures.harmonics(harmonic_voltages),
         f"Harmonics of the lever voltage under a sine of {drive:.2g} V about {bias:g} V.",
     )

@@ -107,9 +107,9 @@ def by_layout(probe: Probe, progress: Progress | None = None) -> float:
     Each is off by the standard deviation of its usual prior in the model that is fitted.
     """
     data, true, off = Measurement.of_sweep(Lever(probe).sweep(paper.RAMP)), knee_K(probe), []
-    known = parameters_of(probe)
+    parameters = parameters_of(probe)
     for name in each(nuisances(probe), progress):
-        value, spread = float(probe.values([name])[0]), known[name].spread or 0.0
+        value, spread = float(probe.values([name])[0]), parameters[name].spread or 0.0
         moved = probe.replace({name: value * (1.0 + spread)})
         off.append(knee_K(fit(data, moved).probe) - true)
     return float(np.linalg.norm(off))

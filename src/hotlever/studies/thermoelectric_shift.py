@@ -89,14 +89,14 @@ class Axis:
         half = 0.5 * _INNER * taper.length_um
         self._position = np.linspace(-half, half, _POINTS)
         along = np.outer(self._position, taper.axis)
-        self._places = np.array(taper.centre) + along
+        self._positions = np.array(taper.centre) + along
 
     def temperatures(self, x: Array) -> list[Chebyshev]:
         """Return the temperature (K) of states, or of changes, (size + 1, k), by position (µm).
 
         It counts from that of the base.
         """
-        values, position = self._space.rise_at(self._places, x), self._position
+        values, position = self._space.rise_at(self._positions, x), self._position
         domain = position[[0, -1]]
         return [Chebyshev.fit(position, column, _DEGREE, domain=domain) for column in values.T]
 
@@ -284,8 +284,8 @@ def _from_supply(plain: Lever) -> tuple[Taper, dict[str, Array]]:
     _, potential = space.nodal(plain.equations.cold()[0][:, 0], 0.0)
     elements = space.elements
     end = 0.25 * taper.length_um * np.array(taper.axis)
-    places = np.array(taper.centre) + np.outer([-1.0, 0.0, 1.0], end)
-    before, centre, after = elements.interpolation(places)[0] @ potential
+    positions = np.array(taper.centre) + np.outer([-1.0, 0.0, 1.0], end)
+    before, centre, after = elements.interpolation(positions)[0] @ potential
     if before < after:
         taper = replace(taper, axis=(-taper.axis[0], -taper.axis[1]))
     at_points = (elements.sampling[: elements.weights.size] @ potential)[:, None]

@@ -175,12 +175,20 @@ class SolvedDesign:
 
         And those of V_l by u, (n,), of the states themselves, not of the curve through them.
         """
-        places = self.branch.parametrisation
-        constraint = places.constraint(u)
-        roots = solve_at(self._equations, u, self.branch.states(u), NewtonOptions(), places=places)
+        parametrisation = self.branch.parametrisation
+        constraint = parametrisation.constraint(u)
+        roots = solve_at(
+            self._equations,
+            u,
+            self.branch.states(u),
+            NewtonOptions(),
+            parametrisation=parametrisation,
+        )
         shown = by_parameter(self._equations, roots.x, self._names, roots.factors, constraint)
         along = self._equations.along(roots.x, roots.factors, constraint)[-1]
-        return shown[:, [0, 1, TIP_RISE]], along * places.rate(u, self._equations.space, roots.x)
+        return shown[:, [0, 1, TIP_RISE]], along * parametrisation.rate(
+            u, self._equations.space, roots.x
+        )
 
     def _moved(self, u: float, partial: Array) -> Array:
         """Return how the place u of the working point or of the knee moves, (p,)."""

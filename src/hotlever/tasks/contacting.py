@@ -129,8 +129,8 @@ def what_the_current_tells(data: xr.Dataset) -> str:
         return ""
     best = int(np.nanargmin(relative))
     share = relative[best]
-    known = f"to {share:.2g} of it" if share < 1 else f"no better than {share:.2g} times over"
+    accuracy = f"to {share:.2g} of it" if share < 1 else f"no better than {share:.2g} times over"
     return (
         f"a change of I_h known to {_CURRENT_KNOWN:g} of I_h tells the sum of resistances, "
-        f"{1e3 * whole.values[best]:.3g} K/W, best at {data.bias_V.values[best]:.4g} V: {known}"
+        f"{1e3 * whole.values[best]:.3g} K/W, best at {data.bias_V.values[best]:.4g} V: {accuracy}"
     )

@@ -42,7 +42,7 @@ def show_probe(reporter: Reporter, request: ShowRequest) -> None:
             draw(
                 request.plot,
                 lambda figures: figures.outlines_drawing(
-                    fault.outlines, fault=str(fault), place=fault.place
+                    fault.outlines, fault=str(fault), fault_at=fault.place
                 ),
             )
         raise

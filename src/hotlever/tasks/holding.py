@@ -174,16 +174,16 @@ def _resistance(text: str | None, where: str) -> float:
 def _states(lever: Lever, resistances: list[float], integral: float) -> tuple[State, State]:
     """Return the states at both resistances that an integral of some sign leads to."""
     try:
-        found = hold(lever, "resistance", resistances)
+        held_states = hold(lever, "resistance", resistances)
     except InputError as error:
         raise InputError(f"--controller: {error}") from None
     chosen: list[State] = []
     for value in resistances:
-        here = np.flatnonzero(found.data.set_ohm.values == value)
-        rises = found.data.slope_ohm_per_K.values[here] > 0.0
-        held = [found.states[k] for k in here[rises == (integral > 0.0)].tolist()]
+        here = np.flatnonzero(held_states.data.set_ohm.values == value)
+        rises = held_states.data.slope_ohm_per_K.values[here] > 0.0
+        held = [held_states.states[k] for k in here[rises == (integral > 0.0)].tolist()]
         if not held:
-            tips = ", ".join(f"{found.states[k].tip_K:.0f} K" for k in here.tolist())
+            tips = ", ".join(f"{held_states.states[k].tip_K:.0f} K" for k in here.tolist())
             other = ("rises", "above") if integral < 0.0 else ("falls", "below")
             raise InputError(
                 f"--controller: found I = {integral:g}, expected gains {other[1]} 0: at "

@@ -19,7 +19,7 @@ def propose_probe(reporter: Reporter, request: ImportRequest) -> None:
     folder = Path() if output is None else output.parent
     proposed = import_drawing(drawing, request.cell, folder, unit)
     fault = proposed.fault
-    place = fault.place if isinstance(fault, DrawingError) else None
+    fault_at = fault.place if isinstance(fault, DrawingError) else None
     with outputs.together():
         if output is not None:
             write_text(output, proposed.text)
@@ -29,8 +29,8 @@ def propose_probe(reporter: Reporter, request: ImportRequest) -> None:
                 proposed.outlines,
                 drawing.name,
                 tip=proposed.inference.tip,
-                fault="" if place is None else str(fault),
-                place=place,
+                fault="" if fault_at is None else str(fault),
+                fault_at=fault_at,
             ),
         )
     reporter.give(proposed.text if output is None else "\n".join([*proposed.listing, ""]))

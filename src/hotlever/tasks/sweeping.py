@@ -84,7 +84,7 @@ def _held(
 ) -> tuple[xr.Dataset, list[State], xr.Dataset]:
     """Return the states at set points, and all of the branch."""
     try:
-        found: HeldStates = hold(lever, what, set_points, progress=update)
+        held_states: HeldStates = hold(lever, what, set_points, progress=update)
     except InputError as error:
         raise InputError(f"{option}: {error}") from None
-    return found.data, found.states, found.curve
+    return held_states.data, held_states.states, held_states.curve

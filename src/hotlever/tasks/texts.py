@@ -275,10 +275,10 @@ def parse_band(text: str) -> tuple[float, float]:
     """
     where = f"--bandwidth {shown(text)}"
     low, _, high = text.partition(":")
-    found = setting(low, "Hz", where), setting(high, "Hz", where)
-    if not 0 < found[0] < found[1]:
+    band = setting(low, "Hz", where), setting(high, "Hz", where)
+    if not 0 < band[0] < band[1]:
         raise InputError(f"{where}: expected LOW:HIGH, such as 1Hz:1kHz, with 0 < LOW < HIGH")
-    return found
+    return band
 
 
 def parse_distances(text: str) -> Array:

@@ -28,19 +28,19 @@ def slider(
 ) -> ui.number:
     """Show a slider with its number, which is returned, and may be beyond the slider's ends.
 
-    `by_decades` it is even in the logarithm; `from_zero` its lowest place is then 0.
+    `by_decades` it is even in the logarithm; `from_zero` its lowest position is then 0.
     """
     ends = (math.log10(low), math.log10(high)) if by_decades else (low, high)
 
-    def place(value: float | None) -> float:
+    def position(value: float | None) -> float:
         if not by_decades:
             return ends[0] if value is None else value
         return math.log10(max(value or low, low))
 
-    def number_at(place: float) -> float:
+    def number_at(position: float) -> float:
         if not by_decades:
-            return place
-        return 0.0 if from_zero and place <= ends[0] else float(f"{10.0**place:.3g}")
+            return position
+        return 0.0 if from_zero and position <= ends[0] else float(f"{10.0**position:.3g}")
 
     with ui.column().classes("w-full gap-0"):
         with ui.row().classes("w-full items-center no-wrap justify-between"):
@@ -51,16 +51,16 @@ def slider(
             number.props(remove="outlined").props(f'aria-label="{words}"')
             number.props(f'borderless suffix="{unit}" input-class=text-right')
         step = (ends[1] - ends[0]) / _STEPS
-        bar = ui.slider(min=ends[0], max=ends[1], step=step, value=place(value))
+        bar = ui.slider(min=ends[0], max=ends[1], step=step, value=position(value))
         bar.props(f'dense aria-label="{words}"')
 
     # each follows the other unless it is there already: what is typed has more digits than places
     def typed() -> None:
         if number.value != number_at(bar.value):
-            bar.set_value(place(number.value))
+            bar.set_value(position(number.value))
 
     def slid() -> None:
-        if bar.value != place(number.value):
+        if bar.value != position(number.value):
             number.set_value(number_at(bar.value))
 
     number.on_value_change(typed)

@@ -264,12 +264,12 @@ class LivePlots:
         figure["data"][0]["marker"] |= {"cmin": scale[0], "cmax": scale[1]}
         self._heat.update()
 
-    def _move(self, plot: ui.plotly, place: int, values: dict[str, Any]) -> None:
+    def _move(self, plot: ui.plotly, trace: int, values: dict[str, Any]) -> None:
         """Move a trace, with all else as it is."""
-        plot.figure["data"][place] |= values
+        plot.figure["data"][trace] |= values
         if plot in self._ready:
             at_once = {"transition": {"duration": 0}, "frame": {"duration": 0, "redraw": False}}
-            plot.run_plot_method("animate", {"data": [values], "traces": [place]}, at_once)
+            plot.run_plot_method("animate", {"data": [values], "traces": [trace]}, at_once)
         else:
             plot.update()
 
@@ -295,8 +295,8 @@ def _range(values: list[float]) -> list[float]:
     return [low - margin, high + margin]
 
 
-def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    return all(np.array_equal(one[name], other[name]) for name in ("lever_V", "tip_K"))
+def _same(first: dict[str, Any], second: dict[str, Any]) -> bool:
+    return all(np.array_equal(first[name], second[name]) for name in ("lever_V", "tip_K"))
 
 
 def short(values: Any) -> list[float]:

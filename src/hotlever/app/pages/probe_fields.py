@@ -47,16 +47,16 @@ class ProbeFields:
         """Show what can be set in a text, and what is wrong; nothing if nothing is open."""
         self._turn += 1
         turn, self._text = self._turn, text
-        found = await self._session.ask("quick", "fields:settable", text) if text else {}
+        settable = await self._session.ask("quick", "fields:settable", text) if text else {}
         if turn != self._turn:
             return
-        rows = found.get("layers", [])
+        rows = settable.get("layers", [])
         layers = [(row.label, row.name, row.role, row.material) for row in rows]
-        built = layers, [(card["section"], card["title"]) for card in found.get("cards", [])]
+        built = layers, [(card["section"], card["title"]) for card in settable.get("cards", [])]
         if built != self._built:
             self._built = built
-            self._build(found, rows)
-        for card in found.get("cards", []):
+            self._build(settable, rows)
+        for card in settable.get("cards", []):
             for field in card["fields"]:
                 self._show_field(field, card["section"])
         for row in rows:
@@ -65,16 +65,16 @@ class ProbeFields:
                 self._set(("layers", row.name), "thickness_um", shown)
         self._mark(fault)
 
-    def _build(self, found: dict[str, Any], rows: list[LayerRow]) -> None:
+    def _build(self, settable: dict[str, Any], rows: list[LayerRow]) -> None:
         self._column.clear()
         self._inputs, self._cards = {}, {}
         with self._column:
             if rows:
                 ui.label("Layers of the drawing").classes("text-bold")
-            materials = {"": _SILICON, **{name: name for name in found.get("materials", [])}}
+            materials = {"": _SILICON, **{name: name for name in settable.get("materials", [])}}
             for row in rows:
-                self._row(row, materials | found["new"])
-            for card in found.get("cards", []):
+                self._row(row, materials | settable["new"])
+            for card in settable.get("cards", []):
                 with ui.row().classes("w-full items-center gap-2"):
                     ui.label(card["title"]).classes("text-bold")
                     if card["section"][0] == "materials":
@@ -82,7 +82,7 @@ class ProbeFields:
                         rename = partial(self._rename, name)
                         flat_button("", rename, icon="edit", label=f"Rename {name}")
                 self._cards[card["section"]] = ui.element("div").classes("w-full fields")
-            if found.get("materials"):
+            if settable.get("materials"):
                 caption(_LAWS)
 
     def _row(self, row: LayerRow, materials: dict[str, str]) -> None:
@@ -145,8 +145,8 @@ class ProbeFields:
         self._set(section, key, value or "")
 
     def _input(self, section: Section, key: str, meaning: str, of: str = "") -> ui.input:
-        known = self._session.project.data if section[0] == "materials" else None
-        made = ui.input(meaning, autocomplete=known)
+        files = self._session.project.data if section[0] == "materials" else None
+        made = ui.input(meaning, autocomplete=files)
         made.props(f'debounce=300 hide-bottom-space aria-label="{of}{meaning}"')
         made.tooltip(".".join((*section, key)))
         made.on_value_change(partial(self._typed, section, key))
@@ -178,6 +178,6 @@ class ProbeFields:
             for (section, key), made in self._inputs.items()
             if about.endswith(f"[{'.'.join(section)}") and key in words
         ]
-        wrong = min(at_fault, key=lambda one: one[0], default=(0, None))[1]
+        wrong = min(at_fault, key=lambda pair: pair[0], default=(0, None))[1]
         for made in self._inputs.values():
             made.error = reason if made is wrong else None

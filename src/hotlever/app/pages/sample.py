@@ -35,7 +35,7 @@ class SampleLayers:
             layers = parsed_layers(text, "")
         except InputError:
             layers = ()
-        self._layers = [(one.material, 1e3 * (one.thickness_um or 0.0)) for one in layers]
+        self._layers = [(layer.material, 1e3 * (layer.thickness_um or 0.0)) for layer in layers]
         self._column.clear()
         with self._column:
             if not layers:

@@ -2,11 +2,11 @@
 
 from hotlever import Lever, figures, fit, save_figure
 
-found = fit("src/hotlever/examples/lever-a.csv")
-for name, one in found.parameters.items():
-    print(f"{name}: {one}")
+result = fit("src/hotlever/examples/lever-a.csv")
+for name, parameter in result.parameters.items():
+    print(f"{name}: {parameter}")
 
-measured = found.measurement.dataset(found.probe.circuit)
-model = Lever(found.probe).sweep(found.measurement.bias_V)
-made = figures.data_and_model(measured, model, found.observables)
+measured = result.measurement.dataset(result.probe.circuit)
+model = Lever(result.probe).sweep(result.measurement.bias_V)
+made = figures.data_and_model(measured, model, result.observables)
 save_figure(made, "fit_my_data.png")

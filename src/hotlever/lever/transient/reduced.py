@@ -103,7 +103,7 @@ class TabulatedLaws(LawsAtPoints):
         motions: Mapping[str, Motion],
     ) -> None:
         super().__init__(space, materials, base_temperature_K, physics, motions)
-        self._found: tuple[Array, Array, Array] | None = None
+        self._looked_up: tuple[Array, Array, Array] | None = None
         T = np.arange(_COLDEST, _HOTTEST + 1.0, 0.5 * _PIECE)
         T = np.broadcast_to(T, (space.weights.size, T.size))
         laws = super().properties(T, ())[0].named
@@ -122,7 +122,7 @@ class TabulatedLaws(LawsAtPoints):
 
     def _look_up(self, T: Array) -> tuple[Array, Array]:
         """Return the properties and the heat (laws, points, n), and their slopes."""
-        if self._found is None or self._found[0] is not T:
+        if self._looked_up is None or self._looked_up[0] is not T:
             position = (T - _COLDEST) * (1.0 / _PIECE)
             piece = position.clip(0.0, self._last).astype(np.intp)
             off = position - piece
@@ -134,8 +134,8 @@ class TabulatedLaws(LawsAtPoints):
             value += off * slope
             slope += bent
             slope *= 1.0 / _PIECE
-            self._found = T, value, slope
-        return self._found[1:]
+            self._looked_up = T, value, slope
+        return self._looked_up[1:]
 
     def properties(
         self, T: Array, names: Sequence[str] = ("T",)

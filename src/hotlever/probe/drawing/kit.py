@@ -225,8 +225,8 @@ def fillet(
         raise InputError(f"fillet: found a radius of {radius_um:g} µm, expected one above 0")
     corners = shapely.get_coordinates(whole)
     if at is not None:
-        places = np.array(at, dtype=float).reshape(-1, 1, 2)
-        corners = corners[np.linalg.norm(places - corners, axis=2).argmin(axis=1)]
+        points = np.array(at, dtype=float).reshape(-1, 1, 2)
+        corners = corners[np.linalg.norm(points - corners, axis=2).argmin(axis=1)]
     rounded = []
     for part in shapely.get_parts(whole):
         outline, *holes = (_rounded(ring, corners, radius_um, quarter) for ring in _rings(part))

@@ -187,8 +187,8 @@ def _check_on_body(
 
 def _with_corners(silicon: Polygon, ends: list[Terminal]) -> Polygon:
     """Return the silicon with a corner wherever a terminal begins or ends."""
-    places = shapely.MultiPoint([point for end in ends for point in (end.start, end.end)])
-    return shapely.snap(silicon, places, 1e-6)
+    corners = shapely.MultiPoint([point for end in ends for point in (end.start, end.end)])
+    return shapely.snap(silicon, corners, 1e-6)
 
 
 def _regions(

@@ -115,7 +115,7 @@ class Partition:
         shape = self.pieces[number].shape
         if len(group) > 1:
             # where a film ends on it is no corner of the part
-            shapes = [self.pieces[one].shape for one in sorted(group)]
+            shapes = [self.pieces[index].shape for index in sorted(group)]
             shape = shapely.union_all(shapes).simplify(GRID)
         strip = _strip(shape, borders, tolerance)
         if strip is not None:
@@ -188,14 +188,14 @@ def _strip(shape: Polygon, borders: list[LineString], tolerance: float) -> Taper
     if length < tolerance:
         return None
     normal: Array = np.array([-along[1], along[0]]) / length
-    places = [float(end.mean(axis=0) @ normal) for end in ends]
-    away = np.abs(np.array(shape.exterior.coords) @ normal - np.reshape(places, (2, 1)))
-    if abs(places[1] - places[0]) < tolerance or away.min(axis=0).max() > tolerance:
+    distances = [float(end.mean(axis=0) @ normal) for end in ends]
+    away = np.abs(np.array(shape.exterior.coords) @ normal - np.reshape(distances, (2, 1)))
+    if abs(distances[1] - distances[0]) < tolerance or away.min(axis=0).max() > tolerance:
         return None
     middle = (ends[0].mean(axis=0) + ends[1].mean(axis=0)) / 2
-    axis = normal if places[1] > places[0] else -normal
+    axis = normal if distances[1] > distances[0] else -normal
     return Taper(
         (float(middle[0]), float(middle[1])),
         (float(axis[0]), float(axis[1])),
-        abs(places[1] - places[0]),
+        abs(distances[1] - distances[0]),
     )

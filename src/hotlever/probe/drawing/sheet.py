@@ -201,10 +201,10 @@ def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...]
     """Return the closed outlines that lines make whose ends meet, and the lines that are left."""
     if not lines:
         return (), ()
-    places = np.array([point for line in lines for point in (line[0], line[-1])])
+    points = np.array([point for line in lines for point in (line[0], line[-1])])
     # each end goes to the first of those near it
-    near = spatial.cKDTree(places).query_ball_point(places, tolerance)
-    ends = iter([tuple(places[min(some)].tolist()) for some in near])
+    near = spatial.cKDTree(points).query_ball_point(points, tolerance)
+    ends = iter([tuple(points[min(some)].tolist()) for some in near])
     met = [(next(ends), *line[1:-1], next(ends)) for line in lines]
     some = [LineString(line) for line in met if len(set(line)) > 1]
     closed, cuts, dangles, _ = shapely.polygonize_full(some)

@@ -126,8 +126,8 @@ def _between_groups(result: Fit) -> list[float]:
     group = {"c_kappa": 0, "a0": 1, "a1": 1, "delta": 2, "n_d": 2, "p": 2}
     groups = np.array([group[name] for name in result.names])
     apart = groups[:, None] != groups[None, :]
-    found = (result.common_noise_correlation, result.correlation)
-    return [float(np.abs(correlation[apart]).max()) for correlation in found]
+    correlations = (result.common_noise_correlation, result.correlation)
+    return [float(np.abs(correlation[apart]).max()) for correlation in correlations]
 
 
 def _hot_error(result: Fit) -> float:

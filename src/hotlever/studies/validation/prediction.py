@@ -129,8 +129,8 @@ def computed(case: Case, changes: dict[str, Any] | None = None) -> float:
     arguments: dict[str, Any] = {**given, **own}
     if (probe := case.probe()) is not None:
         # what was known beforehand need not hold of what is drawn
-        known = probe.model_copy(update={"prior": None})
-        arguments["probe"] = known.with_(**lever) if lever else known
+        without_prior = probe.model_copy(update={"prior": None})
+        arguments["probe"] = without_prior.with_(**lever) if lever else without_prior
     value = case.asked.compute(**arguments)
     if not (math.isfinite(value) and value > 0):
         raise ComputationError(f"{case.name}: no {case.quantity} of such a lever")
