@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.estimation.noise import relative_noise
+from hotlever.estimation.noise import CommonError, relative_noise
 from hotlever.estimation.residuals import Residuals
 from hotlever.measurement import Measurement
 
@@ -70,7 +70,8 @@ def residuals_of(current):
     nothing = np.full(SHOWN.size, np.nan)
     measurement = Measurement(np.arange(1.0, 41.0), current, nothing, nothing, nothing)
     residuals = Residuals(measurement, ("current",), "errors")
-    predicted = np.stack([SHOWN, SHOWN, SHOWN])
+    shown = SHOWN[np.isfinite(current)]
+    predicted = np.stack([shown, shown, shown])
     for _ in range(3):
         residuals.take_scatter(predicted, usual=1e-3)
     return residuals, predicted
@@ -108,3 +109,34 @@ def test_what_is_smooth_is_no_noise():
     # and noise is counted in full
     right, _ = residuals_of(SHOWN + noise(5, 0.05 * SHOWN.max()))
     assert np.sqrt(np.mean(right.errors.weights**-2.0)) > 0.04 * SHOWN.max()
+
+
+def test_what_the_scale_of_a_meter_explains_is_no_noise():
+    """A good meter: noise of 1e-4, and a scale that is off by five times as much."""
+    current = SHOWN * (1.0 + 5e-4) + noise(6, 1e-4 * SHOWN)
+    measurement = Measurement(np.arange(1.0, 41.0), current, *3 * [np.full(SHOWN.size, np.nan)])
+    common = [CommonError("current_scale", "current", 1e-3, 1e-3 * SHOWN)]
+    residuals = Residuals(measurement, ("current",), "errors", common=common)
+    predicted = np.stack([SHOWN, SHOWN, SHOWN])
+    slopes = (SHOWN**2)[None, :, None]
+    covariance = np.array([[1e-8]])
+    for _ in range(3):
+        leverage = residuals.leverage(residuals.jacobian(slopes), covariance)
+        residuals.take_scatter(predicted, leverage, usual=1e-3)
+    assert residuals.errors.scale[0, 20:] / (1e-4 * SHOWN[20:]) == pytest.approx(1.0, abs=0.25)
+    # the share of noise that is taken up, by the covariance of all that data are made of
+    weights = residuals.errors.weights[0]
+    pattern, by = weights * common[0].errors, weights * slopes[0, :, 0]
+    without = np.eye(SHOWN.size) + np.outer(pattern, pattern)
+    prior = 1.0 / (1.0 / covariance[0, 0] - by @ np.linalg.solve(without, by))
+    whole = without + prior * np.outer(by, by)
+    leverage = residuals.leverage(residuals.jacobian(slopes), covariance)
+    np.testing.assert_allclose(leverage[0], 1.0 - np.diag(np.linalg.inv(whole)), rtol=1e-6)
+
+
+def test_few_data_of_a_good_meter_scatter_by_what_is_usual_and_many_by_their_own():
+    """Three that lie on a prediction by chance have no noise of zero."""
+    few, _ = residuals_of(np.where(np.arange(SHOWN.size) > 36, SHOWN, np.nan))
+    many, _ = residuals_of(SHOWN + noise(7, 1e-5 * SHOWN))
+    assert 2e-4 < few.errors.scale[0, -1] / SHOWN[-1] < 1e-3
+    assert many.errors.scale[0, -1] / SHOWN[-1] == pytest.approx(1e-5, rel=0.4)

@@ -180,7 +180,8 @@ class DataErrors:
 
         Outliers count as little as they weigh. The `leverage`, (observables, n), is the share of
         each datum's noise that a fit has taken up. The `usual` scatter, a share of the largest
-        value, counts as one datum more: a few data say little of their own. With it the noise may
+        value, counts as one datum more, of a t distribution: a few data say little of their own.
+        With it the noise may
         go with the size of what is shown (see `relative_noise`), and is not what is smooth; without
         it is the same everywhere.
         """
@@ -194,11 +195,14 @@ class DataErrors:
                     difference[row], shown[row], leverage[row], float(least[row, 0])
                 )
         squares = np.nansum(weight * (difference / self._relative) ** 2, axis=1, keepdims=True)
-        count = weight.sum(axis=1, keepdims=True)
-        if usual:
-            squares, count = squares + least**2, count + 1.0
+        count = weight.sum(axis=1, keepdims=True) + bool(usual)
         free = np.maximum(count - leverage.sum(axis=1, keepdims=True), 1.0)
-        scatter = np.maximum(np.sqrt(squares / free), 1e-6 * self.largest)
+        smallest = 1e-6 * self.largest
+        scatter = np.maximum(np.sqrt((squares + least**2) / free), smallest)
+        for _ in range(_ROUNDS if usual else 0):
+            # many data of a good meter outvote it, as they do any outlier
+            counting = (_TAILS + 1.0) / (_TAILS + (least / scatter) ** 2)
+            scatter = np.maximum(np.sqrt((squares + counting * least**2) / free), smallest)
         if usual:
             scatter = np.minimum(scatter, np.maximum(_OF_NOISE * self._noise(difference), least))
         own = scatter * self._relative / self._root
@@ -344,16 +348,31 @@ class CommonCovariance:
         # a meter that is known to show too much has data that are corrected downwards
         return own, dict(zip(names, np.expand_dims(-self._pattern.T @ own, 1), strict=True))
 
+    def sizes(self, differences: Array) -> Array:
+        """Return the errors that explain weighted differences (N,) best, in standard deviations."""
+        return np.asarray(-self._left @ (self._pattern.T @ differences))
+
+    @property
+    def _left(self) -> Array:
+        """The covariance of the errors after data without unknown parameters."""
+        return np.linalg.inv(np.eye(len(self._errors)) + self._pattern.T @ self._pattern)
+
+    def leverage(self, rows: Array, covariance: Array) -> Array:
+        """Return the share of each datum's noise that parameters and these errors take up, (N,).
+
+        By decorrelated slopes (N, p), and the covariance of the parameters that a fit leaves.
+        """
+        own = self.decorrelated(rows)
+        taken = np.einsum("ij,jk,ik->i", self._pattern, self._left, self._pattern)
+        return np.asarray(taken + np.einsum("ij,jk,ik->i", own, covariance, own))
+
     def told(self, differences: Array, slopes: Array, covariance: Array) -> dict[str, Moved]:
         """Return the errors as the data tell them, by name.
 
         By weighted differences (N,) as if data had no errors in common, and their slopes (N, p) by
         parameters of which the fit leaves this covariance.
         """
-        pattern = self._pattern
-        own = np.linalg.inv(np.eye(len(self._errors)) + pattern.T @ pattern)
-        size = -own @ pattern.T @ differences
-        by = own @ pattern.T @ slopes
-        left = np.sqrt(np.diag(own + by @ covariance @ by.T))
-        moved = map(Moved, size.tolist(), left.tolist())
+        by = self.sizes(slopes)
+        left = np.sqrt(np.diag(self._left + by @ covariance @ by.T))
+        moved = map(Moved, self.sizes(differences).tolist(), left.tolist())
         return dict(zip((error.name for error in self._errors), moved, strict=True))

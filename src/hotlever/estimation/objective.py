@@ -252,12 +252,7 @@ class Objective:
 
     def leverage(self, slopes: Array, point: Array) -> Array:
         """Return which share of each datum's noise a fit takes up, (observables, n)."""
-        jacobian = self.of_data(slopes, point)
-        leverage = np.zeros(self.residuals.data.shape)
-        leverage[self.residuals.present] = np.einsum(
-            "ij,jk,ik->i", jacobian, self.laplace(slopes, point), jacobian
-        )
-        return leverage
+        return self.residuals.leverage(self.of_data(slopes, point), self.laplace(slopes, point))
 
     def log_volume(self, point: Array) -> float:
         """Return the logarithm of the volume that a unit of the coordinates has.

@@ -227,12 +227,12 @@ class Optimiser:
         """
         options = self._options
         errors, informed = self.residuals.errors, self.objective.informed
-        difference = self.residuals.difference(optimum.prediction.values)
+        difference = self.residuals.own_difference(optimum.prediction.values)
         if informed and not errors.has_outliers(difference):
             return optimum
         for gently, most in ((True, options.gentle_rounds), (False, options.robust_rounds)):
             for _ in range(most):
-                errors.lessen(self.residuals.difference(optimum.prediction.values), gently)
+                errors.lessen(self.residuals.own_difference(optimum.prediction.values), gently)
                 # outliers can drive the first fit onto a bound, where it would stay without priors
                 origin = start if gently and not informed else optimum.probe
                 previous, optimum = optimum, self.solve(origin)

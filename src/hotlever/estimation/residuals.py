@@ -172,6 +172,20 @@ class Residuals:
         """Return the derivatives of `weighted`, shape (N, p)."""
         return self._common_covariance.decorrelated(self._each_by(slopes))
 
+    def own_difference(self, values: Array) -> Array:
+        """Return `difference` without what errors in common explain of it: that is no scatter."""
+        sizes = self._common_covariance.sizes(self._each(values))
+        return self.difference(values) - self._common @ sizes
+
+    def leverage(self, jacobian: Array, covariance: Array) -> Array:
+        """Return the share of each datum's noise that a fit takes up, (observables, n).
+
+        By the derivatives of `weighted`, and the covariance that a fit leaves of what they are by.
+        """
+        leverage = np.zeros(self.data.shape)
+        leverage[self.present] = self._common_covariance.leverage(jacobian, covariance)
+        return leverage
+
     def _each(self, values: Array) -> Array:
         """Return weighted differences as if data had no errors in common, (N,)."""
         return np.asarray((-self.errors.weights * self.difference(values))[self.present])
@@ -216,7 +230,7 @@ class Residuals:
 
     def deviations(self, values: Array) -> Array:
         """Return differences in units of the scatter of their observable; 0 where nothing is."""
-        return self.errors.deviations(self.difference(values))
+        return self.errors.deviations(self.own_difference(values))
 
     def take_scatter(
         self, values: Array, leverage: Array | float = 0.0, usual: float = 0.0
@@ -225,7 +239,7 @@ class Residuals:
 
         See `hotlever.estimation.noise.DataErrors.take_scatter`.
         """
-        difference = self.difference(values)
+        difference = self.own_difference(values)
         self.errors.take_scatter(difference, values[self.rows], leverage, usual)
 
     def drifting_zeros(self, values: Array, slopes: Array) -> list[str]:
