@@ -21,7 +21,7 @@ _MOST, _BEGINNING = 500, 2**22
 #: Bytes that a probe file may have.
 LARGEST_PROBE = 1_000_000
 
-DATA = (".csv", ".txt", ".tsv", ".dat", ".lvm", ".tdms", ".asc")
+DATA = (".csv", ".txt", ".tsv", ".dat", ".lvm", ".tdms", ".ibw", ".asc")
 DRAWINGS = (".gds", ".gds2", ".gdsii", ".oas", ".oasis", ".dxf")
 #: What the app writes beside a measurement begins with its name and ends so; see also `files`.
 FIT = ".fit.json"

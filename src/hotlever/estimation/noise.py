@@ -355,7 +355,8 @@ class CommonCovariance:
     @property
     def _left(self) -> Array:
         """The covariance of the errors after data without unknown parameters."""
-        return np.linalg.inv(np.eye(len(self._errors)) + self._pattern.T @ self._pattern)
+        precision = np.eye(len(self._errors)) + self._pattern.T @ self._pattern
+        return np.asarray(np.linalg.inv(precision), dtype=float)
 
     def leverage(self, rows: Array, covariance: Array) -> Array:
         """Return the share of each datum's noise that parameters and these errors take up, (N,).

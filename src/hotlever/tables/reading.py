@@ -30,11 +30,15 @@ from hotlever.tables.headings import (
     with_units,
     without_marks,
 )
+from hotlever.tables.igor import SIGNATURES, igor_lines
 from hotlever.tables.layouts import below_a_header
 from hotlever.tables.table import TextTable
 from hotlever.tables.tdms import SIGNATURE, tdms_lines
 from hotlever.types import Array
 from hotlever.units import NUMBER, is_unit, key_and_value
+
+#: What reads the content of a file that begins so, as the lines of a text table.
+_BINARY = {SIGNATURE: tdms_lines, **dict.fromkeys(SIGNATURES, igor_lines)}
 
 # --- a file of one table --------------------------------------------------------------------------
 
@@ -48,7 +52,8 @@ def read_table(
     """Read a table of cells separated by tabs, semicolons, commas or, some, by blanks.
 
     Numbers may have decimal commas unless these separate the cells. Lines that start with ``#``
-    are comments. The channels of a TDMS file are columns too (`hotlever.tables.tdms`).
+    are comments. The channels of a TDMS file are columns too (`hotlever.tables.tdms`), and an Igor
+    wave is a table (`hotlever.tables.igor`).
 
     Parameters
     ----------
@@ -69,8 +74,8 @@ def read_table(
         If there is no such table; the text names file and line.
     """
     raw = read_bytes(path)
-    is_tdms = raw.startswith(SIGNATURE)
-    lines = tdms_lines(raw, str(path)) if is_tdms else filled_lines(raw, str(path))
+    binary = next((read for start, read in _BINARY.items() if raw.startswith(start)), None)
+    lines = (binary or filled_lines)(raw, str(path))
     if is_heading is not None and lines:
         lines = below_a_header(lines)
     first = next((i for i, (_, line) in enumerate(lines) if not is_comment(line)), None)
