@@ -50,16 +50,6 @@ plotting.figures = partial(import_module, "hotlever.figures")
 _PUBLIC = {name: module for module, names in _MODULES.items() for name in names}
 
 
-class _Words(tuple[str, ...]):
-    """What ``import *`` takes; help() explains all that it finds in it, on thousands of lines."""
-
-    def __contains__(self, name: object) -> bool:
-        return False
-
-
-__all__ = _Words(("__version__", "figures", *_PUBLIC))
-
-
 def __getattr__(name: str) -> Any:
     if name == "figures":
         return plotting.figures()
@@ -69,4 +59,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted(("__version__", "figures", *_PUBLIC))
