@@ -3,7 +3,9 @@
 python benchmarks/drawings.py [same|doping|air|solid]
 
 same: the reference probe as a drawing against the parametric one: results, times of a sweep and of
-a layout, and of loading what each needs. doping: the distance to each border against diffusion
+a layout, and of loading what each needs; derivatives by the logarithms of its dimensions, where a
+function draws it, with the tip below the step of κ_Si and above, and what they change by on finer
+meshes. doping: the distance to each border against diffusion
 solved in the plane, for heaters of several shapes; between parallel borders both are the same,
 which shows how good the diffusion is solved. air: the panels of each lever, what making its
 operator costs beside a parametric lever of as many panels, and what finer panels change. solid:
@@ -12,6 +14,7 @@ levers in air against the full 3-D simulation.
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import sys
 from dataclasses import replace
@@ -28,13 +31,17 @@ from skfem.models.poisson import laplace, mass
 from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions, lever_surface
 from hotlever.lever import Lever
+from hotlever.lever.branch import Reach
 from hotlever.lever.films import PlacedFilm
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.similar import SimilarLevers
 from hotlever.lever3d import SolidLever
 from hotlever.materials import LOW_DOPED
+from hotlever.materials.silicon import STEP
 from hotlever.probe import Layout, MeshOptions, Probe, mesh_layout
 from hotlever.probe.drawing import Drawing
 from hotlever.probe.drawing.layout_builder import build_layout
+from hotlever.probe.shapes import ThreeLeg
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.threads import one_blas_thread
@@ -106,6 +113,41 @@ def same() -> None:
         )  # fmt: skip
     columns = ["lever", "unknowns", "sweep (ms)", "layout (ms)", "load (s)"]
     table([*columns, "I_h", "V_l", "V_r", "T_tip (K)"], rows)
+    print("\nderivatives of I_h, V_l and V_r by dimensions against the parametric lever's, largest")
+    function = Probe.from_drawing(three_leg)
+    first = derivatives(reference, 1.0)
+    rows = []
+    for name, compared in {"parametric": reference, "drawn": function}.items():
+        for refinement in (1.0, 2.0):
+            apart = np.abs(derivatives(compared, refinement)[1] - first[1]).max(axis=(1, 2))
+            below = first[0] < STEP - BASE_TEMPERATURE_K
+            kinds = (f"{apart[some].max():.1e}" for some in (below, ~below))
+            rows.append([name, f"sizes / {refinement:g}", *kinds])
+    table(["lever", "mesh", f"tip below {STEP:g} K", "above"], rows)
+
+
+def three_leg(
+    length_um=54.4,
+    centre_leg_width_um=6.44,
+    outer_leg_width_um=3.46,
+    gap_um=3.2,
+    bridge_width_um=3.82,
+    heater_length_um=4.0,
+    heater_width_um=1.645,
+    reader_length_um=4.0,
+    thickness_um=0.4,
+) -> Drawing:
+    """The reference probe, drawn by a function."""
+    return Drawing.of_layout(ThreeLeg(**locals()).layout())
+
+
+def derivatives(probe: Probe, refinement: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rises of the tip (K), and derivatives of what is shown there by logarithms, relative."""
+    names = tuple(inspect.signature(three_leg).parameters)
+    similar = SimilarLevers(Lever(probe, MeshOptions(refinement=refinement)))
+    solved = similar.linearised(probe, Reach(probe.circuit, 11.0), None, names)
+    shown = solved.branch.values[1:, :3, None]
+    return solved.branch.u[1:] ** 2, solved.shown[1:, :3] * probe.values(names) / shown
 
 
 def hundred_layouts(probe: Probe) -> None:
