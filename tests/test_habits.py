@@ -45,9 +45,13 @@ def test_hooks_run_what_make_test_checks_before_the_tests():
 def test_the_citation_is_of_this_version_and_licence():
     project = tomllib.loads(read("pyproject.toml"))["project"]
     citation = dict(
-        re.findall(r"^(version|license|title|abstract): (.+)$", read("CITATION.cff"), re.M)
+        re.findall(
+            r"^(version|date-released|license|title|abstract): (.+)$", read("CITATION.cff"), re.M
+        )
     )
-    assert citation["version"] == project["version"] == hotlever.__version__
+    assert citation["version"] == hotlever.__version__
+    released = f"## {hotlever.__version__} ({citation['date-released']})"
+    assert re.search(r"^## .+", read("CHANGELOG.md"), re.M)[0] == released
     assert citation["license"] == project["license"]
     assert citation["title"] == project["name"]
     assert citation["abstract"] == project["description"]

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Builds sdist and wheel twice, the same to the byte, installs the wheel for every Python from 3.11 on that this machine
-# has, and runs tests there, the README's blocks among them.
+# Builds sdist and wheel twice, the same to the byte; installs each in an empty environment and runs the README's blocks
+# there; and installs the wheel with its extras for every Python from 3.11 on that this machine has, and runs tests there.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -18,6 +18,27 @@ for file in "$folder"/clone/build/release/*; do
     sha256sum "build/release/${file##*/}"
 done
 wheel=$(ls "$folder"/clone/build/release/*.whl)
+
+block() { # LANGUAGE: the block of the README in it
+    sed -n "/^\`\`\`$1\$/,/^\`\`\`\$/{/^\`\`\`/d;p}" README.md
+}
+for file in "$folder"/clone/build/release/*; do
+    empty="$folder/empty-${file##*.}"
+    .venv/bin/python -m venv "$empty"
+    "$empty/bin/pip" install --quiet --disable-pip-version-check "$file"
+    mkdir -p "$empty/work/src/hotlever"
+    cp -r src/hotlever/examples "$empty/work/src/hotlever"
+    block python >"$empty/work/block.py"
+    block sh >"$empty/work/block.sh"
+    (
+        cd "$empty/work"
+        PATH="$empty/bin:$PATH" HOTLEVER_CACHE="$empty/cache"
+        export PATH HOTLEVER_CACHE
+        python -I block.py >out.txt
+        sh -eu block.sh >>out.txt 2>&1
+    ) || { tail -n 20 "$empty/work/out.txt" >&2; exit 1; }
+    echo "README's blocks run with ${file##*/}"
+done
 
 tested=
 for python in $(

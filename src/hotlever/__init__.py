@@ -23,12 +23,11 @@ from __future__ import annotations
 
 from functools import partial
 from importlib import import_module
-from importlib.metadata import version
 from typing import Any
 
 from hotlever import plotting
 
-__version__ = version("hotlever")
+__version__ = "1.0.0"
 
 #: What the package offers at its top, by the module it lives in. Loaded when first used, so that
 #: the command line starts fast.
