@@ -65,12 +65,15 @@ def _row(text: str, folder: Path, name: str) -> LayerRow:
     return next(row for row in rows if row.name == name)
 
 
-def test_a_material_is_renamed_at_its_layers_too(tmp_path: Path) -> None:
+def test_a_material_is_renamed_wherever_it_is_named(tmp_path: Path) -> None:
     name, old = FILES[0], "film"
     text = (EXAMPLES / name).read_text(encoding="utf-8")
+    text += '[prior]\n"film.tcr" = "± 3%" # of the wafer\n[monitor.track]\nregion = "film"\n'
     (tmp_path / "mine.toml").write_text(with_material_renamed(text, old, "my-film"))
     renamed, before = Probe.from_file(tmp_path / "mine.toml"), Probe.from_file(EXAMPLES / name)
     assert dict(renamed.materials)["my-film"] == dict(before.materials)[old]
+    assert renamed.stated_priors == {"my-film.tcr": "± 3%"}
+    assert renamed.monitors["track"].region == "my-film"
     with pytest.raises(InputError, match="a name that no material has"):
         with_material_renamed(text, old, old)
     inline = "materials = { a = { kind = 'metal-film' } }\n"

@@ -124,7 +124,9 @@ def without_section(text: str, section: Section) -> str:
 
 
 def with_material_renamed(text: str, old: str, new: str) -> str:
-    """Return a probe file in which a material has another name, at its layers too.
+    """Return a probe file in which a material has another name, wherever it is named.
+
+    Layers are made of it, priors are of its parameters, and a monitor may be the mean over it.
 
     Raises
     ------
@@ -145,19 +147,34 @@ def with_material_renamed(text: str, old: str, new: str) -> str:
     materials, new = expected.get("materials", {}), new.strip()
     if not new or new in materials:
         raise InputError(f"found '{shown(new)}', expected a name that no material has")
+    layers, of_old = expected.get("layers", {}), f"{old}."
     expected["materials"] = {new if name == old else name: own for name, own in materials.items()}
+    if "prior" in expected:
+        expected["prior"] = {
+            new + name.removeprefix(old) if name.startswith(of_old) else name: stated
+            for name, stated in expected["prior"].items()
+        }
+    # the keys that name it, in sections of which kind; a layer of its name comes before it
+    keys = {"layers": "material"} | ({} if old in layers else {"monitor": "region"})
+    for part, key in keys.items():
+        for own in expected.get(part, {}).values():
+            if isinstance(own, dict) and own.get(key) == old:
+                own[key] = new
     entries = _entries(text)
     for entry in entries:
+        part = entry.section[0] if entry.section else ""
         if entry.is_header and entry.section == ("materials", old):
             entry.lines = [f"[materials.{_quoted(new)}]"]
-        elif entry.section[:1] == ("layers",) and not entry.is_header:
-            made_of = rf"""(\bmaterial\s*=\s*)(["']){re.escape(old)}\2"""
+        elif entry.is_header or entry.key is None:
+            continue
+        elif part == "prior" and entry.key.startswith(of_old):
+            name = new + entry.key.removeprefix(old)
+            entry.lines[0] = entry.lines[0].replace(as_toml(entry.key), as_toml(name), 1)
+        elif part in keys:
+            named = rf"""(\b{keys[part]}\s*=\s*)(["']){re.escape(old)}\2"""
             entry.lines = [
-                re.sub(made_of, lambda match: match[1] + as_toml(new), line) for line in entry.lines
+                re.sub(named, lambda match: match[1] + as_toml(new), line) for line in entry.lines
             ]
-    for layer in expected.get("layers", {}).values():
-        if isinstance(layer, dict) and layer.get("material") == old:
-            layer["material"] = new
     renamed = _text(entries)
     if tomllib.loads(renamed) != expected:
         raise InputError(f"'{shown(old)}': expected to be renamed in the text of the probe file")
