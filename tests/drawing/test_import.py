@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 import gdstk
@@ -135,26 +134,23 @@ def test_what_cannot_be_told_is_left_to_the_user(run, tmp_path):
     assert run("sweep", "probe.toml")[0] == 2
 
 
-def test_a_film_that_is_heater_and_legs_needs_no_heater(run, tmp_path):
-    """What is said to be written makes it a lever."""
+@pytest.mark.parametrize("contacts", [True, False])
+def test_a_film_that_is_heater_and_legs_in_one(run, tmp_path, contacts):
+    """As on an example, of whose materials a drawing says nothing."""
     lever = Probe.from_file(EXAMPLES / "palladium-on-nitride.toml")
     lever.to_file(tmp_path / "pd.toml", drawing=tmp_path / "pd.gds")
-    status, out, _ = run("probe", "import", "pd.gds", "-o", "probe.toml")
-    assert status == 0
-    assert '[layers.body] drawn = "1/0" and [layers.film] drawn = "2/0"' in out
-    sections = tomllib.loads((tmp_path / "probe.toml").read_text(encoding="utf-8"))
-    del sections["material"]
-    sections["probe"]["tip_um"] = [56.0, 0.0]
-    sections["layers"] = {
-        "body": {"drawn": "1/0", "material": "nitride"},
-        "film": {"drawn": "2/0", "material": "metal", "thickness_um": 0.05},
-    }
-    sections["materials"] = {
-        "nitride": {"kind": "dielectric", "preset": "SiN"},
-        "metal": {"kind": "metal-film", "preset": "Pd"},
-    }
-    made = Probe.from_sections(sections, "probe", tmp_path)
-    assert made.layout().heater.area == pytest.approx(lever.layout().heater.area, rel=1e-6)
+    if contacts:
+        library = gdstk.read_gds(tmp_path / "pd.gds")
+        (cell,) = library.top_level()
+        cell.add(gdstk.rectangle((-2, -25), (0.5, -15), layer=10))
+        cell.add(gdstk.rectangle((-2, 15), (0.5, 25), layer=11))
+        library.write_gds(tmp_path / "pd.gds")
+    probe, out, _ = imported(run, tmp_path, "pd.gds")
+    assert "what it and the body are made of, the drawing does not say" in out
+    assert [layer.thickness_um for layer in probe.shape.layers] == [None, 0.05]
+    assert sorted(probe.materials) == ["Pd", "SiN"]
+    assert probe.shape.tip_um == pytest.approx((56.0, 0.0), abs=0.5)
+    assert probe.layout().heater.area == pytest.approx(lever.layout().heater.area, rel=1e-6)
 
 
 def test_a_proposal_that_is_at_fault_is_drawn_with_its_place(run, tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -182,11 +182,13 @@ def file_text(
     return f"{lines[0]}\n{heading}" + "\n".join(lines[1:]) + "\n" + other_sections(probe)
 
 
-def other_sections(probe: ProbeParts) -> str:
-    """Return the sections of a probe's file beside those of its shape."""
+def other_sections(probe: ProbeParts, without: Container[str] = ()) -> str:
+    """Return the sections of a probe's file beside those of its shape, some of them left out."""
     lines = []
     named = {f"{MATERIALS}.{name}": kind for name, kind in probe.materials.items()}
     for name, part in (named | probe.parts).items():
+        if name in without:
+            continue
         lines += section_lines(name, part.model_dump(), part.description(), optional=True)
     if probe.tip is None:
         lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]

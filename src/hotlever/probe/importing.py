@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.probe.drawing.layer_inference import Drawn, LayerInference, infer_layers
-from hotlever.probe.drawing.layers import HEATER, REQUIRED, SILICON, terminal_part
+from hotlever.probe.drawing.layer_inference import FILM, Drawn, LayerInference, infer_layers
+from hotlever.probe.drawing.layers import BODY, DRAWN, HEATER, REQUIRED, SILICON, terminal_part
 from hotlever.probe.drawing.outlines import Ring
 from hotlever.probe.drawing.saving import relative
 from hotlever.probe.drawing.shape import TOLERANCE_UM
@@ -23,13 +23,21 @@ from hotlever.probe.drawing.sheet import (
     read_sheet,
     sensible_unit,
 )
-from hotlever.probe.file_sections import commented, other_sections
+from hotlever.probe.file_sections import commented, other_sections, section_lines
 from hotlever.probe.layout import Point, ring_area
+from hotlever.probe.parts import MATERIAL
 from hotlever.probe.probe import Probe
 from hotlever.text import aligned, as_toml
 
 #: Layers that are listed.
 _MOST_LISTED = 60
+#: What is assumed of a film that is heater and legs in one, and of the body below it.
+_ASSUMED = {
+    BODY: {"kind": "dielectric", "preset": "SiN"},
+    FILM: {"kind": "metal-film", "preset": "Pd"},
+}
+_FILM_UM = 0.05
+_UNSAID = "assumed: a drawing does not say"
 
 
 @dataclass(frozen=True)
@@ -199,14 +207,33 @@ def _probe_file(
     )
     lines.append(_entry("tip_um", inference.tip, inference.reasons.get("tip"), (0.0, 0.0)))
     reasons = inference.reasons
-    lines += ["", "[layers]"]
-    for role in dict.fromkeys((SILICON, HEATER, *inference.layers)):
-        lines.append(_entry(role, inference.layers.get(role), reasons.get(role), "1/0"))
+    has_film = FILM in inference.layers
+    if has_film:
+        lines += _film_sections(inference)
+    else:
+        lines += ["", "[layers]"]
+        for role in dict.fromkeys((SILICON, HEATER, *inference.layers)):
+            lines.append(_entry(role, inference.layers.get(role), reasons.get(role), "1/0"))
     lines += ["", "[terminals]"]
     for role in dict.fromkeys((*REQUIRED, *inference.terminals)):
         reason = reasons.get(terminal_part(role))
         lines.append(_entry(role, inference.terminals.get(role), reason, "10/0"))
-    return "\n".join(lines) + "\n" + other_sections(reference)
+    without = (MATERIAL,) if has_film else ()
+    return "\n".join(lines) + "\n" + other_sections(reference, without)
+
+
+def _film_sections(inference: LayerInference) -> list[str]:
+    """Return the sections of a film, of its body, and of the materials that are assumed of both."""
+    lines: list[str] = []
+    for name, assumed in _ASSUMED.items():
+        layer: dict[str, object] = {DRAWN: inference.layers[name], "material": assumed["preset"]}
+        if name == FILM:
+            layer["thickness_um"] = _FILM_UM
+        meaning = {DRAWN: inference.reasons[name], "thickness_um": _UNSAID}
+        lines += section_lines(f"layers.{name}", layer, meaning)
+    for assumed in _ASSUMED.values():
+        lines += section_lines(f"materials.{assumed['preset']}", assumed, {"preset": _UNSAID})
+    return lines
 
 
 def _entry(key: str, value: Drawn | Point | None, reason: str | None, example: object) -> str:

@@ -12,7 +12,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from hotlever.probe.drawing.contacts import outline_edges, terminal_edges
-from hotlever.probe.drawing.layers import HEATER, SILICON, terminal_part
+from hotlever.probe.drawing.layers import BODY, HEATER, SILICON, terminal_part
 from hotlever.probe.drawing.outlines import DrawingError, Ring, healed, parts_of, polygons, snapped
 from hotlever.probe.drawing.partition import Partition, partitioned
 from hotlever.probe.drawing.shape import rings_of
@@ -20,8 +20,12 @@ from hotlever.probe.drawing.sheet import Layer, Sheet
 from hotlever.probe.layout import Point
 
 SUPPLY, GROUND, READER = "supply", "ground", "reader"
+#: A film that is heater and legs in one, on a body that is not of silicon.
+FILM = "film"
 #: Share of the silicon that a low-doped layer does not exceed.
 _LARGEST_SHARE = 0.6
+#: Of a film's greatest distance from the terminals, the share from which on its tip may be.
+_FAR = 0.95
 
 #: A layer by its name, or outlines.
 Drawn = str | tuple[Ring, ...]
@@ -57,9 +61,11 @@ def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
     if best is None:
         inferred.doubts.append("no layer holds a closed outline")
         return inferred
-    inferred.layers[SILICON] = best.name
+    best, film = _body_and_film(best, judged)
+    body = SILICON if film is None else BODY
+    inferred.layers[body] = best.name
     touched = len(best.cutters) + len(best.touching)
-    inferred.reasons[SILICON] = (
+    inferred.reasons[body] = (
         f"{best.shape.area:.4g} µm²; {touched} other layer{'s' * (touched != 1)} lie"
         f"{'s' * (touched == 1)} across it or touch{'es' * (touched == 1)} its outline"
     )
@@ -67,7 +73,15 @@ def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
         inferred.doubts.append(
             f"layer {best.name} has {len(best.pieces)} pieces that do not touch; a lever is one"
         )
-    _low_doped(best, inferred)
+    if film is None:
+        _low_doped(best, inferred)
+    else:
+        inferred.layers[FILM] = film.name
+        inferred.reasons[FILM] = "it lies on the body, and no layer lies across it"
+        inferred.doubts.append(
+            f"layer {film.name} is taken for a film that is heater and legs in one; its thickness, "
+            "and what it and the body are made of, the drawing does not say"
+        )
     _terminals(best, sheet, inferred)
     _tip(best, sheet, shapes, inferred)
     return inferred
@@ -152,6 +166,19 @@ def _terminal(sheet: Sheet, layer: Layer) -> tuple[Ring, ...]:
     return rings_of(sheet, layer, lines=True)
 
 
+def _body_and_film(best: _Silicon, judged: list[_Silicon]) -> tuple[_Silicon, _Silicon | None]:
+    """Return the body of a lever, and the film on it where no layer lies across the silicon."""
+    if best.cutters:
+        return best, None
+    below = [other for other in judged if best.lies_on(other.name)]
+    if below:
+        return max(below, key=lambda other: other.shape.area), best
+    above = [
+        other for other in judged if other.lies_on(best.name) and other.name not in best.touching
+    ]
+    return best, max(above, key=lambda other: other.shape.area, default=None)
+
+
 # --- low-doped parts ---------------------------------------------------------------------------
 
 
@@ -161,14 +188,6 @@ def _low_doped(best: _Silicon, inferred: LayerInference) -> None:
         inferred.doubts.append(
             "no layer lies across the silicon so that current has to pass it: the heater is missing"
         )
-        below = [name for name in best.areas if name != best.name and best.lies_on(name)]
-        inferred.doubts += [
-            f"layer {best.name} lies on layer {name}: if it is a film that is heater and legs in "
-            f'one, there is no heater to name; then say [layers.body] drawn = "{name}" and '
-            f'[layers.film] drawn = "{best.name}", each with a material of [materials], and the '
-            "film's thickness_um"
-            for name in below[:1]
-        ]
         return
     heater = _hinted(best.cutters, ("heat", "htr")) or _farthest(best)
     reason = "the silicon falls apart without it"
@@ -245,7 +264,7 @@ def _named(
     low = {
         part: snapped(best.areas[name], best.shape, 1.5 * best.tolerance)
         for part, name in inferred.layers.items()
-        if part != SILICON and isinstance(name, str)
+        if part not in (SILICON, BODY, FILM) and isinstance(name, str)
     }
     partition = partitioned((SILICON, best.shape), low)
     ends = terminal_edges(best.shape, rings, best.tolerance)
@@ -263,7 +282,7 @@ def _named(
     ground = _hinted(rest, ("ground", "gnd")) or next(
         (name for name in rest if name not in behind), rest[0]
     )
-    reason = "on the other side of the heater"
+    reason = "on the other side of the heater" if heaters else "at the other end"
     if len(rest) > 1 and not behind:
         reason += "; which of the terminals there is ground, the drawing does not say"
     named[GROUND] = (ground, reason)
@@ -321,11 +340,22 @@ def _tip(
             inferred.tip = (round(point[0], 6) + 0.0, round(point[1], 6) + 0.0)  # no -0
             inferred.reasons["tip"] = f"the text '{text.strip()[:20]}' stands there"
             return
-    heater = inferred.layers.get(HEATER)
+    heater, film = (inferred.layers.get(part) for part in (HEATER, FILM))
     if isinstance(heater, str):
-        inside = max(
-            parts_of(shapes[heater].intersection(best.shape)), key=lambda piece: piece.area
-        )
-        middle = inside.centroid if inside.contains(inside.centroid) else inside.point_on_surface()
-        inferred.tip = (round(middle.x, 6) + 0.0, round(middle.y, 6) + 0.0)
-        inferred.reasons["tip"] = "the middle of the heater; no text in the drawing says 'tip'"
+        area, why = shapes[heater].intersection(best.shape), "the middle of the heater"
+    elif isinstance(film, str):
+        drawn = [inferred.terminals[end] for end in (SUPPLY, GROUND) if end in inferred.terminals]
+        ends = [
+            shapes.get(end, best.shape) if isinstance(end, str) else shapely.MultiPoint(end[0])
+            for end in drawn
+        ]
+        near = shapely.union_all(ends or [best.shape]).centroid
+        reach = shapely.hausdorff_distance(near, shapes[film].boundary)
+        area = shapes[film].difference(near.buffer(_FAR * reach))
+        why = "where the film is farthest from the terminals"
+    else:
+        return
+    inside = max(parts_of(area), key=lambda piece: piece.area)
+    middle = inside.centroid if inside.contains(inside.centroid) else inside.point_on_surface()
+    inferred.tip = (round(middle.x, 6) + 0.0, round(middle.y, 6) + 0.0)
+    inferred.reasons["tip"] = f"{why}; no text in the drawing says 'tip'"
