@@ -30,7 +30,7 @@ _PREFIXES |= {"a": -18, "da": 1, "h": 2, "k": 3, "K": 3, "M": 6, "G": 9, "T": 12
 _PREFIX_WORDS = {"": 0, "milli": -3, "micro": -6, "nano": -9, "pico": -12, "kilo": 3, "mega": 6}
 #: Quantity (its unit), and what one of a unit is of it.
 _SYMBOLS = {
-    **{symbol: (symbol, 1.0) for symbol in ("V", "A", "W", "K", "s", "Hz", "m", "bar")},
+    **{symbol: (symbol, 1.0) for symbol in ("V", "A", "W", "K", "s", "Hz", "m", "bar", "S", "J")},
     **dict.fromkeys(("ohm", "Ohm", "OHM", "Ω"), ("ohm", 1.0)),
     **dict.fromkeys(("torr", "Torr"), ("bar", 1.01325 / 760.0)),
     "Pa": ("bar", 1e-5),
@@ -65,7 +65,7 @@ _UNIT_WORDS = {
     for word, (quantity, factor) in _WORDS.items()
 }
 #: In brackets alone: in a heading `V_s` is no voltage in seconds.
-_OF_SETTINGS = {"s", "Hz", "W", "m"}
+_OF_SETTINGS = {"s", "Hz", "W", "m", "S", "J"}
 #: Headings that name a time; of these alone a unit of time is one.
 TIMES = {"t", "time", "relative time", "elapsed time", "zeit", "relative zeit"}
 _CELSIUS = {"°C", "degC", "C", "oC", "celsius", "Celsius", "degreesC", "degreesCelsius"}
@@ -131,17 +131,17 @@ def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float,
     return 10.0 ** (theirs.power - ours.power) * (theirs.factor / ours.factor), 0.0
 
 
-#: What one of a unit is of the products of V, A, ohm, K and cm that properties of materials have.
-_FACTORS = {
-    **{symbol: ({symbol: 1}, 1.0) for symbol in ("V", "A", "K", "s")},
-    **dict.fromkeys(("Ω", "ohm", "Ohm"), ({"V": 1, "A": -1}, 1.0)),
-    "S": ({"A": 1, "V": -1}, 1.0),
-    "W": ({"V": 1, "A": 1}, 1.0),
-    "J": ({"V": 1, "A": 1, "s": 1}, 1.0),
-    "m": ({"cm": 1}, 100.0),
-    "1": ({}, 1.0),
-    "%": ({}, 0.01),
+#: Powers of V, A, K, s and m of the quantities that properties of materials are products of.
+_POWERS = {
+    **{symbol: {symbol: 1} for symbol in ("V", "A", "K", "s", "m")},
+    "ohm": {"V": 1, "A": -1},
+    "S": {"A": 1, "V": -1},
+    "W": {"V": 1, "A": 1},
+    "J": {"V": 1, "A": 1, "s": 1},
+    "1": {},
 }
+#: Numbers that stand among units.
+_NUMBERS = {"1": _Unit("1", 0, 1.0), "%": _Unit("1", -2, 1.0)}
 _FACTOR = re.compile(r"([^\d\s^*·./()-]+|%|1(?!\d))(?:\^|\*\*)?([+-]?\d+)?")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 
@@ -163,7 +163,7 @@ def product_conversion(unit: str, inside: str) -> float | None:
 
 
 def _product(text: str) -> tuple[dict[str, int], float] | None:
-    """Return the powers of V, A, K, s and cm in a product of units, and what one of it is."""
+    """Return the powers of V, A, K, s and m in a product of units, and what one of it is."""
     text = unicodedata.normalize("NFKC", text.translate(_RAISED)).strip()
     # written together: metres or centimetres, and kelvins
     text = re.sub(r"(ohm|Ω)(c?m)\b", r"\1 \2", text)
@@ -176,20 +176,12 @@ def _product(text: str) -> tuple[dict[str, int], float] | None:
         if rest or "/" in part:
             return None
         for symbol, exponent in _FACTOR.findall(part):
-            match = next(
-                (
-                    (_FACTORS[symbol[len(prefix) :]], power)
-                    for prefix, power in _PREFIXES.items()
-                    if symbol.startswith(prefix) and symbol[len(prefix) :] in _FACTORS
-                ),
-                None,
-            )
-            if match is None:
+            unit = _UNITS.get(symbol) or _NUMBERS.get(symbol)
+            if unit is None or unit.quantity not in _POWERS:
                 return None
-            (of, factor), power = match
             times = sign * int(exponent or 1)
-            scale *= (factor * 10.0**power) ** times
-            for name, each in of.items():
+            scale *= (unit.factor * 10.0**unit.power) ** times
+            for name, each in _POWERS[unit.quantity].items():
                 powers[name] = powers.get(name, 0) + times * each
     return {name: power for name, power in powers.items() if power}, scale
 
