@@ -42,6 +42,7 @@ from hotlever.materials import full_name
 from hotlever.materials.parameters import INVERSION
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of, usual_parameters
+from hotlever.steps import each
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
@@ -350,12 +351,10 @@ def predictive_band(
     flat = np.stack([posterior[name].values.ravel() for name in fit.names], axis=1)
     chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]
     tips, powers = [], []
-    for done, row in enumerate(chosen, start=1):
+    for row in each(list(chosen), progress):
         shown = named(surrogate.shown(row))
         tips.append(shown["tip_K"])
         powers.append(surrogate.circuit(row).power(grid, shown["current_mA"]))
-        if progress is not None:
-            progress(done, len(chosen))
     power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)
     if np.diff(powers, axis=1).min() < 0:
         # with held supplies there may be several temperatures at one power

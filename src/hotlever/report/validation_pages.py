@@ -13,6 +13,7 @@ from hotlever.calibration import Calibration, calibrate
 from hotlever.calibration.summary import calibration_parts
 from hotlever.materials.parameters import sentence
 from hotlever.report.page import Page
+from hotlever.steps import each
 from hotlever.studies.validation.case import Case, cases, sought
 from hotlever.studies.validation.prediction import (
     DRAWS,
@@ -48,11 +49,7 @@ def validation_page(
         See `hotlever.studies.validation.prediction.comparison`.
     """
     every = cases()
-    now = []
-    for done, case in enumerate(every, start=1):
-        now.append(predict(case, within))
-        if progress is not None:
-            progress(done, len(every))
+    now = [predict(case, within) for case in each(every, progress)]
     compared = comparison(every, now)
     page = Page("Published numbers, predicted and compared", _summary(compared))
     page.figure(

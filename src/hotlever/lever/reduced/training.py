@@ -18,6 +18,7 @@ from hotlever.lever.sensitivities import Linearised
 from hotlever.materials import full_name
 from hotlever.probe import Probe
 from hotlever.probe.parameters import of_materials
+from hotlever.steps import each
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
@@ -89,12 +90,11 @@ def reduce(
     from scipy.stats import qmc  # takes long, and most commands reduce nothing
 
     options, domain = options or ReductionOptions(), ParameterDomain.of(lever.probe, names)
-    training = []
     shares = qmc.Sobol(len(domain.names), seed=0).random(options.parameter_sets)
-    for done, row in enumerate(shares, start=1):
-        training.append(_trained(lever.with_probe(domain.probe(lever.probe, row)), domain))
-        if progress is not None:
-            progress(done, options.parameter_sets)
+    training = [
+        _trained(lever.with_probe(domain.probe(lever.probe, row)), domain)
+        for row in each(list(shares), progress)
+    ]
     space = _space(lever, training, domain, options)
     points, weights = empirical_cubature(_integrands(space, training), space.weights[:, 0])
     few, surface = space.at_points(points, weights), _surface(space, training, domain)

@@ -31,6 +31,7 @@ from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.reduced import space_of_modes
 from hotlever.lever.transient.waveform import step
 from hotlever.probe import Circuit
+from hotlever.steps import each
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
@@ -216,11 +217,7 @@ def harmonics(
     equations = LeverEquations.of_probe(space, lever.probe)
     start = space.coordinates(rest.x)
     balance = HarmonicBalance(equations, lever.circuit, start, offset_V, amplitude_V)
-    answers = []
-    for done, hertz in enumerate(frequency.tolist(), start=1):
-        answers.append(balance.solved(hertz))
-        if progress is not None:
-            progress(done, frequency.size)
+    answers = [balance.solved(hertz) for hertz in each(frequency.tolist(), progress)]
     lever_V, mean = np.array([volts for volts, _ in answers]), [kelvin for _, kelvin in answers]
     columns: dict[str, ArrayLike] = {"frequency_Hz": frequency, "mean_tip_K": mean}
     seen = {"": lever_V}
