@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from hotlever.app.workers import Worker
 from hotlever.errors import HotleverError
+from hotlever.tasks.commands import COMMANDS
 
 Standing = Literal["running", "done", "failed", "cancelled"]
 
@@ -19,8 +20,6 @@ Standing = Literal["running", "done", "failed", "cancelled"]
 _MOST_NOTES = 200
 #: Share of the work from which on it tells how long the rest takes: it may begin slowly.
 _TELLING = 0.03
-#: Options that name what is written.
-_FILES = ("output", "plot", "fields", "film")
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class Task:
     Attributes
     ----------
     command : str
-        Such as ``fit``; see `hotlever.app.work`.
+        Such as ``fit``; see `hotlever.tasks.commands`.
     files : tuple of str
     options : dict
         By their names, in the order in which they are typed; empty ones are none.
@@ -61,7 +60,8 @@ class Task:
 
     def writing(self, files: Mapping[str, str]) -> Task:
         """Return the same that writes other files."""
-        options = {name: value for name, value in self.options.items() if name not in _FILES}
+        written = COMMANDS[self.command].written
+        options = {name: value for name, value in self.options.items() if name not in written}
         return replace(self, options={**options, **files})
 
     @property

@@ -35,7 +35,7 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
     """Read a lever at distances to a surface, over biases and pressures."""
     from hotlever.lever.reader import Reader, best_bias, over_surface, rows_of
 
-    outputs = request.outputs(request.probe)
+    outputs = request.outputs()
     distances, noise = parse_distances(request.distance), noise_of(request)
     pressures = None if request.pressure is None else parse_pressures(request.pressure)
     probe = probe_over_surface(reporter, request, distances)

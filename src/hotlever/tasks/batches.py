@@ -81,8 +81,8 @@ def estimate_several(
             "to"
         )
     folder = output or Path(str(report), results)
-    outputs.folder(folder)
-    outputs.folder(report)
+    if output is None:
+        outputs.folder(folder)
     if folder.is_dir():
         outputs.file(folder / table)
     done = 0

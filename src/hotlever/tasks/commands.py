@@ -49,6 +49,11 @@ class Command:
         """The fields of the request that have no names on the command line."""
         return [field for field in fields(self.request) if "names" not in field.metadata]
 
+    @property
+    def written(self) -> set[str]:
+        """The names of the fields that say what is written."""
+        return {field.name for field in fields(self.request) if "writes" in field.metadata}
+
     def do(self, reporter: Reporter, request: Any) -> int:
         """Do what is requested; return the exit status."""
         status: int | None = getattr(import_module(self.module), self.task)(reporter, request)

@@ -43,7 +43,7 @@ def touch(reporter: Reporter, request: ContactRequest) -> None:
         sweep_in_contact,
     )
 
-    outputs = request.outputs(request.probe, request.waveform)
+    outputs = request.outputs()
     waveform = request.read_waveform()
     if waveform is not None and request.bias is not None:
         raise InputError("--bias: does not go with a wave form, which has biases of its own")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from hotlever.errors import unknown_name
-from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.lever.meshing import chosen_space
 from hotlever.materials.catalogue import curves, listing
 from hotlever.probe import Probe
@@ -22,7 +21,7 @@ def new_probe(reporter: Reporter, request: NewRequest) -> None:
     """Write a parametric probe as a commented file."""
     if request.shape not in NEW_PROBES:
         raise unknown_name("shape", request.shape, NEW_PROBES)
-    Outputs().file(request.output, ".toml")
+    request.outputs()
     probe: Probe = getattr(Probe, NEW_PROBES[request.shape])()
     if request.output is None:
         reporter.give(probe.to_toml())
@@ -32,8 +31,7 @@ def new_probe(reporter: Reporter, request: NewRequest) -> None:
 
 def show_probe(reporter: Reporter, request: ShowRequest) -> None:
     """Draw and describe a probe; outlines that make none are drawn with what is wrong of them."""
-    outputs = Outputs(request.probe)
-    outputs.file(request.plot, *FIGURE_TYPES)
+    outputs = request.outputs()
     try:
         probe = read_probe(reporter, request.probe)
     except DrawingError as error:
@@ -56,8 +54,7 @@ def show_probe(reporter: Reporter, request: ShowRequest) -> None:
 
 def list_materials(reporter: Reporter, request: MaterialsRequest) -> None:
     """List kinds of material, or those of a probe, and draw their laws."""
-    outputs = Outputs(request.probe)
-    outputs.file(request.plot, *FIGURE_TYPES)
+    outputs = request.outputs()
     chosen: tuple[Any, ...] = ()
     if request.probe is not None:
         probe = read_probe(reporter, request.probe)

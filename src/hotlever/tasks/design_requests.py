@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass
+from dataclasses import MISSING, Field, dataclass
 from pathlib import Path
+from typing import Any
 
 from hotlever.errors import unknown_name
-from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.requests import (
     File,
     PhysicsRequest,
     PlotRequest,
     ProbeRequest,
+    Request,
     TableRequest,
     argument,
     option,
+    written,
 )
 
 #: Shapes of new probe files, and the methods of `Probe` that make one.
@@ -59,17 +61,17 @@ class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
         """Whether the best design is looked for."""
         return self.minimise is not None or self.maximise is not None
 
-    @property
-    def output_types(self) -> tuple[str, ...]:
-        """How the name of the file may end: the best design is a probe file."""
-        return (".toml",) if self.asks_for_best else super().output_types
+    def types_of(self, own: Field[Any]) -> tuple[str, ...]:
+        """Return how the name of a file may end: the best design is a probe file."""
+        is_probe = own.name == "output" and self.asks_for_best
+        return (".toml",) if is_probe else super().types_of(own)
 
 
 @dataclass(kw_only=True)
-class NewRequest:
+class NewRequest(Request):
     """Write the reference probe as a commented file."""
 
-    output: File = option(None, "-o", "--output", help="File; standard output if left out.")
+    output: File = written((".toml",), "-o", "--output", help="File; standard output if left out.")
     shape: str = option("three-leg", help=f"One of: {', '.join(NEW_PROBES)}.")
 
 
@@ -85,8 +87,8 @@ class ImportRequest(PlotRequest):
     """Say what a drawing holds, and propose a probe file for it."""
 
     drawing: Path = argument(MISSING, metavar="DRAWING", help="GDSII, OASIS or DXF file.")
-    output: File = option(
-        None, "-o", "--output", help="Probe file to write; standard output if left out."
+    output: File = written(
+        (".toml",), "-o", "--output", help="Probe file to write; standard output if left out."
     )
     cell: str | None = option(None, help="Of GDSII or OASIS; the top cell if left out.")
     unit: str | None = option(
@@ -102,10 +104,3 @@ class ImportRequest(PlotRequest):
         if name is not None and name not in UNITS:
             raise unknown_name("unit", name, UNITS, "--unit")
         return name
-
-    def outputs(self) -> Outputs:
-        """Check the files that are written, none of which is read."""
-        outputs = Outputs(self.drawing)
-        outputs.file(self.output, ".toml")
-        outputs.file(self.plot, *FIGURE_TYPES)
-        return outputs

@@ -26,7 +26,7 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
         return
     if request.within is not None:
         raise InputError("--within: goes with --minimise or --maximise")
-    output, plot, outputs = request.output, request.plot, request.outputs(request.probe)
+    output, plot, outputs = request.output, request.plot, request.outputs()
     asked: Any = {"power_mW": request.power, "air": request.air}
     check_number("--power", request.power, 1e-3, 1000)
     check_number("--annealing-K", request.annealing_K, 700, 1700)
@@ -69,7 +69,7 @@ def optimise_design(reporter: Reporter, request: DesignRequest) -> None:
     from hotlever.studies.optimisation import optimise, optimum_text
     from hotlever.studies.working_point import WorkingPoint
 
-    outputs = request.outputs(request.probe)
+    outputs = request.outputs()
     if request.minimise is not None and request.maximise is not None:
         raise InputError("--minimise, --maximise: found both, expected one")
     if request.vary is not None:

@@ -8,17 +8,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hotlever.files import Outputs, write_text
+from hotlever.files import write_text
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import File, argument, option
+from hotlever.tasks.requests import FOLDER, File, Request, argument, option, written
 
 
 @dataclass(kw_only=True)
-class ReproduceRequest:
+class ReproduceRequest(Request):
     """Compute the paper's tables and figures and put them on one page."""
 
-    output: Path = option(
-        Path("reproduce"), "-o", "--output", help="Folder for the page and its figures."
+    output: Path = written(
+        FOLDER,
+        *("-o", "--output"),
+        default=Path("reproduce"),
+        help="Folder for the page and its figures.",
     )
     quick: bool = option(
         False,
@@ -28,14 +31,17 @@ class ReproduceRequest:
 
 
 @dataclass(kw_only=True)
-class ValidateRequest:
+class ValidateRequest(Request):
     """Predict published numbers of other levers and compare them, on one page and in a table."""
 
     case: File = argument(
         None, metavar="[CASE.toml]", help="A case of your own, whose prediction is printed."
     )
-    output: Path = option(
-        Path("validate"), "-o", "--output", help="Folder for the page and its table."
+    output: Path = written(
+        FOLDER,
+        *("-o", "--output"),
+        default=Path("validate"),
+        help="Folder for the page and its table.",
     )
 
 
@@ -43,8 +49,7 @@ def reproduce(reporter: Reporter, request: ReproduceRequest) -> None:
     """Write the page of the paper's results."""
     from hotlever.report.reproduce import reproduce_page
 
-    outputs = Outputs()
-    outputs.folder(request.output)
+    outputs = request.outputs()
     with reporter.progress_bars("reproduce", "levers") as (update, within):
         page = reproduce_page(quick=request.quick, progress=update, within=within)
     with outputs.together():
@@ -61,8 +66,7 @@ def validate(reporter: Reporter, request: ValidateRequest) -> None:
     from hotlever.report.validation_pages import validation_page
     from hotlever.studies.validation.prediction import COLUMNS
 
-    outputs = Outputs()
-    outputs.folder(request.output)
+    outputs = request.outputs()
     with reporter.progress_bars("validate", "draws") as (update, within):
         page, compared = validation_page(update, within)
     with outputs.together():

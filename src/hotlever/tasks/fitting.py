@@ -12,7 +12,7 @@ from hotlever.estimation.experiment import Prediction
 from hotlever.estimation.levers import compare_levers, levers_csv, levers_text
 from hotlever.estimation.summary import fit_text
 from hotlever.estimation.uncertainty import Uncertainty, examine
-from hotlever.files import write_text
+from hotlever.files import Outputs, write_text
 from hotlever.measurement import read_measurement_of
 from hotlever.probe import Probe
 from hotlever.tasks.batches import Summary, estimate_several
@@ -38,17 +38,17 @@ def fit_files(reporter: Reporter, request: FitRequest) -> int:
     probe = request.with_physics(read_probe(reporter, request.probe))
     options, outputs = request.options(probe), request.outputs()
     if not request.several:
-        _fit_one(reporter, request, probe, options)
+        _fit_one(reporter, request, outputs, probe, options)
         return 0
     make = partial(fit_many, probe=probe, options=options)
     return estimate_several(reporter, request, outputs, "fits", LEVERS_TABLE, make, _summary)
 
 
-def _fit_one(reporter: Reporter, request: FitRequest, probe: Probe, options: FitOptions) -> None:
-    outputs, (data,), waveform = request.outputs(), request.data, request.read_waveform()
+def _fit_one(
+    reporter: Reporter, request: FitRequest, outputs: Outputs, probe: Probe, options: FitOptions
+) -> None:
+    (data,), waveform = request.data, request.read_waveform()
     samples = request.samples if request.posterior else None
-    outputs.file(request.output, ".json")
-    outputs.folder(request.report)
     measurement = read_measurement_of(probe, data, request.columns, waveform)
     if samples or request.profiles:
         measurement.need_rest("--posterior" if samples else "--profiles")

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass
+from dataclasses import MISSING, Field, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hotlever.errors import InputError, quoted, unknown_name
-from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.files import FIGURE_TYPES
 from hotlever.tasks.requests import (
+    FOLDER,
     DriveRequest,
     File,
     PhysicsRequest,
     PlotRequest,
+    Request,
     argument,
     check_medium,
     option,
+    written,
 )
 from hotlever.tasks.texts import (
     USUAL,
@@ -33,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class MeasuredRequest(PhysicsRequest):
+class MeasuredRequest(PhysicsRequest, Request):
     """What is done with a measurement: how its file is read, and what is known beforehand."""
 
     column: list[str] | None = option(
@@ -61,10 +64,9 @@ class MeasuredRequest(PhysicsRequest):
 
         return parse_columns(self.column or [])
 
-    @property
-    def column_files(self) -> list[Path]:
-        """The files among the values of ``--column``."""
-        return [Path(text) for text in self.column or [] if "=" not in text]
+    def inputs(self) -> list[Path]:
+        """Return the files that are read, those among the values of ``--column`` too."""
+        return super().inputs() + [Path(text) for text in self.column or [] if "=" not in text]
 
 
 @dataclass(kw_only=True)
@@ -77,10 +79,12 @@ class LeversRequest(MeasuredRequest):
     probe: File = option(
         None, help="Probe file of levers like these; the reference probe if left out."
     )
-    output: File = option(
-        None, "-o", "--output", help="Result file (JSON); a folder of them with several data files."
+    output: File = written(
+        (".json",),
+        *("-o", "--output"),
+        help="Result file (JSON); a folder of them with several data files.",
     )
-    report: File = option(None, help="Write a page with figures to this folder.")
+    report: File = written(FOLDER, help="Write a page with figures to this folder.")
     processes: int | None = option(
         None, metavar="N", help="Local processes; one for each processor if left out."
     )
@@ -100,6 +104,10 @@ class LeversRequest(MeasuredRequest):
     def several(self) -> bool:
         """Whether there are several data files."""
         return len(self.data) > 1
+
+    def types_of(self, own: Field[Any]) -> tuple[str, ...]:
+        """Return how the name of a file may end: results of several levers are in a folder."""
+        return FOLDER if own.name == "output" and self.several else super().types_of(own)
 
     def need_single(self, *names: str) -> None:
         """Refuse several data files, with options that go with one."""
@@ -149,10 +157,6 @@ class FitRequest(DriveRequest, LeversRequest):
             self.need_single("--posterior", "--profiles")
         self.need_single(*self.drive)
 
-    def outputs(self) -> Outputs:
-        """Return where files are written to, none of which is read."""
-        return Outputs(*self.data, self.probe, *self.column_files, self.waveform)
-
     def options(self, probe: Probe) -> FitOptions:
         """Return what the fit of a probe is asked."""
         from hotlever.estimation import FitOptions
@@ -199,8 +203,8 @@ class CalibrateRequest(PlotRequest, LeversRequest):
         "levers where they are compared, as 8V or 2mW; the highest bias that all of them were "
         "measured at if left out.",
     )
-    table: File = option(
-        None,
+    table: File = written(
+        (".csv",),
         help="Write the table for an instrument, or for its pulses, to this CSV file; with several "
         "data files each has one beside its calibration.",
     )
@@ -249,19 +253,9 @@ class CalibrateRequest(PlotRequest, LeversRequest):
             raise InputError(f"--table-step {step:g}: expected more than 0 {unit}")
         return {"by": self.table_by, "step": step}
 
-    def outputs(self) -> Outputs:
-        """Return where files are written to, none of which is read; those of one lever checked."""
-        outputs = Outputs(*self.data, self.fit, self.probe, self.power_law, *self.column_files)
-        if not self.several:
-            outputs.file(self.output, ".json")
-            outputs.folder(self.report)
-            outputs.file(self.table, ".csv")
-            outputs.file(self.plot, *FIGURE_TYPES)
-        return outputs
-
 
 @dataclass(kw_only=True)
-class RamanLawRequest:
+class RamanLawRequest(Request):
     """A calibration of Raman spectra."""
 
     calibration: str | None = option(
@@ -270,6 +264,10 @@ class RamanLawRequest:
         help="A calibration that --save-calibration wrote, or 'published' for the published "
         "laws (then --reference is needed).",
     )
+
+    def inputs(self) -> list[Path]:
+        """Return the files that are read, the calibration too."""
+        return super().inputs() + ([] if self.calibration is None else [Path(self.calibration)])
 
 
 @dataclass(kw_only=True)
@@ -315,12 +313,6 @@ class ThermometerRequest(RamanLawRequest):
         0.0, metavar="MPA", help="Unknown stress in the silicon; enters the error."
     )
 
-    @property
-    def files(self) -> list[Path | str | None]:
-        """The files that it reads."""
-        several = [*(self.calibrate_from or []), *(self.reference or [])]
-        return [*several, self.temperatures, self.calibration, self.corrections]
-
 
 def spectra_argument() -> Any:
     """Return the field of the spectra that are measured."""
@@ -332,21 +324,13 @@ class RamanRequest(ThermometerRequest):
     """Find the silicon line in Raman spectra and, calibrated, the temperature."""
 
     spectra: list[Path] = spectra_argument()
-    save_calibration: File = option(
-        None, metavar="CAL.json", help="Write the calibration to this file."
+    save_calibration: File = written(
+        (".json",), metavar="CAL.json", help="Write the calibration to this file."
     )
-    output: File = option(None, "--output", "-o", metavar="FILE.csv", help="Left out: print.")
-    plot: File = option(
-        None, metavar="FILE.png|.svg|.pdf", help="Figure of spectra and calibration."
+    output: File = written((".csv",), "--output", "-o", metavar="FILE.csv", help="Left out: print.")
+    plot: File = written(
+        FIGURE_TYPES, metavar="FILE.png|.svg|.pdf", help="Figure of spectra and calibration."
     )
-
-    def outputs(self) -> Outputs:
-        """Check the files that are written, none of which is read."""
-        outputs = Outputs(*self.spectra, *self.files)
-        outputs.file(self.plot, *FIGURE_TYPES)
-        outputs.file(self.save_calibration, ".json")
-        outputs.file(self.output, ".csv")
-        return outputs
 
 
 @dataclass(kw_only=True)
@@ -359,12 +343,12 @@ class JoinRequest(ThermometerRequest):
 
     bias_log: Path = argument(MISSING, metavar="BIAS_LOG.csv", help="The bias sweep.")
     spectra: list[Path] = spectra_argument()
-    output: File = option(None, "--output", "-o", metavar="DATA.csv", help="Left out: print.")
+    output: File = written((".csv",), "--output", "-o", metavar="DATA.csv", help="Left out: print.")
 
 
 @dataclass(kw_only=True)
 class RamanCheckRequest(RamanLawRequest):
     """How far the paper's linear law is off above 900 K, and what that does to the knee."""
 
-    plot: File = option(None, metavar="FILE.png|.svg|.pdf", help="The check as a figure.")
-    output: File = option(None, "--output", "-o", metavar="FILE.json", help="The numbers.")
+    plot: File = written(FIGURE_TYPES, metavar="FILE.png|.svg|.pdf", help="The check as a figure.")
+    output: File = written((".json",), "--output", "-o", metavar="FILE.json", help="The numbers.")

@@ -1,18 +1,19 @@
 """What is asked of tasks: dataclasses whose fields are options of commands; here on levers.
 
 The command line fills one from what is typed, the app from what is chosen on a page. With each
-field stands what the command line says of it; the docstring of a request is the help of its command
-(`hotlever.tasks.commands`). Requests that share options inherit them.
+field stands what the command line says of it, and of one that names a file whether that is written;
+the docstring of a request is the help of its command (`hotlever.tasks.commands`). Requests that
+share options inherit them.
 """
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 from hotlever.errors import InputError, shown
-from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.files import FIGURE_TYPES, FILM_TYPES, Outputs
 from hotlever.tasks.probes import read_probe
 from hotlever.units import setting
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 MOST_TIMES = 10_000
 
 File = Path | None
+#: How the name of what is written ends if that is a folder.
+FOLDER: tuple[str, ...] = ()
 
 
 def option(default: Any, *names: str, **texts: Any) -> Any:
@@ -38,15 +41,51 @@ def argument(default: Any, **texts: Any) -> Any:
     return field(default=default, metadata={"texts": texts})
 
 
+def written(types: tuple[str, ...], *names: str, default: Any = None, **texts: Any) -> Any:
+    """Return a field of a request that is an option, and names a file of some types, or a folder.
+
+    It is what the task writes.
+    """
+    return field(default=default, metadata={"names": names, "texts": texts, "writes": types})
+
+
 @dataclass(kw_only=True)
-class PlotRequest:
+class Request:
+    """What is asked of a task that writes files."""
+
+    def inputs(self) -> list[Path]:
+        """Return the files that are read: all that fields name and that are not written."""
+        values = [getattr(self, own.name) for own in fields(self) if "writes" not in own.metadata]
+        several = (value if isinstance(value, list) else [value] for value in values)
+        return [path for paths in several for path in paths if isinstance(path, Path)]
+
+    def types_of(self, own: Field[Any]) -> tuple[str, ...]:
+        """Return how the name of a file that is written may end; see `written`."""
+        types: tuple[str, ...] = own.metadata["writes"]
+        return types
+
+    def outputs(self) -> Outputs:
+        """Check the files and folders that are written, none of which is read."""
+        outputs = Outputs(*self.inputs())
+        for own in fields(self):
+            if "writes" in own.metadata:
+                path, types = getattr(self, own.name), self.types_of(own)
+                if types == FOLDER:
+                    outputs.folder(path)
+                else:
+                    outputs.file(path, *types)
+        return outputs
+
+
+@dataclass(kw_only=True)
+class PlotRequest(Request):
     """A figure that is drawn."""
 
-    plot: File = option(None, help="Draw to this file: .png, .svg or .pdf.")
+    plot: File = written(FIGURE_TYPES, help="Draw to this file: .png, .svg or .pdf.")
 
 
 @dataclass(kw_only=True)
-class ProbeRequest:
+class ProbeRequest(Request):
     """A probe as it stands in its file."""
 
     probe: File = argument(
@@ -105,21 +144,9 @@ class LeverRequest(PhysicsRequest, ProbeRequest):
 class TableRequest(PlotRequest):
     """The files of a computed table, and of its figure."""
 
-    output: File = option(
-        None, "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
+    output: File = written(
+        (".csv", ".nc"), "-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."
     )
-
-    @property
-    def output_types(self) -> tuple[str, ...]:
-        """How the name of the table's file may end."""
-        return ".csv", ".nc"
-
-    def outputs(self, *inputs: Path | None) -> Outputs:
-        """Check these files, which are none of the inputs."""
-        outputs = Outputs(*inputs)
-        outputs.file(self.output, *self.output_types)
-        outputs.file(self.plot, *FIGURE_TYPES)
-        return outputs
 
 
 @dataclass(kw_only=True)
@@ -145,10 +172,11 @@ class SweepRequest(TableRequest, LeverRequest):
         help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
         "(minutes; goes on where it was stopped).",
     )
-    map: File = option(
-        None, help="Draw the temperature at the highest tip temperature to this file, as --plot."
+    map: File = written(
+        FIGURE_TYPES,
+        help="Draw the temperature at the highest tip temperature to this file, as --plot.",
     )
-    fields: File = option(None, help="Write the fields of each state as VTU to this folder.")
+    fields: File = written(FOLDER, help="Write the fields of each state as VTU to this folder.")
 
     @property
     def set_points(self) -> tuple[str, str, Array] | None:
@@ -262,15 +290,16 @@ class PulseRequest(TableRequest, LeverRequest, TimesRequest):
         metavar="V",
         help="Highest bias of the controller; 1.5 times that at rest if left out.",
     )
-    gain_map: File = option(None, help="Draw the gains that are stable to this file, as --plot.")
-
-    fields: File = option(None, help="Write the fields as a series of VTU to this folder.")
-    film: File = option(
-        None,
+    gain_map: File = written(
+        FIGURE_TYPES, help="Draw the gains that are stable to this file, as --plot."
+    )
+    fields: File = written(FOLDER, help="Write the fields as a series of VTU to this folder.")
+    film: File = written(
+        FILM_TYPES,
         help="Animate temperature and tip to this file: .gif; a frame for each of --at, or 120.",
     )
-    report: File = option(
-        None, help="Folder for a page of the lever in time; goes without a wave form."
+    report: File = written(
+        FOLDER, help="Folder for a page of the lever in time; goes without a wave form."
     )
 
     def need_no_waveform(self) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from hotlever.errors import HistoryEndError
-from hotlever.files import FIGURE_TYPES, FILM_TYPES, Outputs, output_folder
+from hotlever.files import output_folder
 from hotlever.lever import State
 from hotlever.lever.fields import write_fields_in_time
 from hotlever.lever.transient import (
@@ -50,10 +50,7 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
         return
     given = None if check_control(request) else request.required_waveform()
     until, times = request.end_us, request.times_us
-    outputs = request.outputs(request.probe, request.waveform)
-    outputs.folder(request.fields)
-    outputs.file(request.film, *FILM_TYPES)
-    outputs.file(request.gain_map, *FIGURE_TYPES)
+    outputs = request.outputs()
     lever = make_lever(reporter, request.read_probe(reporter))
     held: Control | None = None
     options: Any = {}
@@ -161,8 +158,7 @@ def _write_page(reporter: Reporter, request: PulseRequest, folder: Path) -> None
     """Write the page of a lever in time."""
     from hotlever.report.transient_pages import transient_page
 
-    outputs = Outputs(request.probe)
-    outputs.folder(folder)
+    outputs = request.outputs()
     lever = make_lever(reporter, request.read_probe(reporter))
     with reporter.progress("sections") as update:
         page = transient_page(lever, update)

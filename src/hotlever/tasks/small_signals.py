@@ -21,7 +21,7 @@ def respond(reporter: Reporter, request: SpectrumRequest) -> None:
     """Find impedance and thermal response to small signals at a bias, or harmonics."""
     swing = None if request.amplitude is None else bias_setting(request.amplitude, "--amplitude")
     volts, frequencies = bias_setting(request.bias, "--bias"), parse_frequencies(request.frequency)
-    outputs = request.outputs(request.probe)
+    outputs = request.outputs()
     lever = make_lever(reporter, request.read_probe(reporter))
     with reporter.progress("spectrum") as update:
         if swing is None:

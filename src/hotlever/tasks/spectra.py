@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from hotlever.errors import InputError
-from hotlever.files import FIGURE_TYPES, Outputs, json_text, write_text
+from hotlever.files import json_text, write_text
 from hotlever.raman.bias_log import join, read_bias_log
 from hotlever.raman.series import to_csv
 from hotlever.tasks.files import draw
@@ -49,8 +49,7 @@ def join_spectra(reporter: Reporter, request: JoinRequest) -> None:
     InputError
         If there is no thermometer, or log and spectra do not belong together.
     """
-    outputs = Outputs(request.bias_log, *request.spectra, *request.files)
-    outputs.file(request.output, ".csv")
+    outputs = request.outputs()
     log = read_bias_log(request.bias_log)
     setup = set_up(reporter, request)
     if setup.thermometer is None:
@@ -70,9 +69,7 @@ def check_linear_law(reporter: Reporter, request: RamanCheckRequest) -> None:
     """Say how far the paper's linear law of Raman shifts is off above 900 K."""
     from hotlever.studies.raman_check import conclusion, paper_check
 
-    outputs = Outputs(request.calibration)
-    outputs.file(request.plot, *FIGURE_TYPES)
-    outputs.file(request.output, ".json")
+    outputs = request.outputs()
     check = paper_check(calibration_named(request.calibration))
     said = conclusion(check)
     with outputs.together():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hotlever.errors import ComputationError, InputError, as_far_as_possible
-from hotlever.files import FIGURE_TYPES, output_folder
+from hotlever.files import output_folder
 from hotlever.lever import State, sweep_csv, write_sweep
 from hotlever.lever.set_points import HeldStates, hold
 from hotlever.tasks.files import draw
@@ -29,9 +29,7 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
     ComputationError
         If it has no state at some of them; what was reached is written.
     """
-    outputs = request.outputs(request.probe)
-    outputs.file(request.map, *FIGURE_TYPES)
-    outputs.folder(request.fields)
+    outputs = request.outputs()
     probe = request.read_probe(reporter)
     held = request.set_points
     biases = parse_bias(request.bias, probe.lowest_bias_V)
