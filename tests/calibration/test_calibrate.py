@@ -29,7 +29,10 @@ from made_up import GONE, damaged
 from synthetic_curves import measured_curve, measurement_of
 
 #: Keys of the budget after the GUM, which older files have not.
-GUM = ("gum", "gum_bias_V", "effective_dof", "coverage_factor", "expanded_uncertainty_K")
+GUM = (
+    *("gum", "gum_bias_V", "effective_dof", "coverage_factor", "expanded_uncertainty_K"),
+    *("gum_monte_carlo", "gum_linear"),
+)
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 
@@ -124,7 +127,7 @@ def test_the_budget_after_the_gum_is_the_table_s_row_by_row(calibrated, tmp_path
         assert (row["dof"] is None) == (row["type"] == "B")
     # of forty data and one more, the fit has taken up several
     assert 15.0 < rows[0]["dof"] < 40.0
-    assert content["expanded_uncertainty_K"] == content["coverage_factor"] * calibrated.gum.u
+    assert content["expanded_uncertainty_K"] == content["coverage_factor"] * calibrated.gum.budget.u
     effective = stderr**4 / (rows[0]["contribution_K"] ** 4 / rows[0]["dof"])
     assert content["effective_dof"] == pytest.approx(effective)
     old = {key: value for key, value in content.items() if key not in GUM}
@@ -313,6 +316,7 @@ def test_a_fit_as_object_or_file_and_data_as_object_or_file_are_one(shared_fit, 
         (("notes",), {}, "notes = {}"),
         (("gum_bias_V",), 99.0, "gum_bias_V: expected the bias of a row of the table"),
         (("gum", 0, "type"), "C", "gum.0.type = 'C'"),
+        (("gum_correlation",), [[1.0]], "gum_correlation: expected 2"),
     ],
 )
 def test_damaged_calibration_files_get_one_line(calibrated, tmp_path, keys, value, message):
@@ -402,12 +406,17 @@ def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, re
     other = replace(measurement_of(measured_curve(air, rng, to_V=12.0)), medium="air")
     fitted = fit(vacuum, Probe.reference(), fixed={"p": None})
     both = calibrate(other, fit=fitted)
-    (earlier,) = (row for row in both.gum.inputs if row.quantity == "fit")
-    assert both.gum.u == pytest.approx(both.table.tip_stderr_K[-1].item(), rel=1e-6)
-    assert earlier.contribution == pytest.approx(both.table.budget_K.sel(source="fit")[-1].item())
-    # how many degrees of freedom a fit to other data has is not known
-    assert np.isnan(both.gum.dof)
+    # what the fit has left is correlated, so that there are no degrees of freedom
+    budget = both.gum.budget
+    earlier = [row.quantity.endswith(" of the fit") for row in budget.inputs]
+    of_fit = both.table.budget_K.sel(source="fit")[-1].item()
+    assert budget.part(np.flatnonzero(earlier)).u == pytest.approx(of_fit, rel=1e-6)
+    assert budget.u == pytest.approx(both.table.tip_stderr_K[-1].item(), rel=1e-6)
+    assert np.isnan(budget.dof)
+    np.testing.assert_array_equal(np.diag(budget.correlation), 1.0)
+    assert np.count_nonzero(budget.correlation) == len(earlier) - sum(earlier) + sum(earlier) ** 2
     content = both.content()
+    assert len(content["gum_correlation"]) == len(content["gum"])
     assert content["effective_dof"] is None
     assert both.file().model_validate(content, context="").result().content() == content
     assert both.medium == "air"

@@ -42,9 +42,12 @@ def test_errors_hold_both_media_where_the_data_do_not_tell(cold, reference):
     np.testing.assert_allclose(table.tip_stderr_K**2, own.tip_stderr_K**2 + away**2 / 2, rtol=0.01)
     for limit, hold in (("tip_low_K", np.minimum), ("tip_high_K", np.maximum)):
         np.testing.assert_allclose(table[limit], hold(own[limit], other[limit]), atol=0.05)
-    assert either.gum.inputs[-1].quantity == "medium"
-    at_budget = table.tip_stderr_K.sel(bias=either.gum_bias_V).item()
-    assert either.gum.u == pytest.approx(at_budget, rel=1e-6)
+    assert either.gum.budget.inputs[-1].quantity == "medium"
+    at_budget = table.sel(bias=either.gum.bias_V)
+    assert either.gum.budget.u == pytest.approx(at_budget.tip_stderr_K.item(), rel=1e-6)
+    assert either.gum.limits_K == (at_budget.tip_low_K, at_budget.tip_high_K)
+    # the Monte Carlo method's interval holds both media, as the limits do
+    assert either.gum.monte_carlo.agrees(either.gum.limits_K, either.gum.budget.tolerance)
     true = reference.tip_temperature(table.power_mW)
     assert np.all((table.tip_low_K <= true) & (true <= table.tip_high_K))
 

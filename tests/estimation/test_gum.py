@@ -1,12 +1,14 @@
-"""The GUM's own examples, to the digits that it prints."""
+"""The GUM's own examples, to the digits that it prints, and the Monte Carlo method."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.special import ndtri
+from scipy.stats import irwinhall
 
-from hotlever.estimation.gum import Budget, InputQuantity
+from hotlever.estimation.gum import Budget, CoverageInterval, InputQuantity, propagate
 
 #: JCGM 100, Table H.2: V (V), I (A) and φ (rad) of five observations.
 OBSERVED = np.array(
@@ -101,3 +103,40 @@ def test_the_thermometer_of_h_3():
     assert (round(slope, 5), round(u_slope, 5)) == (0.00218, 0.00067)
     assert round(correlation[0, 1], 3) == -0.930
     assert (round(cold + 10.0 * slope, 4), round(budget.u, 4)) == (-0.1494, 0.0041)
+
+
+def test_trials_are_added_until_both_ends_are_settled():
+    """The sum of four rectangular quantities of unit variance, whose quantiles are exact."""
+    random, half = np.random.default_rng(0), np.sqrt(3.0)
+
+    def draw(count):
+        return random.uniform(-half, half, (count, 4)).sum(axis=1)
+
+    few, many = (propagate(draw, tolerance) for tolerance in (1.0, 0.1))
+    share = brentq(lambda at: irwinhall.cdf(at, 4) - 0.975, 2.0, 4.0)
+    end = 2.0 * half * (share - 2.0)
+    assert (many.low, many.high) == pytest.approx((-end, end), abs=0.02)
+    assert 20_000 <= few.trials < many.trials
+    # ± 1.96 u is wider than that: by less than half a unit of one digit of u, more than of two
+    budget = Budget((row(1.0),) * 4)
+    around = -budget.expanded(), budget.expanded()
+    assert many.agrees(around, budget.tolerance)
+    assert not many.agrees(around, 0.1 * budget.tolerance)
+
+
+def test_a_bent_measurand_does_not_agree_and_one_without_uncertainty_tells_nothing():
+    assert not CoverageInterval(20_000, -1.2, 2.9).agrees(
+        (-1.96, 1.96), Budget((row(1.0),)).tolerance
+    )
+    assert np.isnan(Budget((row(0.0),)).tolerance)
+    assert not CoverageInterval(0, np.nan, np.nan).agrees((-1.96, 1.96), 5.0)
+
+
+def test_part_of_a_budget_keeps_what_is_correlated():
+    _, _, _, budget = thermometer()
+    ordered = budget.largest_first()
+    assert [row.contribution for row in ordered.inputs] == sorted(
+        (row.contribution for row in budget.inputs), reverse=True
+    )
+    assert ordered.u == pytest.approx(budget.u, rel=1e-12)
+    assert budget.part(np.array([1])).u == pytest.approx(budget.inputs[1].u)

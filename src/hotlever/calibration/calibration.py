@@ -35,10 +35,9 @@ from hotlever.calibration.table import (
     interpolated,
     stored_table,
 )
-from hotlever.calibration.uncertainty_budget import InputSection
+from hotlever.calibration.uncertainty_budget import BudgetFields, TemperatureBudget
 from hotlever.datasets import frame_text
 from hotlever.errors import InputError, unknown_name
-from hotlever.estimation.gum import Budget
 from hotlever.estimation.outcome import (
     IF_ANY,
     Columns,
@@ -100,10 +99,8 @@ class Calibration(Outcome):
         Of the same lever in a pulse.
     converged : bool
         Whether the search for the lever came to its end.
-    gum : Budget, optional
-        The uncertainty budget of one tip temperature; none by the paper's rule.
-    gum_bias_V : float, optional
-        The bias of its row of the table.
+    gum : TemperatureBudget, optional
+        The uncertainty budget of one row of the table; none by the paper's rule.
     """
 
     route: str
@@ -123,8 +120,7 @@ class Calibration(Outcome):
     notes: list[str] = field(default_factory=list)
     pulse: PulseCalibration | None = None
     converged: bool = True
-    gum: Budget | None = None
-    gum_bias_V: float | None = None
+    gum: TemperatureBudget | None = None
 
     lever = "lever like this one"
 
@@ -138,7 +134,6 @@ class Calibration(Outcome):
             "k_stderr": np.nan,
             "pulse": None,
             "gum": None,
-            "gum_bias_V": None,
         }
 
     @property
@@ -228,9 +223,7 @@ class Calibration(Outcome):
             table={name: self.table[name].values for name in self.columns},
             budget_K=budget,
             apex_budget_K=budget_of(self.table, BUDGETS[1]) or None,
-            effective_dof=None if gum is None else gum.dof,
-            coverage_factor=None if gum is None else gum.coverage_factor(),
-            expanded_uncertainty_K=None if gum is None else gum.expanded(),
+            **({} if gum is None else BudgetFields.fields_of(gum)),
             data=MeasurementSection.of(self.measurement),
             request=request,
         )
@@ -279,22 +272,13 @@ _Pulse = Annotated[
     PulseCalibration,
     stored_as(PulseSection, PulseSection.calibration, PulseCalibration.section),
 ]
-_Gum = Annotated[
-    Budget,
-    stored_as(
-        list[InputSection],
-        lambda rows: Budget(tuple(row.row() for row in rows)),
-        lambda budget: [InputSection.of(row).model_dump() for row in budget.inputs],
-    ),
-]
 
 
-class CalibrationFile(ResultFile[Calibration]):
+class CalibrationFile(BudgetFields, ResultFile[Calibration]):
     """What a calibration file holds: the schema that it is written and read by.
 
-    Beside what a `Calibration` has: of the knee ``tip_K`` and whether it was measured, the
-    largest errors in the table, all in all and by source, and what follows from the budget ``gum``
-    for 95 % at its bias.
+    Beside what a `Calibration` has: of the knee ``tip_K`` and whether it was measured, and the
+    largest errors in the table, all in all and by source.
     """
 
     route: str
@@ -313,11 +297,6 @@ class CalibrationFile(ResultFile[Calibration]):
     apex_budget_K: dict[str, Vector] | None = IF_ANY
     measured_rms_K: Number = np.nan
     pulse: _Pulse | None = IF_ANY
-    gum: _Gum | None = IF_ANY
-    gum_bias_V: float | None = IF_ANY
-    effective_dof: Number | None = IF_ANY
-    coverage_factor: float | None = IF_ANY
-    expanded_uncertainty_K: float | None = IF_ANY
 
     @field_serializer("power_law")
     def _with_threshold(self, law: PowerLaw | None) -> dict[str, float] | None:
@@ -328,6 +307,7 @@ class CalibrationFile(ResultFile[Calibration]):
         check_rows(self.table, self.budget_K, "bias", str(info.context), self.apex_budget_K)
         if self.gum is not None and self.gum_bias_V not in self.table["bias_V"]:
             raise InputError(f"{info.context}: gum_bias_V: expected the bias of a row of the table")
+        self.check_correlation(str(info.context))
         return self
 
     def result(self) -> Calibration:
@@ -335,13 +315,15 @@ class CalibrationFile(ResultFile[Calibration]):
         knee = {name: self.knee[name] for name in Knee.__dataclass_fields__ if name in self.knee}
         more = [name for name in (TOTAL_POWER, *OF_THE_CONTACT) if name in self.table]
         names, apex = [*TABLE_COLUMNS, *more], self.apex_budget_K
+        table = stored_table(self.table, self.budget_K, names, of_apex=apex)
         return Calibration(
             law_residual_K=self.power_law_residual_K,
             knee_tip_K=self.knee.get("tip_K", np.nan),
             **self.attributes_of(Calibration)
             | {
                 "knee": Knee(**knee),
-                "table": stored_table(self.table, self.budget_K, names, of_apex=apex),
+                "table": table,
+                "gum": self.temperature_budget(table),
             },
         )
 

@@ -192,12 +192,12 @@ def calibrated_by_estimate(
         for source, error in budget_of(tip.table).items()
         if source in ("model", "jump")
     }
+    limits = tip.table.tip_low_K.values[row].item(), tip.table.tip_high_K.values[row].item()
     if by_power:
         law, residual = law_of_model(vacuum, None if threshold is None else threshold.power_mW)
     return Calibration(
         table=tip.table,
-        gum=budget_of_estimate(estimate, priors, tip.slopes[row], model),
-        gum_bias_V=float(bias[row]),
+        gum=budget_of_estimate(estimate, priors, float(bias[row]), limits, model),
         route=route,
         medium=medium,
         power_law=law,

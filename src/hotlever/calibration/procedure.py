@@ -15,7 +15,6 @@ from hotlever.calibration.plausibility import check_plausible
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
 from hotlever.calibration.table import BUDGETS, budget_of, table_with_budget
-from hotlever.calibration.uncertainty_budget import correction
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
@@ -176,7 +175,8 @@ def _in_either(result: Calibration, other: Calibration) -> Calibration:
         )
     )
     gum = result.gum
-    if gum is not None and result.gum_bias_V is not None:
-        choice = np.interp(result.gum_bias_V, columns["bias_V"], choices["tip_K"]).item()
-        gum = replace(gum, inputs=(*gum.inputs, correction("medium", choice)))
+    if gum is not None and other.gum is not None:
+        row = columns["bias_V"].tolist().index(gum.bias_V)
+        limits = columns["tip_low_K"][row].item(), columns["tip_high_K"][row].item()
+        gum = gum.in_either(other.gum, choices["tip_K"][row].item(), limits)
     return replace(result, table=table_with_budget(columns, parts, of_apex=of_apex), gum=gum)

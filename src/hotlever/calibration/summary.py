@@ -10,6 +10,7 @@ import xarray as xr
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.pulses import PulseCalibration
 from hotlever.calibration.table import BUDGETS
+from hotlever.calibration.uncertainty_budget import TemperatureBudget
 from hotlever.estimation.summary import NEAREST, prior_lines
 from hotlever.text import aligned, significant, value_with_error
 from hotlever.types import Array
@@ -66,6 +67,8 @@ def calibration_parts(calibration: Calibration) -> Parts:
         stated = significant(calibration.tip_temperature_uncertainty_K)
         sure = f"sure to ± {stated} K (standard error, largest in the table)"
         after.append(f"{sure}: {_verdict(calibration)}")
+        if calibration.gum is not None:
+            after.append(_budget_line(calibration.gum))
     else:
         knee = [f"its knee: {_knee_point(calibration)}"] if calibration.knee.measured else []
         before = [calibration.doubt, f"{NEAREST}; it is {basis}", *knee]
@@ -83,6 +86,39 @@ def calibration_text(calibration: Calibration) -> str:
     for caption, rows in parts.tables:
         lines += ["", *([f"{caption}:"] if caption else []), *aligned(rows, right=True)]
     return "\n".join([*lines, *([""] if parts.tables else []), *parts.after])
+
+
+def _budget_line(stated: TemperatureBudget) -> str:
+    """Return what the uncertainty budget comes to."""
+    away = significant(stated.budget.expanded())
+    linear = linear_words(stated)
+    return (
+        f"uncertainty budget at a bias of {stated.bias_V:.4g} V: {stated.estimate_K:.0f} K ± "
+        f"{away} K (95 %, k = {stated.budget.coverage_factor():.2f})" + (linear and f"; {linear}")
+    )
+
+
+def linear_words(stated: TemperatureBudget) -> str:
+    """Say whether the linear budget holds; nothing of a file that does not tell."""
+    interval = stated.monte_carlo
+    if interval is None:
+        return ""
+    if np.isnan(interval.low):
+        return (
+            "not linear: levers within its errors have no state at this bias, so that the Monte "
+            "Carlo method (JCGM 101) fails"
+        )
+    trials = (
+        f"95 % of {interval.trials} Monte Carlo trials lie from {interval.low:.0f} to "
+        f"{interval.high:.0f} K (JCGM 101, within {stated.budget.tolerance:g} K)"
+    )
+    if stated.linear:
+        return f"linear: {trials}"
+    low, high = stated.limits_K
+    return (
+        f"not linear: {trials}, the table's limits are {low:.0f} and {high:.0f} K; the widest of "
+        "these and the budget's hold"
+    )
 
 
 def _law_line(calibration: Calibration) -> str:

@@ -71,8 +71,6 @@ class TipByBias(NamedTuple):
     table : xarray.Dataset
         At even biases, and more where the tip is steep, see `hotlever.calibration.table`; the
         limits are as far away as the errors say, unless these do not hold.
-    slopes : ndarray, shape (rows, p)
-        Derivatives of the tip temperature there by what is varied.
     jumps : list of Jump
         Between measured rows.
     asymmetry : str
@@ -80,7 +78,6 @@ class TipByBias(NamedTuple):
     """
 
     table: xr.Dataset
-    slopes: Array
     jumps: list[Jump]
     asymmetry: str
 
@@ -131,7 +128,7 @@ def tip_by_bias(
     if not circuit.starts_cold:
         total = table.power_mW.values + _held_power(estimate, bias)
         table[TOTAL_POWER] = quantity(TOTAL_POWER, "bias", total)
-    return TipByBias(table, slopes, jumps, asymmetry)
+    return TipByBias(table, jumps, asymmetry)
 
 
 def tips_in_contact(estimate: Estimate) -> tuple[Array, Array]:

@@ -1,38 +1,115 @@
-"""The uncertainty budget of the tip temperature at one bias, after the GUM (JCGM 100:2008).
+"""The uncertainty budget of a temperature at one bias, after the GUM (JCGM 100:2008).
 
 Its rows are what the standard errors by source of a table sum up, one by one: noise of each
-observable, scales, priors, and what the model leaves out. They are independent of each other.
+observable, scales, priors, and what the model leaves out. They are independent of each other, but
+for the parameters that a fit to other data has left. Whether a linear budget holds is told by the
+Monte Carlo method (JCGM 101:2008).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
+import xarray as xr
 
-from hotlever.estimation.gum import Budget, InputQuantity
+from hotlever.errors import ComputationError, InputError
+from hotlever.estimation.curvature import CurvedQuantity
+from hotlever.estimation.gum import Budget, CoverageInterval, InputQuantity, propagate
 from hotlever.estimation.inverse_problem import Estimate
-from hotlever.estimation.outcome import Section
+from hotlever.estimation.outcome import IF_ANY, Matrix, Section
+from hotlever.estimation.prior_density import PriorDensity
 from hotlever.measurands import FITTED
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import SCALES, PriorUse
 from hotlever.records import Number
+from hotlever.text import BAND
 from hotlever.types import Array
 
-#: What a fit to other data of the lever leaves: one row, of which no degrees of freedom are known.
+#: Where the density of priors comes from an earlier estimate.
 _FIT = "fit"
 
 
 def correction(quantity: str, u: float) -> InputQuantity:
-    """Return the row of a correction of the tip temperature (K) that is zero with an error."""
-    dof = np.nan if quantity == _FIT else np.inf
-    return InputQuantity(quantity, 0.0, "K", u, "B", "normal", 1.0, dof)
+    """Return the row of a correction of a temperature (K) that is zero with an error."""
+    return InputQuantity(quantity, 0.0, "K", u, "B", "normal", 1.0)
+
+
+@dataclass(frozen=True)
+class TemperatureBudget:
+    """The uncertainty budget of a temperature, and whether it may be linear.
+
+    Attributes
+    ----------
+    budget : Budget
+        In K.
+    bias_V : float
+    estimate_K : float
+    limits_K : (float, float)
+        What 95 % of the temperatures lie between as the table says: the errors say no more, where
+        levers that are hotter and colder, or samples of the posterior, do not tell otherwise.
+    monte_carlo : CoverageInterval, optional
+        Of 95 %, in K; NaN if levers so near by have no states. None in files without one.
+    """
+
+    budget: Budget
+    bias_V: float
+    estimate_K: float
+    limits_K: tuple[float, float]
+    monte_carlo: CoverageInterval | None = None
+
+    @property
+    def linear(self) -> bool | None:
+        """Whether the linear budget holds (JCGM 101, 8.1); None if that is not known.
+
+        Both the Monte Carlo method and the limits must be where it says within half a unit of the
+        first significant digit of u.
+        """
+        if self.monte_carlo is None:
+            return None
+        tolerance = self.budget.tolerance
+        of_table = CoverageInterval(0, *self.limits_K)
+        linearised = self._about(BAND * self.budget.u)
+        return self.monte_carlo.agrees(self.interval_K, tolerance) and of_table.agrees(
+            linearised, tolerance
+        )
+
+    @property
+    def interval_K(self) -> tuple[float, float]:
+        """Estimate minus and plus the expanded uncertainty for 95 %."""
+        return self._about(self.budget.expanded())
+
+    def _about(self, away_K: float) -> tuple[float, float]:
+        return self.estimate_K - away_K, self.estimate_K + away_K
+
+    def in_either(
+        self, other: TemperatureBudget, choice_K: float, limits_K: tuple[float, float]
+    ) -> TemperatureBudget:
+        """Return the budget of a lever that may be in another medium as well.
+
+        The choice adds an error, and the limits hold both.
+        """
+        inputs = (*self.budget.inputs, correction("medium", choice_K))
+        correlation = self.budget.correlation
+        if correlation is not None:
+            correlation = np.pad(correlation, (0, 1))
+            correlation[-1, -1] = 1.0
+        own, others = self.monte_carlo, other.monte_carlo
+        united = None if own is None or others is None else own.united(others)
+        return replace(
+            self, budget=Budget(inputs, correlation), limits_K=limits_K, monte_carlo=united
+        )
 
 
 def budget_of_estimate(
-    estimate: Estimate, priors: Mapping[str, PriorUse], slopes: Array, model: Mapping[str, float]
-) -> Budget:
+    estimate: Estimate,
+    priors: Mapping[str, PriorUse],
+    bias_V: float,
+    limits_K: tuple[float, float],
+    model: Mapping[str, float],
+) -> TemperatureBudget:
     """Return the budget of a tip temperature.
 
     Parameters
@@ -40,12 +117,16 @@ def budget_of_estimate(
     estimate : Estimate
     priors : mapping of str to PriorUse
         Of the parameters and the scales.
-    slopes : ndarray, shape (p,)
-        Derivatives of the tip temperature by what is varied.
+    bias_V : float
+    limits_K : (float, float)
+        See `TemperatureBudget`.
     model : mapping of str to float
         Standard errors (K) beside those of the parameters, by source.
     """
     residuals, objective = estimate.residuals, estimate.objective
+    predicted = estimate.predicted(np.array([bias_V]))
+    observable = list(FITTED).index("tip")
+    slopes = predicted.slopes[observable, 0, objective.columns]
     moved = {name: slopes @ by for name, by in estimate.posterior.influences.items()}
     u = residuals.noise(estimate.prediction.values).tolist()
     leverage = objective.leverage(estimate.prediction.slopes, objective.point(estimate.probe))
@@ -57,30 +138,114 @@ def budget_of_estimate(
         noise, unit = f"noise of {name}", FITTED[name].unit
         rows.append(InputQuantity(noise, 0.0, unit, size, kind, "normal", sensitivity, free))
     units = {name: each.unit for name, each in parameters_of(estimate.probe, anywhere=True).items()}
+    units |= dict.fromkeys(SCALES, "1")
+    by_fit = moved.pop(_FIT, None)
     for name, by in moved.items():
-        if name == _FIT:
-            rows.append(correction(name, float(np.linalg.norm(by))))
-            continue
-        use, unit = priors[name], "1" if name in SCALES else units[name]
+        use = priors[name]
+        sensitivity = by.item() / use.spread
         rows.append(
             InputQuantity(
-                quantity=name,
-                estimate=use.value,
-                unit=unit,
-                u=use.spread,
-                type="B",
-                distribution=use.distribution,
-                sensitivity=by.item() / use.spread,
+                name, use.value, units[name], use.spread, "B", use.distribution, sensitivity
             )
         )
-    return Budget((*rows, *(correction(name, error) for name, error in model.items())))
+    rows += [correction(name, error) for name, error in model.items()]
+    correlation = None
+    if by_fit is not None:
+        of_fit, among = _rows_of_fit(objective.prior, by_fit, units)
+        correlation = np.eye(len(rows) + len(of_fit))
+        correlation[len(rows) :, len(rows) :] = among
+        rows += of_fit
+    budget = Budget(tuple(rows), correlation)
+    value, other = float(predicted.values[observable, 0]), float(np.linalg.norm([*model.values()]))
+    made = TemperatureBudget(budget, bias_V, value, limits_K)
+    if not budget.u > 0.0:
+        return made
+    free = dict(zip(residuals.observables, dof, strict=True))
+    try:
+        curved = CurvedQuantity(estimate.posterior, predicted, observable)
+    except (ComputationError, np.linalg.LinAlgError):
+        return replace(made, monte_carlo=CoverageInterval(0, np.nan, np.nan))
+    errors = _Errors(curved, estimate.posterior.influences, free)
+
+    def draw(count: int) -> Array:
+        return value + curved.changes(errors.draw(count)) + other * errors.random.normal(size=count)
+
+    return replace(made, monte_carlo=propagate(draw, budget.tolerance))
+
+
+def _rows_of_fit(
+    prior: PriorDensity, by_fit: Array, units: Mapping[str, str]
+) -> tuple[list[InputQuantity], Array]:
+    """Return the parameters that a fit to other data has left as rows, and their correlation.
+
+    By how uncorrelated deviations of that fit move the temperature, (m,).
+    """
+    numbers = [number for number, source in enumerate(prior.sources) if source == _FIT]
+    whitening = prior.whitening[np.ix_(numbers, numbers)]
+    relative, values = prior.relative[numbers], prior.values[numbers]
+    unit = np.where(relative, values, 1.0)
+    covariance = np.linalg.inv(whitening.T @ whitening)
+    spread = np.sqrt(np.diag(covariance))
+    rows = [
+        InputQuantity(
+            f"{prior.names[number]} of the fit",
+            value,
+            units[prior.names[number]],
+            u,
+            "B",
+            "log-normal" if logarithmic else "normal",
+            sensitivity,
+        )
+        for number, value, u, logarithmic, sensitivity in zip(
+            numbers,
+            values.tolist(),
+            (spread * unit).tolist(),
+            relative.tolist(),
+            (by_fit @ whitening / unit).tolist(),
+            strict=True,
+        )
+    ]
+    return rows, covariance / np.outer(spread, spread)
+
+
+class _Errors:
+    """Errors of an estimate along the axes of a quantity, drawn from the distributions of a budget.
+
+    What is of Type A has the tails of a Student's t of its degrees of freedom (JCGM 101, 6.4.9):
+    all data of an observable share their scatter.
+    """
+
+    def __init__(
+        self, curved: CurvedQuantity, influences: Mapping[str, Array], dof: Mapping[str, float]
+    ) -> None:
+        self.random = np.random.default_rng(0)
+        moved = {name: curved.axes_of(influences[name]) for name in dof if np.isfinite(dof[name])}
+        shares = [(moves @ moves.T, dof[name]) for name, moves in moved.items()]
+        axes = np.eye(len(next(iter(influences.values()))))
+        rest = axes - sum(share for share, _ in shares)
+        self._roots = [(_root(share), free) for share, free in [*shares, (rest, np.inf)]]
+
+    def draw(self, count: int) -> Array:
+        """Return errors along the axes, (count, p)."""
+        errors = np.zeros((count, len(self._roots[0][0])))
+        for root, free in self._roots:
+            normal = self.random.normal(size=errors.shape) @ root
+            if np.isfinite(free):
+                normal *= np.sqrt(free / self.random.chisquare(free, size=(count, 1)))
+            errors += normal
+        return errors
+
+
+def _root(covariance: Array) -> Array:
+    """Return the symmetric root of a covariance, of which rounding may have left less than none."""
+    variances, axes = np.linalg.eigh(covariance)
+    return np.asarray((axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T)
 
 
 class InputSection(Section):
     """A row of a budget as calibration files hold it.
 
-    Without degrees of freedom its uncertainty is taken as exact; or it is that of a fit, of which
-    none are known.
+    Without degrees of freedom its uncertainty is taken as exact.
     """
 
     quantity: str
@@ -100,6 +265,74 @@ class InputSection(Section):
 
     def row(self) -> InputQuantity:
         """Return the row."""
-        unknown = np.isnan(self.dof) and self.quantity != _FIT
         values = self.attributes_of(InputQuantity)
-        return InputQuantity(**values | ({"dof": np.inf} if unknown else {}))
+        return InputQuantity(**values | ({"dof": np.inf} if np.isnan(self.dof) else {}))
+
+
+class IntervalSection(Section):
+    """What the Monte Carlo method says, as calibration files hold it; no ends where it failed."""
+
+    trials: int
+    low_K: Number
+    high_K: Number
+    tolerance_K: Number
+
+
+class BudgetFields(Section):
+    """An uncertainty budget as calibration files hold it, with what follows from it for 95 %."""
+
+    gum: list[InputSection] | None = IF_ANY
+    gum_correlation: Matrix | None = IF_ANY
+    gum_bias_V: float | None = IF_ANY
+    effective_dof: Number | None = IF_ANY
+    coverage_factor: float | None = IF_ANY
+    expanded_uncertainty_K: float | None = IF_ANY
+    gum_monte_carlo: IntervalSection | None = IF_ANY
+    gum_linear: bool | None = IF_ANY
+
+    @staticmethod
+    def fields_of(stated: TemperatureBudget) -> dict[str, Any]:
+        """Return the values of a budget by field."""
+        budget, interval, section = stated.budget, stated.monte_carlo, None
+        if interval is not None:
+            section = IntervalSection(
+                trials=interval.trials,
+                low_K=interval.low,
+                high_K=interval.high,
+                tolerance_K=budget.tolerance,
+            )
+        return {
+            "gum": [InputSection.of(row) for row in budget.inputs],
+            "gum_correlation": budget.correlation,
+            "gum_bias_V": stated.bias_V,
+            "effective_dof": budget.dof,
+            "coverage_factor": budget.coverage_factor(),
+            "expanded_uncertainty_K": budget.expanded(),
+            "gum_monte_carlo": section,
+            "gum_linear": stated.linear,
+        }
+
+    def check_correlation(self, where: str) -> None:
+        """Raise an error if the correlation is not that of the rows."""
+        if self.gum is None or self.gum_correlation is None:
+            return
+        size = len(self.gum)
+        if self.gum_correlation.shape != (size, size):
+            raise InputError(
+                f"{where}: gum_correlation: expected numbers in {size} × {size} places"
+            )
+
+    def temperature_budget(self, table: xr.Dataset) -> TemperatureBudget | None:
+        """Return the budget of a row of a table, if there is one."""
+        if self.gum is None:
+            return None
+        row, told, interval = table.sel(bias=self.gum_bias_V), self.gum_monte_carlo, None
+        if told is not None:
+            interval = CoverageInterval(told.trials, told.low_K, told.high_K)
+        return TemperatureBudget(
+            Budget(tuple(each.row() for each in self.gum), self.gum_correlation),
+            row.bias_V.item(),
+            row.tip_K.item(),
+            (row.tip_low_K.item(), row.tip_high_K.item()),
+            interval,
+        )

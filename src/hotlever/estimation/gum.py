@@ -1,15 +1,22 @@
-"""Uncertainty budgets after the GUM (JCGM 100:2008)."""
+"""Uncertainty budgets after the GUM (JCGM 100:2008), and their check after JCGM 101:2008."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from scipy.special import stdtrit
 
-from hotlever.types import Array
+from hotlever.types import Array, Index
+
+#: Trials of a block, and the most of all blocks (JCGM 101, 7.9.4 and 7.2.1).
+_BLOCK, _MOST_TRIALS = 10_000, 1_000_000
+#: Ends of an interval are settled within this share of the tolerance that a budget is judged by
+#: (JCGM 101, 8.2).
+_SETTLED = 0.2
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,18 @@ class Budget:
     inputs: tuple[InputQuantity, ...]
     correlation: Array | None = None
 
+    def largest_first(self) -> Budget:
+        """Return the same with the largest contributions first."""
+        return self.part(np.argsort([-row.contribution for row in self.inputs], kind="stable"))
+
+    def part(self, numbers: Index) -> Budget:
+        """Return what some of the inputs, by their numbers, contribute."""
+        inputs = tuple(self.inputs[number] for number in numbers)
+        correlation = self.correlation
+        return Budget(
+            inputs, None if correlation is None else correlation[np.ix_(numbers, numbers)]
+        )
+
     @property
     def _parts(self) -> Array:
         return np.array([row.sensitivity * row.u for row in self.inputs])
@@ -102,3 +121,75 @@ class Budget:
     def expanded(self, probability: float = 0.95) -> float:
         """Return the expanded uncertainty."""
         return self.coverage_factor(probability) * self.u
+
+    @property
+    def tolerance(self) -> float:
+        """Half a unit of the first significant digit of u (JCGM 101, 7.9.2); NaN without one.
+
+        The digit is that of u before it is rounded, so that 9.6 does not count as 10.
+
+        Examples
+        --------
+        >>> row = InputQuantity("x", 0.0, "K", 17.0, "B", "normal", 1.0)
+        >>> Budget((row,)).tolerance
+        5.0
+        """
+        positive = self.u > 0.0
+        return 0.5 * 10.0 ** math.floor(math.log10(self.u)) if positive else math.nan
+
+
+# --- Monte Carlo --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CoverageInterval:
+    """What the Monte Carlo method says of a measurand.
+
+    Attributes
+    ----------
+    trials : int
+    low, high : float
+        The probabilistically symmetric coverage interval.
+    """
+
+    trials: int
+    low: float
+    high: float
+
+    def agrees(self, other: tuple[float, float], tolerance: float) -> bool:
+        """Whether both ends are those of another interval within a tolerance (JCGM 101, 8.1)."""
+        ends = abs(self.low - other[0]), abs(self.high - other[1])
+        return all(end <= tolerance for end in ends)
+
+    def united(self, other: CoverageInterval) -> CoverageInterval:
+        """Return the interval that holds this one and another."""
+        low, high = min(self.low, other.low), max(self.high, other.high)
+        return CoverageInterval(self.trials + other.trials, low, high)
+
+
+def propagate(
+    draw: Callable[[int], Array], tolerance: float, probability: float = 0.95
+) -> CoverageInterval:
+    """Propagate distributions by as many trials as it takes (JCGM 101, 7.9.4).
+
+    Parameters
+    ----------
+    draw : callable
+        Return so many independent values of the measurand, (n,).
+    tolerance : float
+        By which a budget will be judged: blocks are added until two standard deviations of the
+        mean of both ends are within a fifth of it.
+    probability : float
+        Of coverage.
+    """
+    tails = 0.5 * (1.0 - probability), 0.5 * (1.0 + probability)
+    blocks = [draw(_BLOCK)]
+    ends = [np.quantile(blocks[0], tails)]
+    while len(blocks) * _BLOCK < _MOST_TRIALS:
+        blocks.append(draw(_BLOCK))
+        ends.append(np.quantile(blocks[-1], tails))
+        spread = 2.0 * np.std(ends, axis=0, ddof=1).max() / math.sqrt(len(ends))
+        if not spread > _SETTLED * tolerance:
+            break
+    low, high = np.quantile(np.concatenate(blocks), tails).tolist()
+    return CoverageInterval(len(blocks) * _BLOCK, low, high)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
 import xarray as xr
 
 from hotlever import figures
@@ -14,16 +13,13 @@ from hotlever.calibration.summary import calibration_parts
 from hotlever.calibration.table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, even_rows
 from hotlever.datasets import QUANTITIES
 from hotlever.estimation.batch import Batch
-from hotlever.estimation.gum import Budget
 from hotlever.materials.parameters import sentence
+from hotlever.report.budget_page import add_largest
 from hotlever.report.fit_pages import add_remarks
 from hotlever.report.page import Block, Page
-from hotlever.text import significant, with_unit
 
 #: Rows of a calibration's table that are shown, about.
 _ROWS = 15
-#: Rows of its uncertainty budget, of which the others are shown together.
-_CONTRIBUTIONS = 10
 
 
 def calibration_page(
@@ -63,47 +59,10 @@ def calibration_page(
         + ("for the instrument." if described else "of the nearest lever, not for an instrument."),
     )
     if calibration.gum is not None:
-        _add_gum(page, calibration, calibration.gum)
+        add_largest(page, calibration.gum)
     for note in calibration.notes:
         page.text(sentence(note))
     return page
-
-
-def _add_gum(page: Page, calibration: Calibration, gum: Budget) -> None:
-    """Add the uncertainty budget of one tip temperature, the largest contributions first."""
-    stated = calibration.table.sel(bias=calibration.gum_bias_V)
-    rows = sorted(gum.inputs, key=lambda row: row.contribution, reverse=True)
-    cells = [
-        [
-            row.quantity,
-            with_unit(f"{row.estimate:.4g}", row.unit),
-            with_unit(significant(row.u), row.unit),
-            row.type,
-            row.distribution,
-            with_unit(f"{row.sensitivity:.3g}", _per(row.unit)),
-            f"{row.contribution:.1f}",
-            f"{row.dof:.0f}" if np.isfinite(row.dof) else "∞" if np.isinf(row.dof) else "",
-        ]
-        for row in rows[:_CONTRIBUTIONS]
-    ]
-    if rest := rows[_CONTRIBUTIONS:]:
-        together = f"{Budget(tuple(rest)).u:.1f}"
-        cells.append([f"{len(rest)} more, together", *[""] * 5, together, ""])
-    head = ["quantity", "estimate", "u", "type", "distribution", "sensitivity", "in K", "dof"]
-    effective = f"{gum.dof:.0f} effective degrees of freedom, " if np.isfinite(gum.dof) else ""
-    page.table(
-        head,
-        cells,
-        f"The uncertainty budget after the GUM (JCGM 100) of {stated.tip_K.item():.1f} K at a "
-        f"bias of {stated.bias_V.item():.4g} V, linearised: standard uncertainty "
-        f"{significant(gum.u)} K, {effective}k = {gum.coverage_factor():.2f}, expanded uncertainty "
-        f"{significant(gum.expanded())} K (95 %).",
-    )
-
-
-def _per(unit: str) -> str:
-    """Return the unit of kelvins per another one."""
-    return {"K": "1", "1": "K"}.get(unit, f"K/({unit})" if " " in unit else f"K/{unit}")
 
 
 def calibrations_page(batch: Batch[Calibration], levers: xr.Dataset) -> Page:

@@ -24,6 +24,7 @@ Block = dict[str, Any]
 
 #: Sections from which on a page has a list of them.
 _CONTENTS_FROM = 5
+_PAGE = re.compile(r"\b(\w+\.html)\b")
 _DOI = re.compile(r"doi:(10\.\d{4,9}/[^\s,;]*[^\s,;.])")
 
 
@@ -45,9 +46,9 @@ def _anchor(text: str) -> str:
 
 
 def _with_links(text: str) -> Markup:
-    """Return a text whose DOIs are links."""
+    """Return a text whose DOIs and other pages are links."""
     link = r'<a href="https://doi.org/\1">doi:\1</a>'
-    return Markup(_DOI.sub(link, str(escape(text))))
+    return Markup(_PAGE.sub(r'<a href="\1">\1</a>', _DOI.sub(link, str(escape(text)))))
 
 
 @dataclass
@@ -59,12 +60,15 @@ class Page:
     title, summary : str
     added : callable, optional
         Called with each block as soon as it is there.
+    one_sheet : bool
+        Whether it is printed on one sheet of A4, in small letters.
     blocks : list of dict
     """
 
     title: str
     summary: str = ""
     added: Callable[[Block], None] | None = None
+    one_sheet: bool = False
     blocks: list[Block] = field(default_factory=list)
 
     def _add(self, kind: str, **block: Any) -> None:
@@ -101,7 +105,7 @@ class Page:
         """Add a figure; `name` is its file name without suffix."""
         self._add("figure", name=name, figure=made, caption=caption)
 
-    def write(self, folder: str | os.PathLike[str]) -> Path:
+    def write(self, folder: str | os.PathLike[str], name: str = "index") -> Path:
         """Write the page, and each figure as PDF beside it; return the page's path.
 
         Raises
@@ -110,10 +114,17 @@ class Page:
             If the folder cannot be made or written.
         """
         target = output_folder(folder)
+        path = target / f"{name}.html"
+        write_text(path, self.html(target))
+        return path
+
+    def html(self, figures: Path | None = None) -> str:
+        """Return the text of the page; figures are written as PDF to a folder, if one is given."""
         blocks = []
         for block in self.blocks:
             if block["kind"] == "figure":
-                save_figure(block["figure"], target / f"{block['name']}.pdf")
+                if figures is not None:
+                    save_figure(block["figure"], figures / f"{block['name']}.pdf")
                 image = io.BytesIO()
                 block["figure"].savefig(image, format="png", dpi=160)
                 block = {**block, "image": base64.b64encode(image.getvalue()).decode("ascii")}
@@ -124,12 +135,11 @@ class Page:
             loader=jinja2.PackageLoader("hotlever", "report"), **options
         )
         environment.filters["with_links"] = _with_links
-        html = environment.get_template("page.html.j2").render(
+        return environment.get_template("page.html.j2").render(
             title=self.title,
             summary=self.summary,
             blocks=blocks,
+            one_sheet=self.one_sheet,
             version=__version__,
             contents_from=_CONTENTS_FROM,
         )
-        write_text(target / "index.html", html)
-        return target / "index.html"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hotlever.calibration import Calibration
@@ -87,10 +88,20 @@ def _write(
             write_text(request.table, result.table_csv(**request.table_options()))
         draw(request.plot, lambda figures: figures.calibration_curves(result))
         if request.report is not None:
-            from hotlever.report.calibration_pages import calibration_page
-
-            texts.append(f"report: {calibration_page(result).write(request.report)}")
+            texts.append(f"report: {_report(result, request.report)}")
     reporter.give("\n".join([*texts, ""]))
+
+
+def _report(result: Calibration, folder: Path) -> Path:
+    """Write the page of a calibration, and that of its uncertainty budget; return the former."""
+    from hotlever.report.budget_page import budget_page
+    from hotlever.report.calibration_pages import calibration_page
+
+    page = calibration_page(result)
+    if result.gum is not None:
+        budget_page(result).write(folder, "budget")
+        page.text("The whole uncertainty budget, as one sheet to print: budget.html.")
+    return page.write(folder)
 
 
 def _summary(at: Setting | None, table: dict[str, Any], batch: Batch[Calibration]) -> Summary:
