@@ -14,7 +14,7 @@ from hotlever.calibration.table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, ev
 from hotlever.datasets import QUANTITIES
 from hotlever.estimation.batch import Batch
 from hotlever.materials.parameters import sentence
-from hotlever.report.budget_page import add_largest
+from hotlever.report.budget_pages import add_largest
 from hotlever.report.fit_pages import add_remarks
 from hotlever.report.page import Block, Page
 

@@ -94,7 +94,7 @@ def _write(
 
 def _report(result: Calibration, folder: Path) -> Path:
     """Write the page of a calibration, and that of its uncertainty budget; return the former."""
-    from hotlever.report.budget_page import budget_page
+    from hotlever.report.budget_pages import budget_page
     from hotlever.report.calibration_pages import calibration_page
 
     page = calibration_page(result)
