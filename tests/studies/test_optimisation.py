@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 from hotlever import Lever, Probe
+from hotlever.lever.lever import COARSE
+from hotlever.lever.reader import over_surface
 from hotlever.lever.similar import SimilarLevers
 from hotlever.studies.optimisation import MOST_DESIGNS, optimise
-from hotlever.studies.working_point import QUANTITIES, SolvedDesign, WorkingPoint
+from hotlever.studies.working_point import (
+    OF_THE_READER,
+    QUANTITIES,
+    SolvedDesign,
+    WorkingPoint,
+)
 
 NAMES = ("heater_length_um", "series_resistance_ohm")
 #: Of the knee of a curve through states, differences are known less well.
@@ -25,8 +32,9 @@ def test_derivatives_are_those_of_differences(similar, column):
     probe = similar.drawn
     point = WorkingPoint(column, {"tip_K": 700.0, "bias_V": 6.0, "power_mW": 1.5}[column])
     solved = SolvedDesign(similar, probe, point, NAMES)
-    own = [name for name in QUANTITIES if not name.startswith("knee_")]
-    quantities = QUANTITIES if column == "tip_K" else own
+    exactly = [name for name in QUANTITIES if name not in OF_THE_READER]
+    own = [name for name in exactly if not name.startswith("knee_")]
+    quantities = exactly if column == "tip_K" else own
     exact = {quantity: solved.gradient(quantity) for quantity in quantities}
     for number, name in enumerate(NAMES):
         value = float(probe.values([name])[0])
@@ -44,6 +52,29 @@ def test_derivatives_are_those_of_differences(similar, column):
             assert relative == pytest.approx(0.0, abs=OF_KNEE.get(quantity, 3e-3)), quantity
     if column == "bias_V":
         assert exact["bias_V"] == pytest.approx(np.zeros(2), abs=1e-12)
+
+
+def test_what_a_reader_shows_is_that_of_a_lever_over_a_surface(coarse):
+    probe = coarse.probe.with_(medium="air", surface_gap_um=0.5)
+    lever = Lever(probe, COARSE)
+    solved = SolvedDesign(SimilarLevers(lever), probe, WorkingPoint("bias_V", 9.0))
+    read = over_surface(lever, 0.5, 9.0)
+    for quantity in OF_THE_READER:
+        assert solved.value(quantity) == pytest.approx(read[quantity].item(), rel=1e-6), quantity
+
+
+@pytest.mark.slow
+def test_a_reader_is_most_sensitive_where_others_are_less():
+    """Beside levers on meshes and with panels of their own."""
+    probe, name = Probe.reference().with_(medium="air", surface_gap_um=0.5), "heater_width_um"
+    point, quantity = WorkingPoint("tip_K", 500.0), "dlnR_dz_per_um"
+    optimum = optimise(probe, quantity, point, {name: (0.8, 4.5)}, greatest=True)
+    best = getattr(optimum.best.probe.shape, name)
+    for width in (0.85 * best, 1.15 * best):
+        beside = probe.with_(**{name: width})
+        other = SolvedDesign(SimilarLevers(Lever(beside)), beside, point)
+        assert other.value(quantity) < optimum.best.value(quantity)
+    assert (optimum.limits, optimum.reason) == ((), "")
 
 
 def test_the_greatest_power_is_that_of_a_matched_load():
@@ -87,6 +118,7 @@ def test_a_search_that_is_cut_off_has_the_best_that_it_saw(monkeypatch):
         (["--minimise", "power_mW", "--within", "n_d=2e17:1e17"], "expected a rising range"),
         (["--minimise", "power_mW", "--maximise", "tip_K"], "found both, expected one"),
         (["--within", "n_d=1e17:1e18"], "goes with --minimise"),
+        (["--maximise", "dlnR_dz_per_um", "--within", "n_d=1e17:1e18"], "expected surface_gap_um"),
         (["--minimise", "power_mW", "--at", "7kg"], "or a tip temperature as 700K"),
         (["--minimise", "power_mW", "-o", "best.csv"], "expected .toml"),
     ],

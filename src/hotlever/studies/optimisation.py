@@ -2,7 +2,9 @@
 
 Sequential quadratic programming (SciPy's SLSQP; D. Kraft, DFVLR-FB 88-28 (1988)) over dimensions,
 material parameters and the series resistor, each within bounds, and with bounds on other
-quantities too. One branch is solved for each design that is tried.
+quantities too. One branch is solved for each design that is tried; where it is asked how
+sensitively distances are read, of a coarse lever with panels of its own, and two for each
+derivative. Start and best are always solved on the usual mesh.
 """
 
 from __future__ import annotations
@@ -15,15 +17,24 @@ import numpy as np
 
 from hotlever.errors import HotleverError, InputError, unknown_name
 from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of
-from hotlever.studies.working_point import QUANTITIES, SolvedDesign, WorkingPoint
+from hotlever.studies.working_point import (
+    OF_THE_READER,
+    QUANTITIES,
+    SolvedDesign,
+    WorkingPoint,
+    reads_distance,
+)
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
 #: Designs that are tried at most, and what the objective may still change by, over its first value.
 MOST_DESIGNS, _ACCURATE = 30, 1e-6
+#: The same of what a reader shows, which changes a little with each mesh.
+_ACCURATE_OF_A_READER = 5e-4
 #: Relative change of a dimension from which on the lever is meshed anew.
 _MOVED = 0.25
 #: How near a bound is met: over its range, or over the bound of a quantity.
@@ -132,7 +143,7 @@ def optimise(
             method="SLSQP",
             bounds=[(0.0, 1.0)] * len(search.names),
             constraints=search.constraints,
-            options={"ftol": _ACCURATE, "maxiter": MOST_DESIGNS},
+            options={"ftol": search.accuracy, "maxiter": MOST_DESIGNS},
         )
         reason = "" if result.success else result.message[:1].lower() + result.message[1:]
     except _EnoughDesigns:
@@ -151,6 +162,12 @@ def optimise(
 def _check(probe: Probe, quantity: str, bounds: Mapping[str, Bounds]) -> None:
     if quantity not in QUANTITIES:
         raise unknown_name("quantity", quantity, QUANTITIES)
+    reader = [name for name in (quantity, *bounds) if name in OF_THE_READER]
+    if reader and not reads_distance(probe):
+        raise InputError(
+            f"{reader[0]}: found no surface below the lever, expected surface_gap_um and medium = "
+            '"air" in [surroundings] of the probe file'
+        )
     numbers = [name for name in parameters_of(probe) if name not in _NOT_OF_A_DESIGN]
     for name, (low, high) in bounds.items():
         if name not in (*numbers, *QUANTITIES):
@@ -197,6 +214,8 @@ class _Search:
         ranges: Any = [bounds[name] for name in self.names]
         self._low, self._high = np.array(ranges, dtype=float).T
         self.limited = {name: both for name, both in bounds.items() if name in QUANTITIES}
+        self._reads_distance = not {quantity, *bounds}.isdisjoint(OF_THE_READER)
+        self.accuracy = _ACCURATE_OF_A_READER if self._reads_distance else _ACCURATE
         self.designs, self._scale, self._least = 0, 1.0, np.inf
         self.best: Array | None = None
         self._similar: SimilarLevers | None = None
@@ -283,7 +302,9 @@ class _Search:
         if self._progress is not None:
             self._progress(self.designs, MOST_DESIGNS)
         probe = self.probe_at(share)
-        if not self._follows(probe):
+        if self._reads_distance:
+            self._similar = SimilarLevers(Lever(probe, COARSE))
+        elif not self._follows(probe):
             self._similar = SimilarLevers(Lever(probe))
         assert self._similar is not None
         solved = SolvedDesign(self._similar, probe, self._point, self.names)

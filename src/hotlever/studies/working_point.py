@@ -3,7 +3,9 @@
 A quantity of a state follows from V_l, I_h and T_tip. At a fixed rise of the tip their derivatives
 by a dimension or a material parameter are exact (`hotlever.lever.sensitivities`); the state of a
 working point, or of the knee, then moves along the branch until it is one again:
-dq = ∂q + q' du with g' du = −∂g, where g = 0 says which state it is.
+dq = ∂q + q' du with g' du = −∂g, where g = 0 says which state it is. How sensitively a lever reads
+its distance to a surface depends on the air, which moves with every dimension, so that it is
+differentiated by levers beside it, each with a mesh and panels of its own.
 """
 
 from __future__ import annotations
@@ -17,9 +19,10 @@ import numpy as np
 from hotlever.errors import ComputationError
 from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.continuation import continued
-from hotlever.lever.lever import State
+from hotlever.lever.lever import COARSE, Lever, State
 from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.parametrisation import solve_at
+from hotlever.lever.reader import Reader, Signal
 from hotlever.lever.sensitivities import by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient.modes import slowest_modes
@@ -38,13 +41,17 @@ OF_THE_KNEE = {
 #: From the working point up to the knee.
 DISTANCES = {"knee_distance_K": "knee_K", "knee_distance_V": "knee_bias_V"}
 TIME_CONSTANT = "time_constant_us"
+#: Of a lever in air over a surface, see `hotlever.lever.reader`.
+OF_THE_READER = ("dV_dz_V_per_um", "dlnR_dz_per_um", "resolution_nm_per_rtHz")
 #: All that may be made least or greatest, or bounded.
-QUANTITIES = (*OF_A_STATE, TIME_CONSTANT, *OF_THE_KNEE, *DISTANCES)
+QUANTITIES = (*OF_A_STATE, TIME_CONSTANT, *OF_THE_READER, *OF_THE_KNEE, *DISTANCES)
 
 #: Distance (K^½) of the states that tell how derivatives change at the knee.
 _NEAR_KNEE = 0.3
 #: Relative change of a number by which a time constant is differentiated.
 _STEP = 1e-3
+#: And what a reader shows: of coarse levers, meshed anew, differences are known to some per cent.
+_READER_STEP = 0.05
 
 
 @dataclass(frozen=True)
@@ -122,15 +129,19 @@ class SolvedDesign:
     # --- values and derivatives -------------------------------------------------------------------
 
     def value(self, quantity: str) -> float:
-        """Return a quantity; NaN of a knee that does not exist."""
+        """Return a quantity; NaN of a knee, or a surface below, that does not exist."""
         if quantity == TIME_CONSTANT:
             return self._time_constant
+        if quantity in OF_THE_READER:
+            return getattr(self._signal, quantity, float("nan"))
         return sum(sign * self._read(own, u)[0] for sign, own, u in self._terms(quantity))
 
     def gradient(self, quantity: str) -> Array:
         """Return its derivatives by the parameters, (p,)."""
         if quantity == TIME_CONSTANT:
             return np.array([self._time_constant_by(name) for name in self._names])
+        if quantity in OF_THE_READER:
+            return np.array([self._reader_by(quantity, name) for name in self._names])
         terms = self._terms(quantity)
         return np.sum([sign * self._gradient_of(own, u) for sign, own, u in terms], axis=0)
 
@@ -227,3 +238,29 @@ class SolvedDesign:
         u, guess = np.sqrt([rise_K]), self.branch.states(np.array([self.u]))
         root = solve_at(lever.equations, u, guess, NewtonOptions())
         return float(slowest_modes(State(lever, root.x), count=1)[0][0])
+
+    # --- over a surface ---------------------------------------------------------------------------
+
+    @cached_property
+    def _signal(self) -> Signal | None:
+        """What the reader shows at the working point; None without a surface below."""
+        if not reads_distance(self.probe):
+            return None
+        lever, bias = self._similar.lever(self.probe), self.value("bias_V")
+        return Reader(self.probe).signal(lever, self.branch, self.u, bias)
+
+    def _reader_by(self, quantity: str, name: str) -> float:
+        """Return a derivative of what the reader shows, from coarse levers beside this one."""
+        value = float(self.probe.values([name])[0])
+        step = _READER_STEP * (abs(value) or 1.0)
+        above, below = (
+            SolvedDesign(SimilarLevers(Lever(probe, COARSE)), probe, self._point).value(quantity)
+            for probe in (self.probe.with_(**{name: value + way}) for way in (step, -step))
+        )
+        return (above - below) / (2.0 * step)
+
+
+def reads_distance(probe: Probe) -> bool:
+    """Return whether a probe is in air over a surface."""
+    around = probe.surroundings
+    return around.medium == "air" and around.surface_gap_um is not None
