@@ -9,6 +9,7 @@ simulate(lever, wave, until=100)    in time; see hotlever.lever.transient
 read_measurement("iv.csv")          what an instrument measured
 fit("iv.csv", probe=probe)          the material that explains it
 calibrate("iv.csv", probe=probe)    tip temperatures for what it shows
+plan_next(calibration)              what to measure next, how hot it gets
 read_spectra, Thermometer           Raman spectra made temperatures
 
 data.hotlever.plot()                the figure of any dataset made here
@@ -37,7 +38,9 @@ _MODULES = {
     "hotlever.lever": ("Lever", "Branch", "sweep", "read_sweep", "write_sweep"),
     "hotlever.lever.transient": ("simulate",),
     "hotlever.estimation": ("Measurement", "read_measurement", "FitOptions", "fit", "read_fit"),
-    "hotlever.calibration": ("calibrate", "read_calibration", "PowerLaw", "read_power_law"),
+    "hotlever.calibration": (
+        *("calibrate", "read_calibration", "plan_next", "PowerLaw", "read_power_law"),
+    ),
     "hotlever.raman": (
         *("read_spectra", "measure", "read_lines", "Thermometer"),
         *("calibrate_from", "read_raman_calibration", "published_raman_calibration"),

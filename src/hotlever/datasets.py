@@ -158,6 +158,13 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "mean_stderr_K": ("K", "standard error of the mean tip temperature"),
     "budget_K": ("K", "standard error of the tip temperature by source"),
     "apex_budget_K": ("K", "standard error of the temperature of the apex by source"),
+    # what to measure next
+    "what": ("", "kind of measurement"),
+    "gain": ("K", "how much smaller the standard error gets, per cost"),
+    "stderr_now_K": ("K", "standard error of the tip temperature before the measurement"),
+    "stderr_then_K": ("K", "standard error of the tip temperature after the measurement"),
+    "added": ("1", "measurements made"),
+    "tip_limit_K": ("K", "tip temperature, upper 99 % limit"),
     # knee, design and air
     "knee_K": ("K", "tip temperature at the knee"),
     "knee_mW": ("mW", "power at the knee"),

@@ -28,7 +28,7 @@ from hotlever.studies.simulation_based_calibration import (
 @pytest.fixture(autouse=True)
 def coarse_levers(monkeypatch):
     """What is tested here does not depend on the mesh."""
-    monkeypatch.setattr(study, "_FINER", COARSE)
+    monkeypatch.setattr(study, "FINER", COARSE)
 
 
 @pytest.fixture

@@ -45,7 +45,9 @@ from hotlever.estimation.outcome import (
     Outcome,
     ResultFile,
     Vector,
+    array,
 )
+from hotlever.measurands import FITTED
 from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import PriorUse
@@ -101,6 +103,10 @@ class Calibration(Outcome):
         Whether the search for the lever came to its end.
     gum : TemperatureBudget, optional
         The uncertainty budget of one row of the table; none by the paper's rule.
+    weights : dict of str to ndarray, optional
+        What differences of data and lever were multiplied by, by observable, (rows of the
+        measurement,): one over their standard errors, 0 for what was left out. None by the paper's
+        rule, and without priors.
     """
 
     route: str
@@ -121,6 +127,7 @@ class Calibration(Outcome):
     pulse: PulseCalibration | None = None
     converged: bool = True
     gum: TemperatureBudget | None = None
+    weights: dict[str, Array] | None = None
 
     lever = "lever like this one"
 
@@ -297,6 +304,7 @@ class CalibrationFile(BudgetFields, ResultFile[Calibration]):
     apex_budget_K: dict[str, Vector] | None = IF_ANY
     measured_rms_K: Number = np.nan
     pulse: _Pulse | None = IF_ANY
+    weights: dict[str, Vector] | None = IF_ANY
 
     @field_serializer("power_law")
     def _with_threshold(self, law: PowerLaw | None) -> dict[str, float] | None:
@@ -308,6 +316,10 @@ class CalibrationFile(BudgetFields, ResultFile[Calibration]):
         if self.gum is not None and self.gum_bias_V not in self.table["bias_V"]:
             raise InputError(f"{info.context}: gum_bias_V: expected the bias of a row of the table")
         self.check_correlation(str(info.context))
+        for name, weights in (self.weights or {}).items():
+            if name not in FITTED:
+                raise unknown_name("observable", name, FITTED, f"{info.context}: weights")
+            array(weights, self.data.columns["V_b"].shape, f"{info.context}: weights: {name}")
         return self
 
     def result(self) -> Calibration:

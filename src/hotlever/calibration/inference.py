@@ -198,6 +198,7 @@ def calibrated_by_estimate(
     return Calibration(
         table=tip.table,
         gum=budget_of_estimate(estimate, priors, float(bias[row]), limits, model),
+        weights=_weights(measured, estimate),
         route=route,
         medium=medium,
         power_law=law,
@@ -214,6 +215,16 @@ def calibrated_by_estimate(
         converged=converged,
         notes=notes,
     )
+
+
+def _weights(measured: Measurement, estimate: Estimate) -> dict[str, Array] | None:
+    """Return the weights of an estimate with priors, unless it is of other data too."""
+    residuals = estimate.residuals
+    if not estimate.objective.informed or "fit" in estimate.objective.prior.sources:
+        return None
+    if not _same_data(measured, estimate.measurement):
+        return None
+    return dict(zip(residuals.observables, residuals.data_weights, strict=True))
 
 
 def _verdict(estimate: Estimate, priors: Mapping[str, PriorUse]) -> tuple[bool, str]:

@@ -6,6 +6,7 @@ noise model     `residuals`: `noise`, drift, and the scales that data have in co
 prior           `hotlever.probe.priors`, together a `prior_density`
 optimiser       of an `objective`: `optimiser`, its `subproblem`; where a `search` begins
 posterior       `posterior`: of any quantity, linearised; its `profile`; `sampling` by `chains`
+design          `optimal_design`: which further rows lessen an error most
 diagnosis       `lack_of_fit`; `diagnosis` by `hypotheses`
 problem         `inverse_problem` puts all that together, as `options` ask
 answers         `estimator` makes a fit of it: a `result`, an `outcome` as calibrations are, with

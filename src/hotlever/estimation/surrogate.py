@@ -5,8 +5,9 @@ Search, profile, posterior and diagnosis all take the levers that they do not so
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -98,6 +99,12 @@ class CurveSurrogate:
             # without power everything is zero; its ratios are those of a barely warm lever
             self._rates = np.concatenate([powers[:1], powers])
         self._slopes = spline_through(branch.u, self._rates)(branch.u, 1)
+
+    def reading(self, rows: Rows) -> Self:
+        """Return the same of other rows."""
+        other = copy(self)
+        other.rows = rows
+        return other
 
     def branch_at(self, parameters: Array) -> Branch:
         """Return the branch for some values of the parameters (p,)."""

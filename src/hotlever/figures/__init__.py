@@ -41,6 +41,7 @@ from hotlever.figures.lever import (
     temperature_power,
 )
 from hotlever.figures.maps import field_maps, pulse_film, save_film, temperature_map
+from hotlever.figures.planning import planned_measurements
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
 from hotlever.figures.reader import reader_overview
 from hotlever.figures.style import save_figure

@@ -66,7 +66,7 @@ RAMAN, RAMAN_POINTS = (0.01, 0.02), 5
 HIGHEST_V = {"vacuum": 11.0, "air": 13.0}
 #: Tip temperature (K) above which errors count.
 HOT = 400.0
-_FINER = MeshOptions(refinement=1.3)
+FINER = MeshOptions(refinement=1.3)
 #: Levels of confidence, and their limits in standard deviations.
 LEVELS = {0.68: 0.994, 0.95: BAND}
 PERCENTILES = (50, 90, 100)
@@ -140,7 +140,7 @@ def measure(
     """
     if "mobility" in departures:
         true = true.with_material("material", MinimosMaterial)
-    lever = Lever(true, _FINER if "mesh" in departures else None)
+    lever = Lever(true, FINER if "mesh" in departures else None)
     even = np.linspace(1.0 / POINTS, 1.0, POINTS)
     try:
         sweep = lever.sweep((highest or HIGHEST_V[true.surroundings.medium]) * even)

@@ -16,6 +16,7 @@ from hotlever.tasks.measured_requests import (
     RamanCheckRequest,
     RamanRequest,
 )
+from hotlever.tasks.next_requests import NextRequest
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import (
     ContactRequest,
@@ -77,6 +78,7 @@ COMMANDS = {
     "raman-check": Command(RamanCheckRequest, "hotlever.tasks.spectra", "check_linear_law"),
     "fit": Command(FitRequest, "hotlever.tasks.fitting", "fit_files"),
     "calibrate": Command(CalibrateRequest, "hotlever.tasks.calibrating", "calibrate_files"),
+    "next": Command(NextRequest, "hotlever.tasks.planning", "propose"),
     "reproduce": Command(ReproduceRequest, "hotlever.tasks.evidence", "reproduce"),
     "validate": Command(ValidateRequest, "hotlever.tasks.evidence", "validate"),
     "cache": Command(CacheRequest, "hotlever.tasks.caching", "show_cache"),

@@ -1,0 +1,202 @@
+"""What is asked of the task that says what to measure next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hotlever.errors import InputError, quoted, shown, unknown_name
+from hotlever.files import FIGURE_TYPES, Outputs
+from hotlever.tasks.measured_requests import MeasuredRequest
+from hotlever.tasks.requests import File, PlotRequest, argument, check_medium, option
+from hotlever.tasks.texts import check_number, parse_bias, parse_number, parse_pairs
+from hotlever.units import setting
+
+#: Measurements that are proposed at once; by default, unless kinds are limited.
+MOST_PROPOSALS, _USUAL_PROPOSALS = 100, 5
+#: Minutes by unit of time.
+_MINUTES = {"s": 1.0 / 60.0, "min": 1.0, "h": 60.0}
+
+
+@dataclass(kw_only=True)
+class NextRequest(PlotRequest, MeasuredRequest):
+    """Say what to measure next, so that the tip temperature is known best.
+
+    One row for each proposal, best first: how hot the tip would be there, and how hot at most
+    with 99 % certainty, and how sure its temperature is known then. Without data: where to begin.
+    """
+
+    data: File = argument(
+        None,
+        metavar="[DATA]",
+        help="Calibration (hotlever calibrate -o CAL.json), or a measurement file, which is "
+        "calibrated first; left out: a lever that was not measured yet.",
+    )
+    probe: File = option(
+        None, help="Probe file of a lever like this one; the reference probe if left out."
+    )
+    allow: str | None = option(
+        None,
+        metavar="KIND[=COUNT],...",
+        help="Some of bias,spectra,reader, and at most how many, as bias=15,spectra=3; bias and "
+        "spectra if left out, and reader where it was measured.",
+    )
+    count: int | None = option(
+        None, metavar="N", help="Proposals; 5, or as many as are allowed, if left out."
+    )
+    at: str | None = option(
+        None,
+        metavar="TEMPERATURE",
+        help="Tip temperature whose error counts, as 800K; if left out the hottest that was "
+        "measured, or without data the hottest that may be.",
+    )
+    stay_below: str | None = option(
+        None,
+        metavar="TEMPERATURE",
+        help="Propose nothing at which the tip could be hotter with more than 1 % probability, as "
+        "900K; what melts if left out.",
+    )
+    bias: str | None = option(
+        None,
+        metavar="START:STOP:COUNT",
+        help="Biases that can be taken (V); even ones to half beyond those measured if left out.",
+    )
+    cost: list[str] | None = option(
+        None,
+        metavar="KIND=TIME",
+        help="Of one measurement, as spectra=10min; repeated for each kind. The gain is then that "
+        "per minute.",
+    )
+    noise: list[str] | None = option(
+        None,
+        metavar="NAME=SHARE",
+        help="Of a measurement to come, as current=0.2% or tip=1% (of the rise); that of the data, "
+        "or what is usual, if left out; repeated.",
+    )
+    output: File = option(None, "-o", "--output", help="CSV file; a table in words if left out.")
+
+    def outputs(self) -> Outputs:
+        """Check the files that are written, none of which is read."""
+        outputs = Outputs(self.data, self.probe, *self.column_files)
+        outputs.file(self.output, ".csv")
+        outputs.file(self.plot, *FIGURE_TYPES)
+        return outputs
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the data are a calibration."""
+        return self.data is not None and Path(self.data).suffix.lower() == ".json"
+
+    def check(self) -> None:
+        """Refuse what does not go together."""
+        check_medium(self.medium)
+        check_number("--count", self.count, 1, MOST_PROPOSALS)
+        stated = {"--probe": self.probe, "--prior": self.prior, "--medium": self.medium}
+        stated |= {"--physics": self.physics, "--column": self.column}
+        for name, value in stated.items():
+            if self.calibrated and value is not None:
+                raise InputError(
+                    f"{name}: the calibration has its own; expected a measurement file"
+                )
+        if self.data is None and self.column is not None:
+            raise InputError("--column: expected a measurement file")
+
+    def choices(self) -> dict[str, Any]:
+        """Return what is asked of `hotlever.calibration.next_measurement.plan_next`."""
+        allowed = parse_kinds(self.allow)
+        limits = list((allowed or {"": None}).values())
+        usual = sum(number or 0 for number in limits) if all(limits) else _USUAL_PROPOSALS
+        temperatures = {
+            name: None if text is None else _temperature(text, option)
+            for name, text, option in (
+                ("at_K", self.at, "--at"),
+                ("stay_below_K", self.stay_below, "--stay-below"),
+            )
+        }
+        return {
+            **temperatures,
+            "allowed": allowed,
+            "count": self.count or min(usual, MOST_PROPOSALS),
+            "bias": None if self.bias is None else parse_bias(self.bias),
+            "costs": parse_costs(self.cost, list(allowed or ("bias", "spectra"))),
+            "noise": parse_noise(self.noise),
+        }
+
+
+def _temperature(text: str, option: str) -> float:
+    kelvins = setting(text, "K", option)
+    check_number(option, kelvins, 1.0, 5000.0)
+    return kelvins
+
+
+def parse_kinds(text: str | None) -> dict[str, int | None] | None:
+    """Parse ``bias,spectra`` or ``bias=15,spectra=3``: kinds of measurement, at most so many.
+
+    Examples
+    --------
+    >>> parse_kinds("bias,spectra=3")
+    {'bias': None, 'spectra': 3}
+    """
+    if text is None:
+        return None
+    kinds = dict[str, int | None]()
+    expected = "KIND,... or KIND=COUNT,..., such as bias,spectra=3"
+    for name, number in parse_pairs("--allow", text.split(","), expected, bare=True).items():
+        if number and not (number.isdecimal() and 1 <= int(number[:9]) <= MOST_PROPOSALS):
+            raise InputError(
+                f"--allow {shown(name)}: found {quoted(number)}, expected a whole number from 1 to "
+                f"{MOST_PROPOSALS}"
+            )
+        kinds[name] = int(number) if number else None
+    return kinds
+
+
+def parse_costs(texts: Iterable[str] | None, kinds: Sequence[str]) -> dict[str, float]:
+    """Parse several ``KIND=TIME``, such as ``spectra=10min``, in minutes.
+
+    Examples
+    --------
+    >>> parse_costs(["spectra=10min", "bias=30s"], ["bias", "spectra"])
+    {'spectra': 10.0, 'bias': 0.5}
+    """
+    costs, expected = dict[str, float](), "KIND=TIME, such as spectra=10min"
+    for name, text in parse_pairs("--cost", texts, expected).items():
+        where = f"--cost {shown(name)}"
+        if name not in kinds:
+            raise unknown_name("kind of measurement", name, kinds, "--cost")
+        number, minutes = text.rstrip("hminsec "), 0.0
+        with suppress(InputError):
+            minutes = _MINUTES.get(text[len(number) :].strip(), 0.0) * parse_number(number, where)
+        if not 0.0 < minutes < math.inf:
+            raise InputError(f"{where}: found {quoted(text)}, expected a time such as 30s or 10min")
+        costs[name] = minutes
+    missing = [kind for kind in kinds if kind not in costs]
+    if costs and missing:
+        raise InputError(f"--cost: found none of {', '.join(missing)}, expected one of each kind")
+    return costs
+
+
+def parse_noise(texts: Iterable[str] | None) -> dict[str, float]:
+    """Parse several ``NAME=SHARE``, such as ``current=0.2%``, of observables.
+
+    Examples
+    --------
+    >>> parse_noise(["current=0.2%", "tip=1%"])
+    {'current': 0.002, 'tip': 0.01}
+    """
+    from hotlever.measurands import OBSERVABLES
+
+    noise, expected = dict[str, float](), "NAME=SHARE, such as current=0.2%"
+    for name, text in parse_pairs("--noise", texts, expected).items():
+        if name not in OBSERVABLES:
+            raise unknown_name("observable", name, OBSERVABLES, "--noise")
+        where = f"--noise {name}"
+        share = parse_number(text.removesuffix("%"), where) / 100.0 if text.endswith("%") else 0.0
+        if not 1e-6 <= share <= 0.5:
+            raise InputError(f"{where}: found {quoted(text)}, expected a share from 1e-4% to 50%")
+        noise[name] = share
+    return noise

@@ -1,0 +1,167 @@
+"""What to measure next: the error that is foretold is the one that comes, no tip gets too hot."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hotlever.calibration import calibrate, plan_next, read_calibration
+from hotlever.calibration.linearised_lever import LinearisedLever
+from hotlever.errors import InputError
+from hotlever.estimation.experiment import TIP
+from hotlever.estimation.load_lines import Rows
+from hotlever.measurement import Measurement
+from hotlever.probe import Probe
+
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
+#: Noise of currents and, with the same error in common, of Raman temperatures.
+CURRENT, RAMAN = 2e-3, 0.01
+
+
+@pytest.fixture(scope="module")
+def measure(coarse):
+    """Measure the reference lever at biases (V), at some of them with a spectrum."""
+    random = np.random.default_rng(5)
+
+    def measured(bias, spectra):
+        sweep = coarse.sweep(np.sort(bias))
+        tip, rise = (np.full(bias.size, np.nan) for _ in range(2))
+        spectrum = np.isin(np.sort(bias), spectra)
+        rise[spectrum] = sweep.tip_K.values[spectrum] - 293.0
+        tip[spectrum] = 293.0 + (rise * (1.0 + RAMAN * random.standard_normal(bias.size)))[spectrum]
+        noise = 1.0 + CURRENT * random.standard_normal(bias.size)
+        nothing = np.full(bias.size, np.nan)
+        return Measurement(
+            sweep.bias.values, sweep.current_mA.values * noise, nothing, tip, RAMAN * rise
+        )
+
+    return measured
+
+
+@pytest.fixture(scope="module")
+def first(measure):
+    """A sweep to 7.2 V with one spectrum, and its calibration."""
+    bias = np.linspace(0.6, 7.2, 12)
+    return bias, calibrate(measure(bias, bias[-1:]))
+
+
+@pytest.fixture(scope="module")
+def plan(first):
+    return plan_next(first[1], at_K=500.0, stay_below_K=700.0, count=6)
+
+
+def test_the_error_now_is_the_one_that_the_calibration_states(first, tmp_path):
+    first[1].write(tmp_path / "cal.json")
+    calibration = read_calibration(tmp_path / "cal.json")
+    table = calibration.table
+    plan = plan_next(calibration, at_K=450.0, count=1)
+    stated = np.interp(450.0, table.tip_K, table.tip_stderr_K)
+    assert plan.proposals.stderr_now_K.item() == pytest.approx(stated, rel=0.02)
+    # and at all others
+    now = plan.errors.sel(added=0).isel(bias=plan.errors.bias.values < table.bias_V.values[-1])
+    stated = np.interp(now.bias, table.bias_V, table.tip_stderr_K)
+    np.testing.assert_allclose(now.tip_stderr_K, stated, rtol=0.05)
+
+
+def test_the_error_that_is_foretold_is_the_one_that_then_comes(first, plan, measure):
+    before = first[1].measurement
+    added, what = plan.proposals.bias_V.values, plan.proposals.what.values
+    # a spectrum that is taken twice is two rows
+    added = added + 1e-4 * np.arange(added.size)
+    more = measure(added, added[what == "spectra"])
+    both = replace(
+        before,
+        **{
+            name: np.concatenate([getattr(before, name), getattr(more, name)])
+            for name in ("bias_V", "current_mA", "reader_V", "tip_K", "tip_error_K")
+        },
+    )
+    then = calibrate(both).table
+    stated = np.interp(500.0, then.tip_K, then.tip_stderr_K)
+    assert plan.proposals.stderr_then_K.values[-1] == pytest.approx(stated, rel=0.25)
+    assert stated < 0.9 * plan.proposals.stderr_now_K.values[0]
+
+
+def test_nothing_is_proposed_beyond_the_limit(plan):
+    proposals, errors = plan.proposals, plan.errors
+    assert np.all(proposals.tip_limit_K < 700.0)
+    assert np.all(proposals.bias_V <= plan.safe_V)
+    assert plan.safe_V <= plan.safe_then_V
+    assert np.all(errors.tip_limit_K >= errors.tip_K)
+    assert np.all(np.diff(proposals.stderr_then_K) < 0.0)
+    together = proposals.stderr_now_K[0] - proposals.stderr_then_K[-1]
+    assert proposals.gain.sum() == pytest.approx(float(together))
+
+
+@pytest.mark.slow
+def test_of_levers_drawn_from_the_priors_one_in_a_hundred_is_hotter_than_said():
+    lever = LinearisedLever.of_priors(Probe.reference())
+    plan = plan_next(probe=Probe.reference(), stay_below_K=900.0, count=1)
+    spread = np.linalg.cholesky(lever.information.covariance)
+    random, count = np.random.default_rng(0), len(lever.names)
+    surrogate = lever.surrogate.reading(Rows(np.array([plan.safe_V])))
+    drawn = (spread @ random.standard_normal((len(spread), 1500)))[:count].T
+    tips = [surrogate.shown(lever.parameters(away))[TIP, 0] for away in drawn]
+    assert 0.003 < np.mean(np.array(tips) > 900.0) < 0.03
+    assert np.quantile(tips, 0.99) == pytest.approx(900.0, abs=60.0)
+
+
+def test_spectra_at_one_bias_do_not_beat_the_scale_of_their_thermometer():
+    plan = plan_next(bias=np.array([6.4]), allowed={"spectra": None}, count=60)
+    common, then = 0.02 * (plan.at_K - 293.0), plan.proposals.stderr_then_K.values
+    assert then[0] > 1.5 * common
+    assert then[-1] == pytest.approx(common, rel=0.1)
+
+
+def test_costs_decide(first, plan):
+    dear = plan_next(first[1], at_K=500.0, count=1, costs={"bias": 1.0, "spectra": 1e4})
+    assert plan.proposals.what.values[0] == "spectra"
+    assert dear.proposals.what.item() == "bias"
+
+
+def test_data_that_are_not_described_get_no_proposals(first):
+    doubtful = replace(first[1], reason="the current differs")
+    with pytest.raises(InputError, match="no lever like this one shows these data"):
+        plan_next(doubtful)
+    with pytest.raises(InputError, match="without the weights of its data"):
+        plan_next(replace(first[1], weights=None))
+
+
+def test_the_command_writes_a_row_for_each_proposal(run, first):
+    first[1].write("cal.json")
+    words = ("cal.json", "--at", "500K", "--stay-below", "700K", "--allow", "bias=2,spectra=1")
+    status, out, err = run("next", *words, "-o", "next.csv", "--plot", "next.png")
+    assert (status, err) == (0, "")
+    assert "keeps the tip below 700 K with a certainty of 99%" in out
+    rows = list(csv.DictReader(Path("next.csv").read_text(encoding="utf-8").splitlines()))
+    names = "what,bias_V,gain,tip_K,tip_high_K,stderr_now_K,stderr_then_K"
+    assert list(rows[0]) == names.split(",")
+    assert sorted(row["what"] for row in rows) == ["bias", "bias", "spectra"]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--allow", "pulse"), "expected some of bias, reader, spectra"),
+        (("--allow", "spectrum"), "did you mean 'spectra'"),
+        (("--allow", "bias=0"), "a whole number from 1 to 100"),
+        (("--stay-below", "250K"), "no bias is safe"),
+        (("--at", "3000K"), "expected a temperature from 293 to"),
+        (("--at", "80"), "expected a number with a unit like K"),
+        (("--cost", "spectra=10min"), "found none of bias"),
+        (("--cost", "spectra=10kg"), "a time such as 30s or 10min"),
+        (("--noise", "current=2"), "expected a share"),
+        (("--bias", "20:30:5"), "expected some above 0 and up to"),
+        (("none.json",), "none.json: no such file"),
+        (("c.json", "--prior", "n_d=±5%"), "the calibration has its own"),
+    ],
+)
+def test_what_cannot_be_is_said_in_one_line(run, words, expected):
+    status, _, err = run("next", *words)
+    assert status == 2
+    assert expected in err.splitlines()[-1]
