@@ -6,13 +6,11 @@ import math
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from hotlever.errors import InputError, quoted, shown, unknown_name
-from hotlever.files import FIGURE_TYPES, Outputs
 from hotlever.tasks.measured_requests import MeasuredRequest
-from hotlever.tasks.requests import File, PlotRequest, argument, check_medium, option
+from hotlever.tasks.requests import File, PlotRequest, argument, check_medium, option, written
 from hotlever.tasks.texts import check_number, parse_bias, parse_number, parse_pairs
 from hotlever.units import setting
 
@@ -77,23 +75,21 @@ class NextRequest(PlotRequest, MeasuredRequest):
         help="Of a measurement to come, as current=0.2% or tip=1% (of the rise); that of the data, "
         "or what is usual, if left out; repeated.",
     )
-    output: File = option(None, "-o", "--output", help="CSV file; a table in words if left out.")
-
-    def outputs(self) -> Outputs:
-        """Check the files that are written, none of which is read."""
-        outputs = Outputs(self.data, self.probe, *self.column_files)
-        outputs.file(self.output, ".csv")
-        outputs.file(self.plot, *FIGURE_TYPES)
-        return outputs
+    output: File = written(
+        (".csv",), "-o", "--output", help="CSV file; a table in words if left out."
+    )
 
     @property
     def calibrated(self) -> bool:
         """Whether the data are a calibration."""
-        return self.data is not None and Path(self.data).suffix.lower() == ".json"
+        return self.data is not None and self.data.suffix.lower() == ".json"
 
     def check(self) -> None:
         """Refuse what does not go together."""
-        check_medium(self.medium)
+        from hotlever.estimation.options import UNKNOWN_MEDIUM
+
+        # of a lever that was not measured nothing could tell in which it is
+        check_medium(self.medium, *([] if self.data is None else [UNKNOWN_MEDIUM]))
         check_number("--count", self.count, 1, MOST_PROPOSALS)
         stated = {"--probe": self.probe, "--prior": self.prior, "--medium": self.medium}
         stated |= {"--physics": self.physics, "--column": self.column}
