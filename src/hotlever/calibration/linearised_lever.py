@@ -246,15 +246,17 @@ class LinearisedLever:
         low, high = self._coordinates.bounds
         # uniform within its bounds where there is no prior
         uniform = np.where(rows[:, :count].any(axis=0), 0.0, 12.0 / (high - low) ** 2)
-        known = Information(np.diag(np.append(uniform, np.ones(len(_SCALED))))).with_rows(rows)
+        information = Information(np.diag(np.append(uniform, np.ones(len(_SCALED))))).with_rows(
+            rows
+        )
         if self.measurement is None:
-            return known
+            return information
         _, slopes = self.shown(Rows(self.measurement.bias_V, self._measured))
         for name, weights in self.weights.items():
             counts = weights > 0
             of_data = slopes[list(FITTED).index(name), counts]
-            known = known.with_rows(weights[counts, None] * of_data)
-        return known
+            information = information.with_rows(weights[counts, None] * of_data)
+        return information
 
     def noise(self, observable: str, values: Array, share: float | None = None) -> Array:
         """Return the standard errors of rows that show values (observables, n) of an observable.

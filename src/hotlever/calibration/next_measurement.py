@@ -200,7 +200,7 @@ def plan_next(
     )
     most = _allowed(lever, allowed)
     limit = np.inf if stay_below_K is None else stay_below_K
-    biases, known = _safe_biases(lever, bias, limit), lever.information
+    biases, information = _safe_biases(lever, bias, limit), lever.information
     bias, safe = biases.bias_V, biases.safe
     tip_K, by_unknowns = lever.tip(bias)
     if at_K is None:
@@ -210,11 +210,11 @@ def plan_next(
     _, (gradient,) = lever.tip(np.array([aim]))
     candidates = _candidates(lever, most, bias[:safe], costs or {}, noise or {})
     limited = {kind: number for kind, number in most.items() if number is not None}
-    chosen = best_first(known, candidates, gradient, count, limited)
+    chosen = best_first(information, candidates, gradient, count, limited)
     each = (candidates[number].rows for number in chosen)
-    after = list(accumulate(each, Information.with_rows, initial=known))
+    after = list(accumulate(each, Information.with_rows, initial=information))
     stays, notes = _errors_that_stay(lever, calibration, np.append(bias, aim))
-    of_tip = np.array([known.stderr(gradient) for known in after])
+    of_tip = np.array([information.stderr(gradient) for information in after])
     stderr = np.hypot(of_tip, stays[-1])
     cost = np.array([candidates[number].cost for number in chosen])
     rows = np.array(chosen) % safe
@@ -257,11 +257,12 @@ class _Biases:
     highest_K: Array
     safe: int
 
-    def safe_then(self, lever: LinearisedLever, known: Information, limit_K: float) -> float:
+    def safe_then(self, lever: LinearisedLever, information: Information, limit_K: float) -> float:
         """Return the highest bias (V) that will be safe when so much is known."""
         beyond = self.safe
         while (
-            beyond < self.bias_V.size and _highest(lever, self.bias_V[[beyond]], known)[0] < limit_K
+            beyond < self.bias_V.size
+            and _highest(lever, self.bias_V[[beyond]], information)[0] < limit_K
         ):
             beyond += 1
         return float(self.bias_V[beyond - 1])
@@ -275,12 +276,12 @@ def _safe_biases(lever: LinearisedLever, stated: Array | None, limit_K: float) -
     InputError
         If none is safe.
     """
-    known = lever.information
+    information = lever.information
     if stated is None:
         bias = _usual_biases(lever)
     else:
         bias = np.unique(stated[(stated > 0.0) & (stated <= lever.highest_V)])
-    highest = _highest(lever, bias, known)
+    highest = _highest(lever, bias, information)
     safe = int(np.argmin(np.append(highest < limit_K, False)))
     if not bias.size:
         raise InputError(f"biases: expected some above 0 and up to {lever.highest_V:.4g} V")
@@ -294,7 +295,7 @@ def _safe_biases(lever: LinearisedLever, stated: Array | None, limit_K: float) -
     low, high = bias[safe - 1 : safe + 1]
     for _ in range(_HALVED):
         middle = np.array([(low + high) / 2.0])
-        tip = _highest(lever, middle, known)
+        tip = _highest(lever, middle, information)
         if tip[0] >= limit_K:
             (high,) = middle
             continue
@@ -304,9 +305,9 @@ def _safe_biases(lever: LinearisedLever, stated: Array | None, limit_K: float) -
     return _Biases(bias, highest, safe)
 
 
-def _highest(lever: LinearisedLever, bias: Array, known: Information) -> Array:
+def _highest(lever: LinearisedLever, bias: Array, information: Information) -> Array:
     """Return the tip temperatures (K) that are not exceeded at some biases (V), for all we know."""
-    return lever.highest_tip(bias, known.covariance, float(ndtri(SURE)))
+    return lever.highest_tip(bias, information.covariance, float(ndtri(SURE)))
 
 
 def _allowed(

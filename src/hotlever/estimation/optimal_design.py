@@ -29,8 +29,8 @@ class Information:
 
     Examples
     --------
-    >>> known = Information(np.eye(2)).with_rows(np.array([[1.0, 0.0]]))
-    >>> known.stderr(np.array([[1.0, 0.0], [0.0, 2.0]])).round(4).tolist()
+    >>> information = Information(np.eye(2)).with_rows(np.array([[1.0, 0.0]]))
+    >>> information.stderr(np.array([[1.0, 0.0], [0.0, 2.0]])).round(4).tolist()
     [0.7071, 2.0]
     """
 
