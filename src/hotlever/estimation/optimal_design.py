@@ -136,9 +136,9 @@ class NoiseLaw:
 
         Examples
         --------
-        >>> law = NoiseLaw.of(np.array([0.5, 1.3]), np.array([30.0, 120.0]))
+        >>> law = NoiseLaw.of(np.array([0.5, 1.3]), np.array([0.0, 120.0]))
         >>> round(law.constant, 6), round(law.share, 6)
-        (0.4, 0.01)
+        (0.5, 0.01)
         """
         columns = np.stack([np.ones(shown.size), shown**2], axis=1) / errors[:, None] ** 2
         unit = np.max(columns, axis=0)
