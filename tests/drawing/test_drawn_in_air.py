@@ -37,7 +37,7 @@ def pointed(folder) -> Probe:
     return Probe.from_sections(sections, "test")
 
 
-@pytest.mark.parametrize("turn", [False, True])
+@pytest.mark.parametrize("turn", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_the_reference_probe_as_a_drawing(tmp_path, parametric, turn):
     """Turned by 30° and shifted too: what is left comes of the mesh of the lever."""
     file = written(tmp_path / "reference.gds", turn=turn)

@@ -97,7 +97,7 @@ def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
     (tmp_path / "bad.csv").write_text("V_b (V),I_h (mA)\n1,high\n")
     (tmp_path / "few.csv").write_text("V_b (V),I_h (mA),T_tip (K)\n1,0.1,\n,,\n2,,\n")
     names = ["bad.csv", "few.csv", *(path.name for path in levers)]
-    status, printed, err = run("fit", *names, *COMMAND, "--processes", "2", "--report", "report")
+    status, printed, err = run("fit", *names, *COMMAND, "--processes", "1", "--report", "report")
     assert status == 2
     assert "bad.csv: line 2: I_h: found 'high', expected a number" in err
     assert "few.csv: no values of tip" in err
@@ -206,7 +206,8 @@ def test_bad_levers_are_reported_by_name_and_the_others_go_on(texts, run, tmp_pa
     os.link("a/b/x.csv", "hard.csv")
     same = ["a_b/../a_b/x.csv", "link.csv", "hard.csv"]
     Path("out/taken.json").mkdir(parents=True)
-    status, out, err = run("fit", *names, *same, *COMMAND, "-o", "out", "--report", "report")
+    outputs = ("-o", "out", "--report", "report", "--processes", "1")
+    status, out, err = run("fit", *names, *same, *COMMAND, *outputs)
     assert status == 2, err
     assert len(re.findall("^hotlever: ", err, re.M)) == 3
     # what was understood of each of the others
@@ -235,22 +236,8 @@ def test_a_batch_overwrites_no_input(texts, run, tmp_path, names):
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-def test_a_fit_that_cannot_be_written_is_a_failure_of_its_own(levers, tmp_path, monkeypatch):
-    def full(path: Path, text: str) -> None:
-        if path.stem == "lever-1":
-            raise HotleverError(f"{path}: cannot be written (No space left on device)")
-        path.write_text(text)
-
-    monkeypatch.setattr("hotlever.estimation.batch.write_text", full)
-    batch = fit_many(levers[:2], tmp_path / "out", None, OPTIONS, processes=1)
-    assert list(batch.results) == ["lever-0"]
-    assert batch.exit_status == 1
-    assert "No space left" in str(batch.failures[str(levers[1])])
-
-
-def test_a_geometry_that_cannot_be_reduced_is_a_failure_of_its_levers(
-    levers, texts, tmp_path, monkeypatch
-):
+def test_what_fails_for_one_lever_is_a_failure_of_its_own(levers, texts, tmp_path, monkeypatch):
+    """A geometry that cannot be reduced, and a file that cannot be written."""
     levers[0].write_text(f"# base temperature (K): 300\n{texts[0]}")
     make = Lever.__init__
 
@@ -259,10 +246,19 @@ def test_a_geometry_that_cannot_be_reduced_is_a_failure_of_its_levers(
             raise RuntimeError("Factor is exactly singular")
         make(self, probe, *arguments, **options)
 
+    def full(path: Path, text: str) -> None:
+        if path.stem == "lever-1":
+            raise HotleverError(f"{path}: cannot be written (No space left on device)")
+        path.write_text(text)
+
     monkeypatch.setattr(Lever, "__init__", fail)
-    batch = fit_many(levers[:2], tmp_path / "out", None, OPTIONS, processes=1)
-    assert list(batch.results) == ["lever-1"]
-    assert str(batch.failures[str(levers[0])]).endswith("RuntimeError: Factor is exactly singular")
+    monkeypatch.setattr("hotlever.estimation.batch.write_text", full)
+    batch = fit_many(levers, tmp_path / "out", None, OPTIONS, processes=1)
+    assert list(batch.results) == ["lever-2"]
+    assert batch.exit_status == 1
+    geometry, file = (str(batch.failures[str(path)]) for path in levers[:2])
+    assert geometry.endswith("RuntimeError: Factor is exactly singular")
+    assert "No space left" in file
 
 
 def test_levers_of_the_same_name_are_told_apart_by_their_folders():
