@@ -17,7 +17,7 @@ SHARP = {
     "centre_leg_width_um": 11.0,
     "delta": 0.1,
 }
-BIAS = [1.0, 4.0, 7.0]
+BIAS = [4.0, 7.0]
 
 
 @pytest.fixture(scope="module")
@@ -42,13 +42,16 @@ def test_a_border_sharper_than_the_triangles_gets_smaller_ones(sharp):
     assert energy(sharp, chosen.space).sum() <= TOLERANCE
     mesh = chosen.space.mesh
     everywhere = mesh.refined(np.arange(mesh.elements.nelements))
-    truth = Lever(sharp, space=FullSpace(everywhere)).sweep(BIAS)
+    truth, by_usual, by_chosen = (
+        lever.dataset(lever.solve(BIAS))
+        for lever in (Lever(sharp, space=FullSpace(everywhere)), usual, chosen)
+    )
     of_usual, of_chosen = (
-        np.abs(lever.sweep(BIAS).current_mA / truth.current_mA - 1).max()
-        for lever in (usual, chosen)
+        np.abs(shown.current_mA.values / truth.current_mA.values - 1).max()
+        for shown in (by_usual, by_chosen)
     )
     assert of_chosen < 2e-5 < 4e-4 < of_usual
-    assert np.abs(chosen.sweep(BIAS).tip_K - truth.tip_K).max() < 0.1
+    assert np.abs(by_chosen.tip_K.values - truth.tip_K.values).max() < 0.1
 
 
 def test_split_triangles_are_of_the_same_regions_and_terminals(sharp):

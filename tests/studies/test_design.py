@@ -15,6 +15,8 @@ from hotlever.probe import Probe
 from hotlever.spieser2017 import ANNEALING_K
 from hotlever.studies.design import Design, design_notes, quantities, sensitivities, vary
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 EXAMPLES = Path(hotlever.__file__).parent / "examples"
 
 
