@@ -58,7 +58,7 @@ def outcome(file: InstrumentFile, folder: Path) -> tuple[str, str]:
     waveform = step(5.0) if file.driven else None
     try:
         data = read_measurement(path, None, circuit, waveform)
-        return ("read" if _holds(file, data) else "wrong"), "; ".join(data.notes)
+        return ("read" if _holds(file, data) else "wrong"), "; ".join((*data.notes, *data.unused))
     except InputError as error:
         said = str(error)
     if "--column" not in said or not file.columns:

@@ -37,7 +37,7 @@ def test_channels_are_columns_with_their_units(tmp_path):
     assert data.bias_V.tolist() == BIAS.tolist()
     np.testing.assert_allclose(data.current_mA, 1e3 * CURRENT, rtol=1e-15)
     assert data.series_resistance_ohm == 5600.0
-    assert f"{path}: column 'flag' is not used" in data.notes
+    assert f"{path}: column 'flag' is not used" in data.unused
 
 
 def test_groups_of_the_same_channels_follow_each_other(tmp_path):

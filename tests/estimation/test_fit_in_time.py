@@ -133,7 +133,7 @@ def test_bias_and_current_follow_from_the_lever_voltage(folder):
 def test_a_slow_sweep_with_times_stays_one(folder):
     data = read("time (s),V_b (V),I_h (mA)\n0,1,0.1\n1,2,0.2\n")
     assert data.time_us is None
-    assert "column 'time (s)' is not used" in data.notes[0]
+    assert "column 'time (s)' is not used" in data.unused[0]
     assert read("time (s),V_b (V),I_h (mA)\n09:51:02,1,0.1\n09:51:03,2,0.2\n").time_us is None
 
 

@@ -87,7 +87,7 @@ def test_a_voltage_that_the_resistor_would_eat_is_asked_for(tmp_path):
 def test_twenty_unused_columns_are_one_line(tmp_path):
     names = ",".join(f"flag {i}" for i in range(20))
     data = read(tmp_path, f"V_b (V),I_h (mA),{names}\n1,0.1{',0' * 20}\n")
-    (note,) = data.notes
+    (note,) = data.unused
     assert "columns 'flag 0', 'flag 1', " in note
     assert "and 14 more are not used" in note
 

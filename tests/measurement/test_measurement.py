@@ -225,7 +225,7 @@ def test_impossible_settings_are_refused(tmp_path, comment, message):
 
 def test_a_column_like_a_known_one_is_named_with_what_it_may_be(tmp_path):
     data = read(tmp_path, "V_b (V),I_h (mA),T spot (K),U (mV),time (s)\n1,0.1,300,50,0\n")
-    assert [note.split(": ", 1)[1] for note in data.notes] == [
+    assert [note.split(": ", 1)[1] for note in data.unused] == [
         "columns 'T spot (K)', 'U (mV)', 'time (s)' are not used; if one is T_tip, say "
         "--column 'T_tip=T spot (K)'; if one is V_r, say --column 'V_r=U (mV)'"
     ]

@@ -72,11 +72,10 @@ def understood(report: Report, name: str, told: Mapping[str, Any] | None = None)
     in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}
     columns_shown = ["bias_V", "lever_V", *(column.name for column in FITTED.values())]
     head, *rows = measurement.understood
-    # the page shows all columns
-    notes = [note for note in measurement.notes if note not in measurement.unused]
     return {
         "rows": [(Path(name).name, *head[1:]), *rows],
-        "notes": notes,
+        # those that were not used are among the columns, all of which the page shows
+        "notes": list(measurement.notes),
         "observables": list(measurement.observables),
         "medium": measurement.medium,
         "data": in_time

@@ -61,9 +61,9 @@ class Measurement:
     path, sha256 : str
         Origin; empty for data made in memory.
     notes : tuple of str
-        What of the file was not used or not understood, and what looks wrong in it.
+        What of the file was not understood, and what looks wrong in it.
     unused : tuple of str
-        Those of them that say which columns were not used.
+        Which of its columns were not used, and why.
     understood : tuple of tuple of str
         What each column and setting of the file was taken for, as rows of a table.
     rows : ndarray, shape (n,), or None

@@ -90,7 +90,7 @@ def read_measurement(
         series_ohm = circuit.series_resistance_ohm if circuit and assumed else 0.0
         order = _complete_at_rest(contents, circuit, series_ohm, symmetric=not signed)
     unused = note_on_unused(table, quantities)
-    notes = [*contents.notes, *note_on_bias(table, quantities, assigned), *unused]
+    notes = [*contents.notes, *note_on_bias(table, quantities, assigned)]
     more = len(notes) - _MOST_NOTES
     if more > 0:
         notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]

@@ -97,7 +97,7 @@ def estimate_several(
             (name, *_, rows), *quantities = measurement.understood
             columns_read = "; ".join(f"{what} {value}" for what, value, _ in quantities)
             reporter.tell(f"{name}: {rows}; {columns_read}")
-            reporter.note(*measurement.notes)
+            reporter.note(*measurement.notes, *measurement.unused)
 
         where: Any = {"processes": request.processes, "scheduler": scheduler}
         bars: Any = {"reading": read, "reducing": reducing, "progress": update}

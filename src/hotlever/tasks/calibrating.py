@@ -66,7 +66,7 @@ def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
     (data,) = request.data
     measurement = read_measurement_of(like, data, request.columns)
     reporter.tell_table(measurement.understood)
-    reporter.note(*measurement.notes)
+    reporter.note(*measurement.notes, *measurement.unused)
     with reporter.progress("calibrate") as update:
         at_V = None if request.at is None else parse_setting(request.at)[1]
         result = calibrate(measurement, fit=fit, at_V=at_V, progress=update, **how)

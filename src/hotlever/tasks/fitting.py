@@ -54,7 +54,7 @@ def _fit_one(
         measurement.need_rest("--posterior" if samples else "--profiles")
     options.of(probe, in_time=measurement.time_us is not None)  # raises before anything is said
     reporter.tell_table(measurement.understood)
-    reporter.note(*measurement.notes)
+    reporter.note(*measurement.notes, *measurement.unused)
     with reporter.progress("fit") as update:
         seen = partial(_show_curve, reporter)
         result = fit(measurement, probe, options, progress=update, seen=seen)
