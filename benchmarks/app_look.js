@@ -124,6 +124,9 @@
             const box = range.getBoundingClientRect();
             const fault = within(e, box.left, box.right, box.top, box.bottom);
             if (fault) all.push(`${fault}: ${said(e)}`);
+            if (box.width < 90 && box.height > 5 * parseFloat(getComputedStyle(e).fontSize)) {
+                all.push(`squeezed: ${said(e)}`);
+            }
         }
         for (const e of scope().querySelectorAll('img, .js-plotly-plot, input, textarea, button')) {
             if (!isShown(e)) continue;

@@ -2,7 +2,7 @@
 
 ``python benchmarks/app_look.py [FOLDER [PAGE …]]`` opens each page in a headless Chromium, and what
 can be opened on them (`VIEWS`), prints for each the lowest contrast and what is wrong (cut off,
-covered, unreachable, without a name), and keeps a picture of each look in the folder.
+covered, squeezed, unreachable, without a name), and keeps a picture of each look in the folder.
 """
 
 from __future__ import annotations
@@ -72,6 +72,15 @@ def _compared(page: Page) -> None:
     page.locator("[data-number=beside]").filter(has_text="tip").wait_for(timeout=_WORK_MS)
 
 
+def _read(page: Page) -> None:
+    page.locator("[aria-live=polite]").filter(has_text="coarse lever").wait_for(timeout=_WORK_MS)
+
+
+def _designed(page: Page) -> None:
+    page.get_by_role("checkbox", name="in air too").uncheck()
+    _drawn(page, "Knee, tip temperature", "Vary")
+
+
 def _menu(page: Page) -> None:
     page.set_viewport_size({"width": WIDTHS[0], "height": _HEIGHTS[WIDTHS[0]]})
     page.get_by_label("Pages: ").click()
@@ -88,6 +97,8 @@ VIEWS: dict[str, tuple[str, Callable[[Page], None], tuple[int, ...]]] = {
     "in time": ("simulate", _in_time, WIDTHS),
     "small signals": ("simulate", _small_signals, WIDTHS),
     "compared": ("simulate", _compared, WIDTHS),
+    "read": ("reader", _read, WIDTHS),
+    "designed": ("design", _designed, WIDTHS),
     "menu": ("materials", _menu, WIDTHS[:1]),
     "changes": ("materials", lambda page: page.get_by_label("What the app wrote").click(), WIDTHS),
     "question": ("lever", _question, WIDTHS),

@@ -107,7 +107,7 @@ class DrawnPage(Page):
                     number_shown(title, title, value)
             self.show_figure(path)
             with ui.row().classes("w-full items-center"):
-                caption(task.writing({}).line).classes("remark col")
+                caption(task.writing({}).line).classes("remark col min-w-60")
                 self.kind_buttons(partial(self._ask, task, path), self.kinds)
 
     def show_figure(self, path: Path) -> None:
