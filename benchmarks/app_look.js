@@ -124,7 +124,8 @@
             const box = range.getBoundingClientRect();
             const fault = within(e, box.left, box.right, box.top, box.bottom);
             if (fault) all.push(`${fault}: ${said(e)}`);
-            if (box.width < 90 && box.height > 5 * parseFloat(getComputedStyle(e).fontSize)) {
+            if (!(e instanceof SVGElement) && box.width < 90
+                && box.height > 5 * parseFloat(getComputedStyle(e).fontSize)) {
                 all.push(`squeezed: ${said(e)}`);
             }
         }
