@@ -18,6 +18,7 @@ from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Circuit, Probe
 
 BRIDGE = {"bridge_upper_ohm": 4700.0, "bridge_lower_ohm": 1500.0, "bridge_gain": 20.0}
+BRIDGE["bridge_offset_V"] = 1.0
 BIAS = np.linspace(0.5, 9.5, 19)
 #: Standard error of a current (mA).
 NOISE = 1e-3
@@ -42,7 +43,7 @@ def measured(bridged, sweep):
     nothing = np.full(BIAS.size, np.nan)
     by_current = Measurement(BIAS, current, nothing, nothing, nothing, current_error_mA=errors)
     voltage = circuit.bridge_voltage(circuit.lever_voltage(BIAS, current), BIAS)
-    gain = abs(circuit.bridge_voltage(circuit.series_kohm, 0.0))
+    gain = abs(circuit.bridge_change(circuit.series_kohm, 0.0))
     by_bridge = replace(
         by_current,
         current_mA=nothing,
@@ -73,6 +74,7 @@ def test_its_voltage_is_that_of_a_network_of_conductances(bridged, sweep):
         )
         potential = np.linalg.solve(conductance, [source * state.item(), 0.0, 0.0])
         expected = BRIDGE["bridge_gain"] * (potential[1] - potential[2])
+        expected += BRIDGE["bridge_offset_V"]
         assert row.bridge_output_V.item() == pytest.approx(expected, rel=1e-9)
 
 
@@ -94,10 +96,11 @@ def test_in_time_and_for_small_signals_it_follows_lever_and_bias(bridged, sweep)
 
 def test_values_of_the_circuit_have_their_derivatives(bridged):
     """By central differences; those of the lever are in the test of all sensitivities."""
-    names = ("series_resistance_ohm", "bridge_upper_ohm", "bridge_lower_ohm", "base_temperature_K")
+    names = ("series_resistance_ohm", "bridge_upper_ohm", "bridge_lower_ohm", "bridge_offset_V")
+    names = (*names, "base_temperature_K")
     model = ExperimentAtRest(SimilarLevers(bridged), None, BIAS[::4], names)
     at = model.predict(bridged.probe)
-    for place, name in enumerate(names[:3]):
+    for place, name in enumerate(names[:4]):
         (value,) = bridged.probe.values([name])
         up, down = (
             at.surrogate.shown(bridged.probe.replace({name: value * (1 + h)}).values(names))
@@ -124,6 +127,22 @@ def test_its_voltage_alone_tells_what_the_current_does(bridged, measured):
         expected, found = by_current.parameters[name], by_bridge.parameters[name]
         assert found.value == pytest.approx(expected.value, abs=1e-3 * expected.stderr)
         assert found.stderr == pytest.approx(expected.stderr, rel=1e-3)
+
+
+def test_an_offset_is_found_with_the_rest(bridged, measured):
+    """From the value that it had once."""
+    fitted = fit(
+        measured[1],
+        bridged.probe.with_(bridge_offset_V=0.7),
+        fixed=dict.fromkeys(("a0", "a1", "p", "n_d", "delta")),
+        free=("bridge_offset_V",),
+        weights="errors",
+        model=lambda probe, bias: full_experiment(bridged, bias),
+    )
+    offset = fitted.parameters["bridge_offset_V"]
+    assert offset.unit == "V"
+    assert 0.0 < offset.stderr < 0.25 * BRIDGE["bridge_offset_V"]
+    assert abs(offset.value - BRIDGE["bridge_offset_V"]) < 3.0 * offset.stderr
 
 
 @pytest.mark.usefixtures("coarse_meshes")
@@ -157,6 +176,7 @@ def test_a_bridge_is_in_the_probe_or_a_line_says_so(run, tmp_path):
     for wrong, line in (
         ({"bridge_upper_ohm": 5600.0}, "a bridge needs bridge_lower_ohm"),
         ({"bridge_gain": 10.0}, "a bridge needs bridge_upper_ohm"),
+        ({"bridge_offset_V": 0.1}, "a bridge needs bridge_upper_ohm"),
         ({**BRIDGE, "bridge_gain": 0.0}, "bridge_gain = 0: expected the gain"),
         ({**BRIDGE, "series_resistance_ohm": 0.0}, "a bridge needs a resistor in series"),
         ({**BRIDGE, "bridge_lower_ohm": -1.0}, "bridge_lower_ohm = -1"),

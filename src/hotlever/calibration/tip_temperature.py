@@ -37,7 +37,8 @@ _ROWS, _FINE = 101, 10_001
 #: By which source of error a parameter counts that is not the lever's own.
 OF_THE_MEASUREMENT = {
     **dict.fromkeys(
-        ("series_resistance_ohm", "bridge_upper_ohm", "bridge_lower_ohm"), "electronics"
+        ("series_resistance_ohm", "bridge_upper_ohm", "bridge_lower_ohm", "bridge_offset_V"),
+        "electronics",
     ),
     "gas_conductivity": "air",
     "surface_gap_um": "air",

@@ -67,7 +67,7 @@ def observed_by(circuit: Circuit, shown: Array, slopes: Array, names: Sequence[s
     values = {
         "current": current_mA,
         "reader": reader_V,
-        "bridge": circuit.bridge_voltage(lever_V, 0.0) + of_divider,
+        "bridge": circuit.bridge_change(lever_V, 0.0) + of_divider,
         "tip": rise_K + [circuit.base_by(name) for name in names],
     }
     return np.stack([values[name] for name in OBSERVABLES])

@@ -38,7 +38,7 @@ _SLOPE = "temperature coefficient of the high-doped resistivity"
 #: What counts in time alone.
 IN_TIME = "in time"
 #: Units by the endings of names in probe files.
-_UNITS = {"um": "µm", "ohm": "Ω", "K": "K", "deg": "°", "K_per_mW": "K/mW"}
+_UNITS = {"um": "µm", "ohm": "Ω", "V": "V", "K": "K", "deg": "°", "K_per_mW": "K/mW"}
 
 
 class Parameter(NamedTuple):

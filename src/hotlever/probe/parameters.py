@@ -14,6 +14,7 @@ from hotlever.materials.parameters import IN_TIME, parameter_named
 from hotlever.probe.contact import OUT_OF_CONTACT
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
+from hotlever.probe.supply import MOST_OFFSET_V
 
 #: Shares of a dimension or a resistance, of a base temperature, and of what a gas conducts, within
 #: which a fit stays.
@@ -31,6 +32,8 @@ _GAS = 0.1
 _GAP = 0.1
 #: Bounds of an interface, of which nothing is known but its power of ten.
 _OF_THE_INTERFACE, _INTERFACE = (1e-3, 1e3), math.log(10.0)
+#: Offset that the amplifier of a bridge usually has (V).
+_USUAL_OFFSET_V = 0.01
 #: How far off all edges usually are (µm).
 _USUAL_BIAS = 0.1
 #: Dimensions of a tip that matter to its lever, the last in contact only, and of a shape that do
@@ -181,6 +184,10 @@ def parameters_of(
     if probe.circuit.has_bridge:
         add("bridge_upper_ohm", RESISTANCE)
         add("bridge_lower_ohm", RESISTANCE)
+        add("bridge_offset_V", None)
+        table["bridge_offset_V"] = table["bridge_offset_V"]._replace(
+            scale=_USUAL_OFFSET_V, lower=-MOST_OFFSET_V, upper=MOST_OFFSET_V, relative=False
+        )
     if anywhere or probe.surroundings.medium == "air":
         add("gas_conductivity", _GAS, _OF_THE_GAS)
         if probe.surroundings.surface_gap_um is not None:

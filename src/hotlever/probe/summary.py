@@ -30,7 +30,8 @@ def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
         *(
             [
                 f"  bridge: {circuit.bridge_upper_ohm:g} ohm above "
-                f"{circuit.bridge_lower_ohm:g} ohm, gain {circuit.bridge_gain or 1.0:g}"
+                f"{circuit.bridge_lower_ohm:g} ohm, gain {circuit.bridge_gain or 1.0:g}, "
+                f"offset {circuit.bridge_offset_V:g} V"
             ]
             if circuit.has_bridge
             else []

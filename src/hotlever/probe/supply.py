@@ -4,7 +4,7 @@ Series resistor and lever are one arm of the bridge, a divider of two resistors 
 to ground is the other. An amplifier with an input that draws no current shows the voltage between
 both middles::
 
-    V_bridge = gain (V_l − V_b lower / (upper + lower))
+    V_bridge = gain (V_l − V_b lower / (upper + lower)) + offset
 
 With a divider like the cold lever and its series resistor it is zero when cold, and what is left is
 what heat does to the resistance: so a lock-in or an amplifier sees more of it.
@@ -23,6 +23,8 @@ from hotlever.types import Array
 
 #: Largest resistance of a circuit (Ω), smallest of a bridge, and the largest gain.
 _MOST_OHM, _LEAST_OHM, _MOST_GAIN = 1e7, 1e-3, 1e6
+#: Largest offset of an amplifier (V).
+MOST_OFFSET_V = 10.0
 
 
 def resistance(meaning: str, default: float) -> Any:
@@ -49,12 +51,19 @@ class SweptSupply(Record):
         le=_MOST_GAIN,
         description="of the bridge's amplifier; 1 if left out",
     )
+    bridge_offset_V: float = Field(
+        default=0.0,
+        ge=-MOST_OFFSET_V,
+        le=MOST_OFFSET_V,
+        description="that the bridge's amplifier shows of no voltage",
+    )
 
     @model_validator(mode="after")
     def _bridge_is_whole(self) -> Self:
         arms = {name: getattr(self, name) for name in ("bridge_upper_ohm", "bridge_lower_ohm")}
         missing = [name for name, ohm in arms.items() if ohm is None]
-        if len(missing) == 1 or (missing and self.bridge_gain is not None):
+        amplified = self.bridge_gain is not None or self.bridge_offset_V != 0.0
+        if len(missing) == 1 or (missing and amplified):
             raise ValueError(f"a bridge needs {missing[0]}")
         if not missing and not self.series_resistance_ohm:
             raise ValueError(
@@ -109,10 +118,11 @@ class SweptSupply(Record):
         return 1.0 if self.bridge_gain is None else self.bridge_gain, upper, lower
 
     def bridge_voltage(self, lever_V: Any, bias_V: Any) -> Any:
-        """Return the voltage V_bridge (V) of a lever voltage and a bias (V); NaN without a bridge.
+        """Return the voltage V_bridge (V) of a lever voltage and a bias (V); NaN without one."""
+        return self.bridge_change(lever_V, bias_V) + self.bridge_offset_V
 
-        It is linear too.
-        """
+    def bridge_change(self, lever_V: Any, bias_V: Any) -> Any:
+        """Return how V_bridge (V) changes where the lever voltage and the bias change (V)."""
         gain, upper, lower = self._arms
         return gain * (lever_V - lower / (upper + lower) * bias_V)
 
@@ -122,6 +132,8 @@ class SweptSupply(Record):
         The gain is no such value: its error is that of the scale of what is shown.
         """
         gain, upper, lower = self._arms
+        if name == "bridge_offset_V":
+            return np.full_like(bias_V, 1.0)
         by = {"bridge_upper_ohm": lower, "bridge_lower_ohm": -upper}.get(name, 0.0)
         return np.asarray(gain * by / (upper + lower) ** 2 * bias_V)
 
@@ -130,4 +142,5 @@ class SweptSupply(Record):
         if not self.has_bridge:
             return np.full_like(bias_V, np.nan)
         gain, upper, lower = self._arms
-        return np.asarray((upper / (upper + lower) * bias_V - bridge_V / gain) / self.series_kohm)
+        difference_V = (bridge_V - self.bridge_offset_V) / gain
+        return np.asarray((upper / (upper + lower) * bias_V - difference_V) / self.series_kohm)

@@ -130,7 +130,7 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
         "tip_per_bias_deg": np.degrees(np.unwrap(np.angle(per_bias))),
     }
     if state.lever.circuit.has_bridge:
-        out = state.lever.circuit.bridge_voltage(1.0 / bias, 1.0)
+        out = state.lever.circuit.bridge_change(1.0 / bias, 1.0)
         columns["bridge_per_bias_V_per_V"] = np.abs(out)
         columns["bridge_per_bias_deg"] = np.degrees(np.unwrap(np.angle(out)))
     seen: dict[str, Any] = {
@@ -224,7 +224,7 @@ def harmonics(
     if lever.circuit.has_bridge:
         # the bias has a first harmonic alone
         driven_V = np.array([amplitude_V, *np.zeros(len(HARMONICS) - 1)])
-        seen["bridge_"] = lever.circuit.bridge_voltage(lever_V, driven_V)
+        seen["bridge_"] = lever.circuit.bridge_change(lever_V, driven_V)
     for of, volts in seen.items():
         for number, name in enumerate(HARMONICS):
             angle = np.angle(volts[:, number])
