@@ -1,8 +1,10 @@
 """The measurements of the worked examples: made with legacy FEniCS, and compared with the truth.
 
     python benchmarks/example_measurements.py make [EXAMPLE ...]      writes their CSV files
+    python benchmarks/example_measurements.py bridge                  the same current by a bridge
     python benchmarks/example_measurements.py compare [EXAMPLE ...]
 
+bridge writes what the bridge of bridge.toml shows where the current is that of reference-probe.csv.
 make needs benchmarks/fenics/install.sh. Each lever differs from its probe file in the values of its
 materials, as any does, and in what no fit of it looks for: its thickness, and how something in it
 goes with the temperature. compare solves the true lever, and calibrates the one of the probe file
@@ -22,6 +24,7 @@ import xarray as xr
 from hotlever.calibration import Calibration, calibrate
 from hotlever.files import write_text
 from hotlever.lever import Lever
+from hotlever.measurement import read_measurement
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.importing import import_drawing
 from hotlever.probe.priors import PriorUse
@@ -146,6 +149,17 @@ def make(name: str) -> str:
     return "\n".join([*(f"# {line}" for line in head), ",".join(text), *rows]) + "\n"
 
 
+def by_bridge() -> str:
+    """Return the text of a measurement file: a current that was measured, as a bridge shows it."""
+    circuit = nominal("bridge").circuit
+    measured = read_measurement(FOLDER / "reference-probe.csv")
+    lever_V = circuit.lever_voltage(measured.bias_V, measured.current_mA)
+    shown = 1e3 * circuit.bridge_voltage(lever_V, measured.bias_V)
+    head = "# reference probe in the bridge of bridge.toml\n# base temperature (K): 293\n"
+    rows = [f"{bias:.5g},{mV:.3f}" for bias, mV in zip(measured.bias_V, shown, strict=True)]
+    return "\n".join([f"{head}# medium: vacuum", "V_b (V),V_bridge (mV)", *rows]) + "\n"
+
+
 def noisy(values: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
     """Return values with noise in proportion to them."""
     return np.asarray(values * (1.0 + share * rng.standard_normal(len(values))))
@@ -191,6 +205,9 @@ def _with_error(use: PriorUse) -> str:
 
 def main() -> None:
     action, *names = sys.argv[1:] or [""]
+    if [action, *names] == ["bridge"]:
+        write_text(FOLDER / "bridge.csv", by_bridge())
+        return
     if action not in ("make", "compare") or not set(names) <= set(EXAMPLES):
         sys.exit(__doc__)
     for name in names or EXAMPLES:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from documents import EXAMPLES
 from experiments import full_experiment
 from hotlever.calibration import calibrate
 from hotlever.errors import InputError
@@ -164,6 +165,15 @@ def test_files_head_it_as_laboratories_do_and_it_has_either_sign(tmp_path, headi
     assert data.bridge_output_V.tolist() == [-0.25, -0.4, 0.12, 0.09]
     assert data.observables == ("bridge",)
     assert not any("negative" in note and "V_bridge is" in note for note in data.notes)
+
+
+def test_the_example_shows_the_current_of_the_reference_probe_s():
+    circuit = Probe.from_file(EXAMPLES / "bridge.toml").circuit
+    by_bridge = read_measurement(EXAMPLES / "bridge.csv")
+    by_current = read_measurement(EXAMPLES / "reference-probe.csv")
+    assert by_bridge.observables == ("bridge",)
+    np.testing.assert_array_equal(by_bridge.bias_V, by_current.bias_V)
+    np.testing.assert_allclose(by_bridge.current(circuit), by_current.current_mA, atol=1e-7)
 
 
 def test_a_bridge_is_in_the_probe_or_a_line_says_so(run, tmp_path):
