@@ -148,6 +148,12 @@ def test_simulate_shows_the_numbers_of_the_sweep(tmp_path: Path, run: Run) -> No
             assert f"{answer['now'][key]:.10g}" == row[key]
         line = "hotlever sweep --bias 0:12:49 --set n_d=5e+17 -o reference.sweep.csv"
         await user.should_see(line)
+        fields = {one.props.get("label"): one for one in user.client.elements.values()}
+        fields["A table of states"].set_value("resistance")
+        fields["Set points"].set_value("2.9kohm")
+        line = "hotlever sweep --hold-resistance 2.9kohm --set n_d=5e+17 -o reference.sweep.csv"
+        await user.should_see(line)
+        await user.should_see('hold(lever, "resistance", [2900.0]).data  # ohm')
 
     visit(tmp_path, story)
 

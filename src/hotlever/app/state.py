@@ -61,7 +61,8 @@ class Kept(BaseModel):
 class Simulate(Kept):
     """The page Simulate: a lever, the bias, and the slider's highest (V); and one beside it.
 
-    That is in another medium, of another probe, or one that is ``kept``.
+    That is in another medium, of another probe, or one that is ``kept``. A table is by the bias, or
+    of states that are ``held`` at set points of a resistance or a power.
     """
 
     beside: Annotated[str, Field(pattern="^(|vacuum|air|now|probe:.*)$")] = ""
@@ -69,6 +70,8 @@ class Simulate(Kept):
     bias: float = 8.0
     most: float = 12.0
     view: Literal["rest", "time", "signals"] = "rest"
+    held: Literal["", "resistance", "power"] = ""
+    set_points: str = ""
 
 
 class Pulse(BaseModel):

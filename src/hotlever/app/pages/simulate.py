@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from typing import Any
 
@@ -19,7 +19,9 @@ from hotlever.app.pages.sliders import Sliders
 from hotlever.app.pages.small_signals import SmallSignals
 from hotlever.app.session import Session
 from hotlever.app.workers import Heard
-from hotlever.errors import HotleverError
+from hotlever.errors import HotleverError, InputError
+from hotlever.lever.set_points import HELD
+from hotlever.tasks.texts import parse_set_points
 
 #: Biases of a sweep that is written.
 _BIASES = 49
@@ -33,6 +35,9 @@ _MODELS = {
     "reduced lever": "moving: reduced lever, within some 0.1 K",
     "coarse lever": "moving: coarse lever, within some 2 K",
 }
+#: What a table is of, and examples of set points.
+_TABLES = {"": "by the bias", "resistance": "held at a resistance", "power": "held at a power"}
+_SET_POINTS = {"resistance": "2.5kohm:3kohm:6", "power": "1mW:4mW:7"}
 _VIEWS = {"rest": "at a bias", "time": "in time", "signals": "small signals"}
 
 
@@ -56,6 +61,7 @@ class SimulatePage(LivePage):
                     self.show_live(self._make_plots)
                     with ui.card().classes("w-full last").props("flat bordered"):
                         ui.label("Take it with you").classes("text-bold")
+                        self._show_table()
                         self.kind_buttons(lambda kind: self.run(self._sweep(kind)))
                         Work(session, self.name, self.give)
                         self.command()
@@ -135,6 +141,30 @@ class SimulatePage(LivePage):
 
     # --- the table --------------------------------------------------------------------------------
 
+    def _show_table(self) -> None:
+        """Ask what the table is of."""
+
+        def keep(key: str) -> Callable[[Any], None]:
+            def keep_value(event: Any) -> None:
+                self.chosen[key] = event.value
+                self.show_command()
+
+            return keep_value
+
+        with ui.row().classes("w-full items-end"):
+            held = ui.select(_TABLES, label="A table of states", value=self.chosen["held"])
+            held.on_value_change(keep("held")).classes("w-48")
+            points = ui.input("Set points", value=self.chosen["set_points"])
+            points.on_value_change(keep("set_points")).props("debounce=200 stack-label")
+            examples = (f"{what}: {text}" for what, text in _SET_POINTS.items())
+            points.props(f'placeholder="{", ".join(examples)}"').classes("col")
+            points.bind_visibility_from(held, "value")
+
+    @property
+    def _set_points(self) -> str:
+        """What states are held at, as the options of commands have it."""
+        return self.chosen["set_points"] or _SET_POINTS[self.chosen["held"]]
+
     def task(self) -> Task:
         """Return the task that writes the table of a sweep."""
         return self._sweep("CSV")
@@ -145,10 +175,28 @@ class SimulatePage(LivePage):
         bias = f"{chosen['bias']:g}:{chosen['bias']:g}:1"
         bias = bias if kind == "VTU" else f"0:{chosen['most']:g}:{_BIASES}"
         files = outputs(f"{stem(chosen)}.sweep", kind)
-        return Task("sweep", probe_files(chosen), {"bias": bias, **settings(chosen), **files})
+        held = chosen["held"]
+        states = {f"hold_{held}": self._set_points} if held else {"bias": bias}
+        return Task("sweep", probe_files(chosen), {**states, **settings(chosen), **files})
 
     def python(self) -> str:
         """Return the lines of Python that make the sweep."""
+        held = self.chosen["held"]
+        if held:
+            unit = HELD[held].unit
+            try:
+                points = parse_set_points(self._set_points, unit, "set points").tolist()
+            except InputError:
+                return ""  # the command will say what is wrong
+            return "\n".join(
+                [
+                    "from hotlever import Lever, Probe",
+                    "from hotlever.lever.set_points import hold",
+                    "",
+                    f"lever = Lever({in_python(self.chosen)})",
+                    f'data = hold(lever, "{held}", {points}).data  # {unit}',
+                ]
+            )
         return "\n".join(
             [
                 "import numpy as np",
