@@ -4,7 +4,8 @@ python benchmarks/contact_twins.py [COUNT] [CASE...]
 
 Each twin has a resistance of its own, between a third and three times what resists beside it, and a
 material of its own, known to 1 % by priors, as from a fit out of contact. Of its interface nothing
-is known but its power of ten. Currents have a noise of 1e-4, melting points one of 1.5 K.
+is known but its power of ten. Currents have a noise of 1e-4, and a scale that is off
+by 1e-3, as is assumed of a meter; melting points have a noise of 1.5 K.
 
 in: 41 biases in contact. melting: these, and melting points at three of them. in and out: 41
 biases in contact and the same out of it. approach: in air, where the gas is known to 5 %, a curve
@@ -29,6 +30,7 @@ from hotlever import Measurement, Probe, fit
 from hotlever.contact.cone import cold_resistance
 from hotlever.contact.law import INTERFACE, ContactLaw
 from hotlever.estimation.experiment_at_rest import ExperimentAtRest
+from hotlever.estimation.noise import METERS
 from hotlever.estimation.over_a_sample import with_distances
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -100,7 +102,8 @@ def twin(case: Case, number: int) -> tuple[float, float]:
     shown = experiment.measuring(case.bias, None, case.distance).predict(probe.replace(truth))
     rows = {column.name: shown.values[row] for row, column in enumerate(FITTED.values())}
     nothing = np.full(case.bias.size, np.nan)
-    current = rows["current_mA"] * (1.0 + NOISE * random.normal(size=nothing.size))
+    shares = 1.0 + NOISE * random.normal(size=nothing.size)
+    current = rows["current_mA"] * shares * (1.0 + METERS * random.normal())
     measured = Measurement(case.bias, current, nothing, nothing, nothing)
     measured = replace(measured, distance_um=case.distance)
     if case.melting:
