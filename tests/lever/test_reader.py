@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.constants import Boltzmann
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 from hotlever import Lever, Probe
 from hotlever.air.coupling import AirLoss
 from hotlever.datasets import csv_text
 from hotlever.errors import InputError
 from hotlever.figures import figure_of
-from hotlever.lever.lever import COARSE, State
+from hotlever.lever.lever import COARSE
 from hotlever.lever.noise import NoiseOptions, johnson, of_resistors, of_temperature, per_hooge
 from hotlever.lever.reader import Reader, at_distance, best_bias, over_surface, rows_of
 from hotlever.lever.response import Response
@@ -164,17 +166,27 @@ def test_fluctuations_of_the_temperature_are_those_of_a_conductance(medium, coar
 
 
 def test_fluctuations_of_the_temperature_hold_equipartition(coarse):
-    """A mode that decays in τ and holds C has the variance k_B T²/C: the integral of S_T."""
-    cold = np.zeros((coarse.space.size + 1, 1))
-    taus, modes = slowest_modes(State(coarse, cold))
-    for tau, mode in zip(taus, modes.T, strict=True):
-        shape = np.where(coarse.space.is_temperature, mode, 0.0)[:, None]
-        capacity = 1e-9 * (shape * coarse.equations.storage_change(cold, shape)).sum()
-        fluxes = 1e-6 * of_temperature(of_heat(coarse, shape))
-        frequencies = np.geomspace(1e-5, 1e5, 20001) / (1e-6 * tau)
-        spectrum = fluxes / capacity**2 / ((1e6 / tau) ** 2 + (2 * np.pi * frequencies) ** 2)
-        variance = np.trapezoid(spectrum, frequencies)
-        assert variance == pytest.approx(Boltzmann * 293.0**2 / capacity, rel=1e-3)
+    """The spectrum of the mean temperature integrates to k_B T²/C over all frequencies.
+
+    The mean is weighted by heat capacities, and the response at each frequency solved for.
+    """
+    free = np.flatnonzero(coarse.space.is_temperature)
+    each = np.zeros((coarse.space.size + 1, free.size))
+    each[free, np.arange(free.size)] = 1.0
+    changes = coarse.equations.balance_change, coarse.equations.storage_change
+    conducted, stored = (csc_array(change(0.0 * each, each)[free]) for change in changes)
+    capacity = stored.sum()
+    mean, frequencies = stored.sum(axis=0) / capacity, np.geomspace(1e-5, 2e3, 81)
+    spectrum = []
+    for MHz in frequencies:
+        adjoint = splu((conducted + 2j * np.pi * MHz * stored).tocsc()).solve(mean.astype(complex))
+        parts = np.zeros((2, coarse.space.size + 1, 1))
+        parts[:, free, 0] = adjoint.real, adjoint.imag
+        spectrum.append(sum(of_temperature(of_heat(coarse, part)) for part in parts))
+    # below the lowest frequency it is that at rest
+    by_octave = np.trapezoid(spectrum * frequencies, np.log(frequencies))
+    variance = 1e6 * (by_octave + spectrum[0] * frequencies[0])
+    assert variance == pytest.approx(Boltzmann * 293.0**2 / (1e-9 * capacity), rel=1e-3)
 
 
 def test_the_best_bias_resolves_better_than_others():
