@@ -188,6 +188,10 @@ def test_a_refused_calibration_says_nothing_of_what_to_set(tmp_path: Path) -> No
                 shown(user, f"data-answer={along}")
                 for along in ("none", "tip_K", "bias_V", "power_mW")
             )
+            if not reason:
+                user.find("What to measure next").click()
+                # by the paper's rule there is no posterior to ask
+                await user.should_see("expected one of a probe with priors", retries=50)
 
         visit(tmp_path, story)
     assert answered[""].count("set a bias of") == 3

@@ -188,17 +188,20 @@ class LinearisedLever:
         covariance of the unknowns: so far up the gradient that a lever may have a share of
         probability beyond it (the design point of the first-order reliability method; Hasofer and
         Lind, J. Eng. Mech. 100, 111 (1974)). Each such lever is read along its whole branch, so
-        that the knee, a fold and the melting of something count.
+        that the knee, a fold and the melting of something count. Where parameters make up for each
+        other along a bent valley it may lie off the valley and be too cold; so no tip is said to
+        stay below what the linearised error says.
         """
         count, length = len(self.names), deviations * self.stretch
         covariance = covariance[:count, :count]
-        _, slopes = self.tip(bias)
-        return np.array(
-            [
-                self._hottest(float(each), slope[:count], covariance, length)
-                for each, slope in zip(bias, slopes, strict=True)
-            ]
-        )
+        tip, slopes = self.tip(bias)
+        slopes = slopes[:, :count]
+        linear = tip + length * np.sqrt(np.einsum("bp,pq,bq->b", slopes, covariance, slopes))
+        hottest = [
+            self._hottest(float(each), slope, covariance, length)
+            for each, slope in zip(bias, slopes, strict=True)
+        ]
+        return np.maximum(linear, hottest)
 
     def _hottest(self, bias: float, gradient: Array, covariance: Array, length: float) -> float:
         surrogate = self.surrogate.reading(Rows(np.array([bias])))

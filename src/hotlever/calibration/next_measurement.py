@@ -89,31 +89,27 @@ class Plan:
         columns = {name: self.proposals[own].values for name, own in _COLUMNS.items()}
         return frame_text(pd.DataFrame(columns), index=False, float_format="%.6g")
 
+    @property
+    def rows(self) -> list[list[str]]:
+        """The proposals as a table for people, with its head."""
+        head = ["measure", "V_b (V)", "T_tip (K)", f"{SURE:.0%} below (K)", "then ± (K)"]
+        numbers = {"bias_V": 3, "tip_K": 0, "tip_limit_K": 0, "stderr_then_K": 1}
+        columns = [
+            [f"{value:.{digits}f}" for value in self.proposals[name].values.tolist()]
+            for name, digits in numbers.items()
+        ]
+        cells = zip(self.proposals.what.values.tolist(), *columns, strict=True)
+        return [head, *map(list, cells)]
+
+    @property
+    def now(self) -> str:
+        """How sure the tip temperature is now, in words."""
+        stderr = self.proposals.stderr_now_K.values[0]
+        return f"the tip at {self.at_K:.0f} K is known to ± {stderr:.1f} K now (standard error)"
+
     def text(self) -> str:
         """Return what is proposed as lines of text."""
-        names = ["measure", "V_b (V)", "T_tip (K)", f"{SURE:.0%} below (K)", "then ± (K)"]
-        rows = [names]
-        for number in range(self.proposals.sizes["proposal"]):
-            row = self.proposals.isel(proposal=number)
-            numbers = [row[name].item() for name in ("tip_K", "tip_limit_K")]
-            rows.append(
-                [
-                    row.what.item(),
-                    f"{row.bias_V.item():.3f}",
-                    *(f"{value:.0f}" for value in numbers),
-                    f"{row.stderr_then_K.item():.1f}",
-                ]
-            )
-        now = self.proposals.stderr_now_K.values[0]
-        return "\n".join(
-            [
-                f"the tip at {self.at_K:.0f} K is known to ± {now:.1f} K now (standard error)",
-                "",
-                *aligned(rows, right=True),
-                "",
-                self.safety,
-            ]
-        )
+        return "\n".join([self.now, "", *aligned(self.rows, right=True), "", self.safety])
 
     @property
     def safety(self) -> str:
@@ -307,7 +303,17 @@ def _safe_biases(lever: LinearisedLever, stated: Array | None, limit_K: float) -
 
 def _highest(lever: LinearisedLever, bias: Array, information: Information) -> Array:
     """Return the tip temperatures (K) that are not exceeded at some biases (V), for all we know."""
-    return lever.highest_tip(bias, information.covariance, float(ndtri(SURE)))
+    deviations, (tip_K, _) = float(ndtri(SURE)), lever.tip(bias)
+    away = lever.highest_tip(bias, information.covariance, deviations) - tip_K
+    return np.asarray(tip_K + np.hypot(away, deviations * _error_of_model(lever, bias)))
+
+
+def _error_of_model(lever: LinearisedLever, bias: Array) -> Array:
+    """Return what the model leaves out of the tip temperature (K) at some biases (V)."""
+    fine = np.linspace(_LOWEST, 1.0, _FINE) * bias.max()
+    rise = lever.tip(fine)[0] - lever.probe.circuit.base_temperature_K
+    error = error_of_model(lever.probe.surroundings, lever.names, fine, rise)
+    return np.interp(bias, fine, error)
 
 
 def _allowed(
@@ -372,10 +378,7 @@ def _errors_that_stay(
 
     The last bias (V) is the one where the error counts.
     """
-    fine = np.linspace(_LOWEST, 1.0, _FINE) * bias.max()
-    rise = lever.tip(fine)[0] - lever.probe.circuit.base_temperature_K
-    of_model = error_of_model(lever.probe.surroundings, lever.names, fine, rise)
-    of_model = np.interp(bias, fine, of_model)
+    of_model = _error_of_model(lever, bias)
     if calibration is None:
         return of_model, []
     table, notes = calibration.table, []

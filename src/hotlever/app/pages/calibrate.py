@@ -8,6 +8,7 @@ from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import download_button
 from hotlever.app.pages.measured import MeasuredPage
 from hotlever.app.pages.page import MEDIA, REFERENCE, several
+from hotlever.app.pages.proposals import Proposals
 from hotlever.app.project import CALIBRATIONS
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
@@ -86,6 +87,7 @@ class CalibratePage(MeasuredPage):
                 ui.label(refusal).classes("remark").props("data-answer=none")
                 return
             questions = [_Question(self.session, name, along) for along in _ASKED]
+        Proposals(self.session, self.banner, name)
         for question in questions:
             await question.answer()
 
