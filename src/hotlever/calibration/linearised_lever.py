@@ -136,6 +136,11 @@ class LinearisedLever:
         branch = self.surrogate.branch
         return branch.highest_bias(self.probe.circuit, MOST_BIAS)
 
+    @property
+    def hottest_K(self) -> float:
+        """The tip temperature (K) at which something melts."""
+        return self.surrogate.branch.hottest_K
+
     def bias_for(self, tip_K: float) -> float:
         """Return the bias (V) at which a slow ramp has the tip at a temperature.
 
@@ -151,7 +156,7 @@ class LinearisedLever:
             raise InputError(
                 f"no bias of a slow ramp has the tip of this lever at {tip_K:.0f} K; expected a "
                 f"temperature from {self.probe.circuit.base_temperature_K:.0f} to "
-                f"{branch.hottest_K:.0f} K that it does not jump over"
+                f"{self.hottest_K:.0f} K that it does not jump over"
             )
         return float(at[0])
 

@@ -277,15 +277,15 @@ def _safe_biases(lever: LinearisedLever, stated: Array | None, limit_K: float) -
         bias = _usual_biases(lever)
     else:
         bias = np.unique(stated[(stated > 0.0) & (stated <= lever.highest_V)])
-    highest = _highest(lever, bias, information)
-    safe = int(np.argmin(np.append(highest < limit_K, False)))
     if not bias.size:
         raise InputError(f"biases: expected some above 0 and up to {lever.highest_V:.4g} V")
+    highest = _highest(lever, bias, information)
+    safe = int(np.argmin(np.append(highest < limit_K, False)))
     if not safe:
-        raise InputError(
-            f"no bias is safe: at {bias[0]:.3g} V the tip may reach {highest[0]:.0f} K; expected a "
-            "higher limit"
-        )
+        reached = f"the tip may reach {highest[0]:.0f} K"
+        if not np.isfinite(highest[0]):
+            reached = "something may melt"
+        raise InputError(f"no bias is safe: at {bias[0]:.3g} V {reached}; expected a lower one")
     if stated is not None or safe == bias.size:
         return _Biases(bias, highest, safe)
     low, high = bias[safe - 1 : safe + 1]
@@ -302,10 +302,14 @@ def _safe_biases(lever: LinearisedLever, stated: Array | None, limit_K: float) -
 
 
 def _highest(lever: LinearisedLever, bias: Array, information: Information) -> Array:
-    """Return the tip temperatures (K) that are not exceeded at some biases (V), for all we know."""
+    """Return the tip temperatures (K) that are not exceeded at some biases (V), for all we know.
+
+    They are infinite where something may melt.
+    """
     deviations, (tip_K, _) = float(ndtri(SURE)), lever.tip(bias)
     away = lever.highest_tip(bias, information.covariance, deviations) - tip_K
-    return np.asarray(tip_K + np.hypot(away, deviations * _error_of_model(lever, bias)))
+    highest = tip_K + np.hypot(away, deviations * _error_of_model(lever, bias))
+    return np.where(highest < lever.hottest_K, highest, np.inf)
 
 
 def _error_of_model(lever: LinearisedLever, bias: Array) -> Array:
