@@ -85,7 +85,7 @@ class BaseLine:
         return line
 
     def seen(self, points: Array) -> Array:
-        """Return places (n, 2) by their distances along the lever and across it (µm)."""
+        """Return points (n, 2) by their distances along the lever and across it (µm)."""
         return (points - self.origin) @ np.stack([self.along, self.across], axis=1)
 
     def placed(self, corners: Array) -> Array:

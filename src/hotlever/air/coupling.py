@@ -245,7 +245,7 @@ class _Directions:
         self._near, self._lost, self._sampled = near, lost, sampled
         # per direction: its image between the sites (orthonormal), and the change of x
         self._images = self._changes = np.empty((0, 0))
-        self._directions = 0
+        self._count = 0
 
     def solve(self, right_hand_side: Array) -> Array:
         """Solve for one right-hand side."""
@@ -254,17 +254,17 @@ class _Directions:
         goal = _TOLERANCE * np.linalg.norm(residual)
         used = restarts = 0
         while True:
-            if self._directions:
-                images = self._images[used : self._directions]
+            if self._count:
+                images = self._images[used : self._count]
                 shares = images @ residual
-                x += shares @ self._changes[used : self._directions]
+                x += shares @ self._changes[used : self._count]
                 residual = residual - shares @ images
-                used = self._directions
+                used = self._count
             if not np.linalg.norm(residual) > goal:
                 return x
             if used == _MOST_DIRECTIONS:
                 # those of many other right-hand sides fill the memory; begin again
-                used, self._directions, restarts = 0, 0, restarts + 1
+                used, self._count, restarts = 0, 0, restarts + 1
             if restarts > _MOST_RESTARTS:
                 raise ComputationError(
                     f"a linear system in air was not solved with {restarts} times "
@@ -273,7 +273,7 @@ class _Directions:
             self._add(residual)
 
     def _add(self, direction: Array) -> None:
-        count = self._directions
+        count = self._count
         change = -self._near(self._lost(direction))
         image = direction - self._sampled(change)
         if not self._images.size:
@@ -285,7 +285,7 @@ class _Directions:
         change = change - shares @ self._changes[:count]
         length = np.linalg.norm(image)
         self._images[count], self._changes[count] = image / length, change / length
-        self._directions += 1
+        self._count += 1
 
 
 def _columnwise(matrix: Any, x: Array) -> Array:

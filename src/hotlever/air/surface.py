@@ -134,7 +134,7 @@ class _Outline:
         return (np.asarray(points) - self._origin) @ self._axes.T
 
     def on_the_lever(self, points: Array) -> Array:
-        """Return places (..., 2) of the outline in the coordinates of the layout."""
+        """Return points (..., 2) of the outline in the coordinates of the layout."""
         return points @ self._axes + self._origin
 
     def _exposed(self, layout: Layout) -> tuple[list[Array], Array]:

@@ -70,7 +70,7 @@ def relative_noise(difference: Array, shown: Array, leverage: Array, usual: floa
     by_shape = np.append(squares / shape, np.full((_SHARES.size, 1), usual**2), axis=1)
     scale = np.median(by_shape, axis=1, keepdims=True) + np.mean(by_shape, axis=1, keepdims=True)
     for _ in range(_ROUNDS):
-        counting = (_TAILS + 1.0) / (_TAILS + by_shape / scale)
+        counting = _weight_of_t(by_shape / scale)
         scale = np.mean(counting * by_shape, axis=1, keepdims=True)
     tails = 0.5 * (_TAILS + 1.0) * np.log1p(by_shape / (_TAILS * scale))
     likelihood = -tails.sum(axis=1) - 0.5 * np.log(shape * scale).sum(axis=1)
@@ -79,6 +79,11 @@ def relative_noise(difference: Array, shown: Array, leverage: Array, usual: floa
     relative = np.ones(difference.shape)
     relative[here] = np.sqrt(1.0 / (precision * np.mean(1.0 / precision)))
     return relative
+
+
+def _weight_of_t(squares: Array) -> Array:
+    """Return how much data count of a t distribution, by their squares over its scale's."""
+    return (_TAILS + 1.0) / (_TAILS + squares)
 
 
 class DataErrors:
@@ -180,10 +185,9 @@ class DataErrors:
 
         Outliers count as little as they weigh. The `leverage`, (observables, n), is the share of
         each datum's noise that a fit has taken up. The `usual` scatter, a share of the largest
-        value, counts as one datum more, of a t distribution: a few data say little of their own.
-        With it the noise may
-        go with the size of what is shown (see `relative_noise`), and is not what is smooth; without
-        it is the same everywhere.
+        value, counts as one datum more, of a t distribution: a few data say little of their own,
+        many data of a good meter outvote it. With it the noise may go with the size of what is
+        shown (see `relative_noise`), and is not what is smooth; without it is the same everywhere.
         """
         weight = np.where(self.present, self.down**2, 0.0)
         difference = difference * self._root
@@ -197,12 +201,10 @@ class DataErrors:
         squares = np.nansum(weight * (difference / self._relative) ** 2, axis=1, keepdims=True)
         count = weight.sum(axis=1, keepdims=True) + bool(usual)
         free = np.maximum(count - leverage.sum(axis=1, keepdims=True), 1.0)
-        smallest = 1e-6 * self.largest
-        scatter = np.maximum(np.sqrt((squares + least**2) / free), smallest)
-        for _ in range(_ROUNDS if usual else 0):
-            # many data of a good meter outvote it, as they do any outlier
-            counting = (_TAILS + 1.0) / (_TAILS + (least / scatter) ** 2)
+        smallest, counting = 1e-6 * self.largest, np.ones_like(squares)
+        for _ in range(1 + _ROUNDS if usual else 1):
             scatter = np.maximum(np.sqrt((squares + counting * least**2) / free), smallest)
+            counting = _weight_of_t((least / scatter) ** 2)
         if usual:
             scatter = np.minimum(scatter, np.maximum(_OF_NOISE * self._noise(difference), least))
         own = scatter * self._relative / self._root
