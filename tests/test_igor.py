@@ -47,7 +47,7 @@ def test_a_force_curve_has_a_column_for_each_channel(tmp_path):
     data = read_measurement(path, columns=parse_columns(["D (m)=ZSnsr", "I_h (mA)=UserIn0"]))
     assert data.current_mA.tolist() == CURRENT[:3].tolist()
     np.testing.assert_allclose(data.distance_um, [0.3, 0.1, 0.0])
-    assert any("'Defl' is not used" in note for note in data.notes)
+    assert any("'Defl' is not used" in note for note in data.unused)
 
 
 def test_a_wave_in_time_has_its_times(tmp_path):

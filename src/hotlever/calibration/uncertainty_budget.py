@@ -295,12 +295,8 @@ class BudgetFields(Section):
         """Return the values of a budget by field."""
         budget, interval, section = stated.budget, stated.monte_carlo, None
         if interval is not None:
-            section = IntervalSection(
-                trials=interval.trials,
-                low_K=interval.low,
-                high_K=interval.high,
-                tolerance_K=budget.tolerance,
-            )
+            ends = {"low_K": interval.low, "high_K": interval.high}
+            section = IntervalSection.holding(interval, **ends, tolerance_K=budget.tolerance)
         return {
             "gum": [InputSection.of(row) for row in budget.inputs],
             "gum_correlation": budget.correlation,
