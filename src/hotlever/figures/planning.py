@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from itertools import cycle
 from typing import Any
 
@@ -28,7 +29,9 @@ def planned_measurements(plan: Plan) -> Figure:
     """
     errors, proposals = plan.errors, plan.proposals
     shown = np.isfinite(errors.tip_limit_K.values)
-    points = _counted(plan)
+    counts = Counter(
+        zip(proposals.what.values.tolist(), proposals.bias_V.values.tolist(), strict=True)
+    )
     with figure(8.0, 3.8, 1, 2, letters=True) as (made, (by_tip, by_bias)):
         made.suptitle(plan.lever, x=0.01, ha="left")
         for added, colour in zip(errors.added.values.tolist(), cycle(_LINES), strict=False):
@@ -49,7 +52,7 @@ def planned_measurements(plan: Plan) -> Figure:
             by_bias.axhline(plan.stay_below_K, color=VERMILION, lw=0.9)
             text = f" limit {plan.stay_below_K:.0f} K"
             by_bias.annotate(text, (errors.bias.values[0], plan.stay_below_K), va="bottom")
-        for (kind, bias), times in points.items():
+        for (kind, bias), times in counts.items():
             tip = float(np.interp(bias, errors.bias, errors.tip_K))
             stderr_K = float(np.interp(bias, errors.bias, last))
             style = {"ls": "none", "ms": 7.0, "mec": "white", **_MARKS[kind], "zorder": 3}
@@ -64,12 +67,3 @@ def planned_measurements(plan: Plan) -> Figure:
         for axes in (by_tip, by_bias):
             axes.legend(loc="upper left")
     return made
-
-
-def _counted(plan: Plan) -> dict[tuple[str, float], int]:
-    """Return how often each measurement is proposed, by kind and bias (V)."""
-    counts = dict[tuple[str, float], int]()
-    kinds, biases = plan.proposals.what.values.tolist(), plan.proposals.bias_V.values.tolist()
-    for at in zip(kinds, biases, strict=True):
-        counts[at] = counts.get(at, 0) + 1
-    return counts
