@@ -105,6 +105,31 @@ def test_the_thermometer_of_h_3():
     assert (round(cold + 10.0 * slope, 4), round(budget.u, 4)) == (-0.1494, 0.0041)
 
 
+def test_gtc_finds_the_same():
+    gtc = pytest.importorskip("GTC", reason="the extra test is not installed as it is locked")
+    standard, at = gtc.ureal(50_000_623.0, 25.0, 18), gtc.ureal(-0.1, 0.2)
+    apart = sum((gtc.ureal(0.0, *known) for known in ((5.8, 24), (3.9, 5), (6.7, 8))), 215.0)
+    expansion = gtc.ureal(0.0, gtc.type_b.uniform(1e-6), 50)
+    warmth = gtc.ureal(0.0, gtc.type_b.uniform(0.05), 2)
+    length = standard + apart - standard * (expansion * at + 11.5e-6 * warmth)
+    assert end_gauge().u == pytest.approx(length.u, rel=1e-6)
+    assert end_gauge().dof == pytest.approx(length.df, rel=1e-6)
+    assert end_gauge().expanded(0.99) == pytest.approx(
+        gtc.reporting.k_factor(np.floor(length.df), 99) * length.u, rel=1e-6
+    )
+    voltage, current, phase = gtc.type_a.multi_estimate_real(OBSERVED.tolist())
+    size = voltage / current
+    measurands = {"R": size * gtc.cos(phase), "X": size * gtc.sin(phase), "Z": size}
+    _, of = impedance()
+    for name, measurand in measurands.items():
+        assert of[name].u == pytest.approx(measurand.u, rel=1e-9)
+        for other, beside in measurands.items():
+            both = gtc.get_covariance(measurand, beside)
+            assert of[name].covariance(of[other]) == pytest.approx(both, rel=1e-9)
+    line = gtc.type_a.line_fit([reading - 20.0 for reading in READING], CORRECTION)
+    assert thermometer()[-1].u == pytest.approx((line.intercept + 10.0 * line.slope).u, rel=1e-9)
+
+
 def test_trials_are_added_until_both_ends_are_settled():
     """The sum of four rectangular quantities of unit variance, whose quantiles are exact."""
     random, half = np.random.default_rng(0), np.sqrt(3.0)
