@@ -119,6 +119,9 @@ def test_from_the_shipped_measurement_to_a_table_in_five_clicks(
     with page.expect_download() as download:
         button(page, "calibration as PDF").click()
     assert Path(download.value.path()).read_bytes().startswith(b"%PDF")
+    with page.expect_download() as download:
+        button(page, "Uncertainty budget (one sheet)").click()
+    assert "Monte Carlo method" in Path(download.value.path()).read_text(encoding="utf-8")
 
 
 def test_the_files_are_those_of_the_command_line(folder: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 import hotlever
 from hotlever.calibration import calibrate
+from hotlever.report.budget_pages import budget_page
 from hotlever.report.calibration_pages import calibration_page
 
 pytest.importorskip("playwright", reason="the extra test-app is not installed")
@@ -39,6 +40,7 @@ def _boxes(content: bytes) -> list[bytes]:
     return re.findall(rb"/MediaBox \[([^\]]*)\]", content)
 
 
-def test_a_calibration_prints_on_two_sheets(tmp_path):
+def test_a_calibration_prints_on_two_sheets_and_its_uncertainty_budget_on_one(tmp_path):
     result = calibrate(EXAMPLES / "lever-a.csv")
     assert sheets(calibration_page(result).write(tmp_path)) == 2
+    assert sheets(budget_page(result).write(tmp_path, "budget")) == 1

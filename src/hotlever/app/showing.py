@@ -41,6 +41,7 @@ from hotlever.probe import Layout, Probe
 from hotlever.probe.file_sections import read_sections
 from hotlever.probe.shapes import PARAMETRIC
 from hotlever.raman import read_spectra
+from hotlever.report.budget_pages import budget_page
 from hotlever.report.calibration_pages import calibration_page
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.page import Block, Page
@@ -127,6 +128,18 @@ def drawn(report: Report, kind: str, name: str, figure: str, suffix: str) -> byt
     blocks = _page(kind, Path(name)).blocks
     made = next(block["figure"] for block in blocks if block.get("name") == figure)
     return _file(made, suffix)
+
+
+def budget(report: Report, folder: Path, name: str) -> bytes:
+    """Return the uncertainty budget of a calibration as a page that one sheet of paper holds.
+
+    Raises
+    ------
+    InputError
+        If it has none.
+    """
+    stated = budget_page(_calibration(folder / name, file_stamp(folder / name)))
+    return stated.html().encode()
 
 
 def doubted(report: Report, name: str) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.frame import download_button
+from hotlever.app.pages.frame import download_button, hand_over, small_button
 from hotlever.app.pages.measured import MeasuredPage
 from hotlever.app.pages.page import MEDIA, REFERENCE, several
 from hotlever.app.pages.proposals import Proposals
@@ -75,6 +77,8 @@ class CalibratePage(MeasuredPage):
             ui.label(name).classes("text-lg text-bold")
             download_button(self.session, self._table_file, "Table (CSV)")
             download_button(self.session, name, "Calibration (JSON)")
+            give = partial(self._give_budget, name)
+            small_button("Uncertainty budget (one sheet)", give, icon="print")
         doubt: str | None = None
         with self.banner.caught():
             doubt = await self.session.ask("full", "showing:doubted", name)
@@ -90,6 +94,12 @@ class CalibratePage(MeasuredPage):
         Proposals(self.session, self.banner, name)
         for question in questions:
             await question.answer()
+
+    async def _give_budget(self, name: str) -> None:
+        """Hand over the uncertainty budget, to print it."""
+        with self.banner.caught():
+            page = self.session.ask("full", "showing:budget", name)
+            await hand_over(page, f"{self.stem}-budget.html")
 
 
 class _Question:
