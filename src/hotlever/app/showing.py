@@ -130,7 +130,7 @@ def drawn(report: Report, kind: str, name: str, figure: str, suffix: str) -> byt
     return _file(made, suffix)
 
 
-def budget(report: Report, folder: Path, name: str) -> bytes:
+def budget(report: Report, name: str) -> bytes:
     """Return the uncertainty budget of a calibration as a page that one sheet of paper holds.
 
     Raises
@@ -138,7 +138,7 @@ def budget(report: Report, folder: Path, name: str) -> bytes:
     InputError
         If it has none.
     """
-    stated = budget_page(_calibration(folder / name, file_stamp(folder / name)))
+    stated = budget_page(_calibration(Path(name), file_stamp(Path(name))))
     return stated.html().encode()
 
 
