@@ -9,12 +9,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
 from hotlever import __version__
 from hotlever.errors import ComputationError
 from hotlever.probe import Probe
+from hotlever.tasks.ranges import parse_bias, parse_frequencies
 from of_materials import p_type_probe
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
@@ -118,6 +120,12 @@ def test_sweep_prints_csv(run):
     assert 1150 < float(rows[-1]["tip_K"]) < 1250
 
 
+def test_a_range_may_be_a_single_value_and_no_rounding_is_taken_for_a_bias():
+    assert parse_bias("200mV").tolist() == [0.2]
+    assert parse_bias("-0.3:0.3:7", -np.inf)[3] == 0.0
+    assert parse_frequencies("10kHz").tolist() == [1e4]
+
+
 def test_sweep_writes_files_plot_and_fields(run, tmp_path):
     status, out, _ = run(
         "sweep", "--bias", "5:5:1", "--set", "c_kappa=0.7", "--set", "gap_um=3.5",
@@ -219,10 +227,11 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         (("probe", "show", "--plot", "a.txt"), "a.txt: unknown file type '.txt'"),
         (("probe", "new", "-o", "no/such/folder/a.toml"), "the folder no/such/folder does not"),
         (("sweep", "--bias", "1:11"), "expected START:STOP:COUNT"),
+        (("sweep", "--bias", "x"), "found 'x', expected a number"),
         (("sweep", "--bias", "1:x:3"), "found 'x', expected a number"),
         (("sweep", "--bias", "1:11:0"), "COUNT is '0'"),
-        (("sweep", "--bias", "1:11:1"), "COUNT 1 goes with START = STOP"),
-        (("sweep", "--bias", "5:1:3"), "expected 0 <= START <= STOP"),
+        (("sweep", "--bias", "1:11:1"), "expected START < STOP, or START = STOP with COUNT 1"),
+        (("sweep", "--bias", "5:1:3"), "expected START < STOP"),
         (("sweep", "--set", "ckappa=1"), "did you mean 'c_kappa'"),
         # none of sixty names is alike: those that it ends come first
         (("sweep", "--set", "kind=x"), "'kind' (expected one of: circuit.supply.kind, circuit."),

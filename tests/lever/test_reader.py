@@ -241,7 +241,7 @@ def test_what_shows_nothing_is_refused():
         (["--amplifier", "5"], "--amplifier: found '5', expected a number with a unit like V"),
         (["--hooge", "-1"], "--hooge -1: expected a number from 0 to 1"),
         (["--vibration", "1"], "--vibration: found '1', expected a length"),
-        (["--pressure", "0:10:2"], "expected 1e-6 <= START"),
+        (["--pressure", "0:10:2"], "found '0', expected 1e-6 to 1e6 mbar"),
         (["--set", "sample=polymer", "--set", "tip.height_um=0.2"], "the tip touches a sample"),
     ],
 )

@@ -27,7 +27,7 @@ from hotlever.probe import Layout, Probe
 from hotlever.probe.shapes import Shape
 from hotlever.steps import each
 from hotlever.tasks.approaching import noise_of, probe_over_surface
-from hotlever.tasks.texts import parse_distances
+from hotlever.tasks.ranges import parse_distances
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 

@@ -12,9 +12,10 @@ from hotlever.probe.contact import length_um
 from hotlever.probe.surroundings import Surroundings
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
+from hotlever.tasks.ranges import parse_bias, parse_distances, parse_pressures
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import ReaderRequest
-from hotlever.tasks.texts import parse_band, parse_bias, parse_distances, parse_pressures
+from hotlever.tasks.texts import parse_band
 from hotlever.types import Array
 from hotlever.units import setting
 

@@ -13,9 +13,9 @@ from hotlever.probe.contact import interface_of, length_um, parsed_layers
 from hotlever.probe.tip import EXAMPLE
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
+from hotlever.tasks.ranges import parse_bias
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import ContactRequest
-from hotlever.tasks.texts import parse_bias
 
 if TYPE_CHECKING:
     import xarray as xr

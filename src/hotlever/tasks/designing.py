@@ -12,8 +12,9 @@ from hotlever.studies import design as study
 from hotlever.tasks.design_requests import DesignRequest
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe
+from hotlever.tasks.ranges import parse_varied
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.texts import check_number, parse_bounds, parse_setting, parse_varied
+from hotlever.tasks.texts import check_number, parse_bounds, parse_setting
 
 #: Numbers that are varied at once of which there are figures: a curve or a map.
 _DRAWN = 2

@@ -10,8 +10,9 @@ from typing import Any
 
 from hotlever.errors import InputError, quoted, shown, unknown_name
 from hotlever.tasks.measured_requests import MeasuredRequest
+from hotlever.tasks.ranges import parse_bias
 from hotlever.tasks.requests import File, PlotRequest, argument, check_medium, option, written
-from hotlever.tasks.texts import check_number, parse_bias, parse_number, parse_pairs
+from hotlever.tasks.texts import check_number, parse_number, parse_pairs
 from hotlever.units import setting
 
 #: Measurements that are proposed at once; by default, unless kinds are limited.

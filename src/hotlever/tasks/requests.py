@@ -156,7 +156,7 @@ class SweepRequest(TableRequest, LeverRequest):
     bias: str | None = option(
         None,
         metavar="START:STOP:COUNT",
-        help="In volts, ends included; 1:11:25 if left out.",
+        help="In volts, ends included, or a single one; 1:11:25 if left out.",
     )
     hold_resistance: str | None = option(
         None,
@@ -181,7 +181,7 @@ class SweepRequest(TableRequest, LeverRequest):
     @property
     def set_points(self) -> tuple[str, str, Array] | None:
         """What is held, by which option, and the set points (Ω, mW); None of a range of bias."""
-        from hotlever.tasks.texts import parse_set_points
+        from hotlever.tasks.ranges import parse_set_points
 
         asked = {"--hold-resistance": self.hold_resistance, "--hold-power": self.hold_power}
         given = {name: text for name, text in asked.items() if text is not None}
@@ -330,7 +330,8 @@ class ContactRequest(TableRequest, LeverRequest, TimesRequest):
     bias: str | None = option(
         None,
         metavar="START:STOP:COUNT",
-        help="In volts, ends included; 1:11:25 if neither this nor a wave form is given.",
+        help="In volts, ends included, or a single one; 1:11:25 if neither this nor a wave form is "
+        "given.",
     )
 
 
@@ -340,7 +341,9 @@ class SpectrumRequest(TableRequest, LeverRequest):
 
     bias: str = option(MISSING, metavar="V", help="Of the operating point.")
     frequency: str = option(
-        "1Hz:10MHz:71", metavar="START:STOP:COUNT", help="Spaced evenly in the logarithm."
+        "1Hz:10MHz:71",
+        metavar="START:STOP:COUNT",
+        help="Spaced evenly in the logarithm, or a single one.",
     )
     amplitude: str | None = option(
         None, metavar="V", help="Of a sine about the bias: harmonics of V_l instead (3ω method)."
@@ -354,19 +357,19 @@ class ReaderRequest(TableRequest, LeverRequest):
     distance: str = option(
         "0.3um:3um:10",
         metavar="START:STOP:COUNT",
-        help="From the lever's lower face to the surface, ends included.",
+        help="From the lever's lower face to the surface, ends included, or a single one.",
     )
     bias: str | None = option(
         None,
         metavar="START:STOP:COUNT",
-        help="In volts, ends included; the one up to 11 V that resolves the distances best if left "
-        "out.",
+        help="In volts, ends included, or a single one; the one up to 11 V that resolves the "
+        "distances best if left out.",
     )
     pressure: str | None = option(
         None,
         metavar="START:STOP:COUNT",
-        help="Of the air, in mbar, spaced evenly in the logarithm; what the probe file says if "
-        "left out.",
+        help="Of the air, in mbar, spaced evenly in the logarithm, or a single one; what the probe "
+        "file says if left out.",
     )
     bandwidth: str = option("1Hz:1kHz", metavar="LOW:HIGH", help="Of what is read.")
     amplifier: str = option("5nV", metavar="V", help="Noise at its input, for each √Hz.")

@@ -11,9 +11,9 @@ from hotlever.lever.transient.frequency_domain import (
 )
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
+from hotlever.tasks.ranges import parse_frequencies
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import SpectrumRequest
-from hotlever.tasks.texts import parse_frequencies
 from hotlever.units import bias_setting
 
 

@@ -10,9 +10,9 @@ from hotlever.lever import State, sweep_csv, write_sweep
 from hotlever.lever.set_points import HeldStates, hold
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
+from hotlever.tasks.ranges import parse_bias
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import SweepRequest
-from hotlever.tasks.texts import parse_bias
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:

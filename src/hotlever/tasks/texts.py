@@ -1,27 +1,19 @@
-"""Numbers, ranges, values by name, priors and times of pulses as they are typed."""
+"""Numbers, values by name, priors and times of pulses as they are typed."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, get_args
 
 from hotlever.errors import InputError, quoted, shown
-from hotlever.units import LEAST_BIAS, MOST_BIAS, NUMBER, setting
+from hotlever.units import NUMBER, setting
 
 if TYPE_CHECKING:
     from hotlever.calibration.pulses import PulseTiming
     from hotlever.probe import Probe
-    from hotlever.types import Array
 
-#: A sweep of so many biases takes minutes, as does a design varied so often.
-MOST_BIASES, MOST_DESIGNS = 10_000, 1000
-MOST_FREQUENCIES, MOST_SET_POINTS = 10_000, 1000
-#: Distances to a surface, of which each takes seconds, and between which they are (µm).
-MOST_DISTANCES, NEAREST, FARTHEST = 1000, 0.001, 1e4
-#: The paper's sweep.
-_BIAS = "1:11:25"
 #: Of priors: those of a calibration, where none is stated.
 USUAL = "usual"
 
@@ -188,83 +180,6 @@ def parse_bounds(texts: Iterable[str] | None) -> dict[str, tuple[float | None, f
     return bounds
 
 
-# --- ranges: START:STOP:COUNT ---------------------------------------------------------------------
-
-
-def parse_bias(text: str | None, lowest_V: float = 0.0) -> Array:
-    """Parse ``START:STOP:COUNT`` in volts, ends included; ``1:11:25`` if there is none.
-
-    Where the lowest bias that a lever is told of is negative, as with held supplies or
-    thermoelectricity, the start may be negative.
-
-    Examples
-    --------
-    >>> parse_bias("1:11:3").tolist()
-    [1.0, 6.0, 11.0]
-    """
-    import numpy as np
-
-    text = _BIAS if text is None else text
-    where = f"--bias {shown(text)}"
-    start, stop, count = _parse_range(text, where, "such as 1:11:25 (V)", MOST_BIASES)
-    if start < lowest_V or stop < start:
-        least = f"{lowest_V:g} <= " if np.isfinite(lowest_V) else ""
-        polar = "; polarity counts with held supplies or --physics thermoelectric"
-        why = polar if start < lowest_V else ""
-        raise InputError(f"{where}: expected {least}START <= STOP{why}")
-    if (count == 1) != (start == stop):
-        raise InputError(f"{where}: COUNT 1 goes with START = STOP, more with START < STOP")
-    biases = np.linspace(start, stop, count)
-    if biases[biases > 0].min(initial=LEAST_BIAS) < LEAST_BIAS or stop > MOST_BIAS:
-        raise InputError(
-            f"{where}: expected biases of 0, or from {LEAST_BIAS:g} to {MOST_BIAS:g} V"
-        )
-    return biases
-
-
-def parse_set_points(text: str, unit: str, where: str) -> Array:
-    """Parse ``3kohm``, several with commas between, or ``START:STOP:COUNT``, in a unit.
-
-    Examples
-    --------
-    >>> parse_set_points("2.5kohm,3kohm", "ohm", "--hold-resistance").tolist()
-    [2500.0, 3000.0]
-    >>> parse_set_points("1mW:2mW:3", "mW", "--hold-power").tolist()
-    [1.0, 1.5, 2.0]
-    """
-    import numpy as np
-
-    def value(part: str) -> float:
-        number = setting(part, unit, where)
-        if not 0.0 < number < math.inf:
-            raise InputError(f"{where}: found '{shown(part)}', expected more than 0 {unit}")
-        return number
-
-    if ":" not in text:
-        return np.array([value(part) for part in text.split(",")])
-    example = "2kohm:3kohm:11" if unit == "ohm" else f"1{unit}:4{unit}:7"
-    return np.linspace(*_parse_range(text, where, f"such as {example}", MOST_SET_POINTS, value))
-
-
-def parse_frequencies(text: str) -> Array:
-    """Parse ``START:STOP:COUNT`` with units, spaced evenly in the logarithm.
-
-    Examples
-    --------
-    >>> parse_frequencies("1Hz:1kHz:4").round(6).tolist()
-    [1.0, 10.0, 100.0, 1000.0]
-    """
-    import numpy as np
-
-    where = f"--frequency {shown(text)}"
-    start, stop, count = _parse_range(
-        text, where, "such as 1Hz:10MHz:71", MOST_FREQUENCIES, lambda end: setting(end, "Hz", where)
-    )
-    if not 0 < start <= stop or (count == 1) != (start == stop):
-        raise InputError(f"{where}: expected 0 < START < STOP, or START = STOP with COUNT 1")
-    return np.geomspace(start, stop, count)
-
-
 def parse_band(text: str) -> tuple[float, float]:
     """Parse ``LOW:HIGH``, frequencies with units.
 
@@ -279,109 +194,3 @@ def parse_band(text: str) -> tuple[float, float]:
     if not 0 < band[0] < band[1]:
         raise InputError(f"{where}: expected LOW:HIGH, such as 1Hz:1kHz, with 0 < LOW < HIGH")
     return band
-
-
-def parse_distances(text: str) -> Array:
-    """Parse ``START:STOP:COUNT`` with units of length, ends included (µm).
-
-    Examples
-    --------
-    >>> parse_distances("300nm:3um:4").round(6).tolist()
-    [0.3, 1.2, 2.1, 3.0]
-    """
-    import numpy as np
-
-    from hotlever.probe.contact import length_um
-
-    where = f"--distance {shown(text)}"
-
-    def end(part: str) -> float:
-        length = length_um(part)
-        if length is None or not NEAREST <= length <= FARTHEST:
-            raise InputError(
-                f"{where}: found {quoted(part)}, expected a length from {1e3 * NEAREST:g}nm to "
-                f"{1e-4 * FARTHEST:g}cm, such as 300nm"
-            )
-        return length
-
-    start, stop, count = _parse_range(text, where, "such as 0.3um:3um:10", MOST_DISTANCES, end)
-    if stop < start or (count == 1) != (start == stop):
-        raise InputError(f"{where}: expected START < STOP, or START = STOP with COUNT 1")
-    return np.linspace(start, stop, count)
-
-
-def parse_pressures(text: str) -> Array:
-    """Parse ``START:STOP:COUNT`` in mbar, spaced evenly in the logarithm.
-
-    Examples
-    --------
-    >>> parse_pressures("10:1000:3").round(6).tolist()
-    [10.0, 100.0, 1000.0]
-    """
-    import numpy as np
-
-    where = f"--pressure {shown(text)}"
-    start, stop, count = _parse_range(text, where, "such as 10:1000:3 (mbar)", MOST_DISTANCES)
-    if not 1e-6 <= start <= stop <= 1e6 or (count == 1) != (start == stop):
-        raise InputError(
-            f"{where}: expected 1e-6 <= START < STOP <= 1e6, or START = STOP with COUNT 1"
-        )
-    return np.geomspace(start, stop, count)
-
-
-def parse_vary(text: str) -> tuple[str, Array]:
-    """Parse ``NAME=START:STOP:COUNT``, ends included.
-
-    Examples
-    --------
-    >>> name, values = parse_vary("heater_length_um=3:6:4")
-    >>> name, values.tolist()
-    ('heater_length_um', [3.0, 4.0, 5.0, 6.0])
-    """
-    import numpy as np
-
-    where, example = f"--vary {shown(text)}", "such as heater_length_um=3:6:7"
-    name, equals, numbers = text.partition("=")
-    if not equals:
-        raise InputError(f"{where}: expected NAME=START:STOP:COUNT, {example}")
-    start, stop, count = _parse_range(numbers, where, example, MOST_DESIGNS)
-    if count < 2 or start == stop:
-        raise InputError(f"{where}: expected two values or more, {example}")
-    return name.strip(), np.linspace(start, stop, count)
-
-
-def parse_varied(texts: Iterable[str]) -> dict[str, Array]:
-    """Parse several ``NAME=START:STOP:COUNT``, of which each value goes with each other.
-
-    Examples
-    --------
-    >>> {name: values.size for name, values in parse_varied(["n_d=1e17:5e17:3", "p=2:3:2"]).items()}
-    {'n_d': 3, 'p': 2}
-    """
-    varied: dict[str, Array] = {}
-    for text in texts:
-        name, values = parse_vary(text)
-        if name in varied:
-            raise InputError(f"--vary {shown(name)}: given twice, expected once")
-        varied[name] = values
-    count = math.prod(values.size for values in varied.values())
-    if count > MOST_DESIGNS:
-        raise InputError(f"--vary: found {count} designs, expected at most {MOST_DESIGNS}")
-    return varied
-
-
-def _parse_range(
-    text: str, where: str, example: str, most: int, end: Callable[[str], float] | None = None
-) -> tuple[float, float, int]:
-    """Parse ``START:STOP:COUNT``; the ends are numbers unless parsed in another way."""
-    parts = text.split(":")
-    if len(parts) != 3:
-        raise InputError(f"{where}: expected START:STOP:COUNT, {example}")
-    start, stop = (end(part) if end else parse_number(part, where) for part in parts[:2])
-    # a number of more digits than the limit has is too large without being read
-    readable = parts[2].isdecimal() and len(parts[2]) <= len(str(most))
-    if not readable or not 1 <= int(parts[2]) <= most:
-        raise InputError(
-            f"{where}: COUNT is {quoted(parts[2])}, expected a whole number from 1 to {most}"
-        )
-    return start, stop, int(parts[2])

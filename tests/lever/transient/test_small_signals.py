@@ -92,7 +92,7 @@ def test_the_command_writes_table_and_figure(run, tmp_path):
         (("--bias", "0"), "found no current"),
         (("--bias", "1", "--frequency", "1:2:3"), "a unit like Hz"),
         (("--bias", "1", "--frequency", "1Hz:2Hz"), "expected START:STOP:COUNT"),
-        (("--bias", "1", "--frequency", "2Hz:1Hz:3"), "expected 0 < START < STOP"),
+        (("--bias", "1", "--frequency", "2Hz:1Hz:3"), "expected START < STOP"),
         (("--bias", "1", "--frequency", "1Hz:2Hz:0"), "expected a whole number"),
         (("--bias", "1", "--frequency", "1Hz:2THz:5"), "expected frequencies from"),
     ],

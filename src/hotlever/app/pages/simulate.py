@@ -21,7 +21,7 @@ from hotlever.app.session import Session
 from hotlever.app.workers import Heard
 from hotlever.errors import HotleverError, InputError
 from hotlever.lever.set_points import HELD
-from hotlever.tasks.texts import parse_set_points
+from hotlever.tasks.ranges import parse_set_points
 
 #: Biases of a sweep that is written.
 _BIASES = 49
