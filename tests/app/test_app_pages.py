@@ -30,6 +30,8 @@ from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.probe import Probe
 
 Run = Callable[..., tuple[int, str, str]]
+#: The field of a dimension.
+LENGTH = "length: base to front edge (µm)"
 
 
 class Here(Report):
@@ -257,20 +259,23 @@ def test_a_shape_is_drawn_while_its_fields_change(tmp_path: Path) -> None:
             one for one in user.client.elements.values() if isinstance(one, ui.textarea)
         )
         assert "length_um = 54.4" in page_text.value
-        field = next(
-            one
-            for one in user.client.elements.values()
-            if isinstance(one, ui.number) and one.props["label"] == "length"
-        )
-        field.set_value(60.0)
+
+        def fields() -> list[ui.input]:
+            there = user.client.elements.values()
+            inputs = (element for element in there if isinstance(element, ui.input))
+            return [element for element in inputs if element.props.get("label") == LENGTH]
+
+        await until(lambda: bool(fields()))
+        (field,) = fields()
+        field.set_value("60")
         await until(lambda: "length_um = 60" in page_text.value)
         before = drawn(user)
-        field.set_value(1.0)
+        field.set_value("1")
         await until(lambda: "length_um" in shown(user, "role=alert"))
         # what is wrong is drawn, and the field marked
         await until(lambda: drawn(user) != before)
         assert field.props.get("error")
-        field.set_value(50.0)
+        field.set_value("50")
         await until(lambda: not shown(user, "role=alert").strip())
         assert not field.props.get("error")
         plain = len(drawn(user))

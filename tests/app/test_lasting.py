@@ -14,7 +14,7 @@ import pytest
 from nicegui import ui
 from nicegui.testing import User
 from nicegui.testing.user_interaction import UserInteraction
-from test_app_pages import drop, shown, until, visit
+from test_app_pages import LENGTH, drop, shown, until, visit
 from test_pages_at_work import done
 
 from hotlever.app import live, showing
@@ -39,10 +39,15 @@ def at_once(session: Session) -> None:
     session.jobs.start = start  # type: ignore[method-assign]
 
 
+def all_of(user: User, kind: Any, label: str = "") -> list[Any]:
+    """Return the elements of a kind, with some label."""
+    there = (one for one in user.client.elements.values() if isinstance(one, kind))
+    return [one for one in there if not label or one.props.get("label") == label]
+
+
 def of(user: User, kind: Any, label: str = "") -> Any:
     """Return the last element of a kind, with some label."""
-    there = (one for one in user.client.elements.values() if isinstance(one, kind))
-    return [one for one in there if not label or one.props.get("label") == label][-1]
+    return all_of(user, kind, label)[-1]
 
 
 async def tell_columns(user: User) -> None:
@@ -145,7 +150,8 @@ def test_saving_asks_before_another_file_is_replaced(tmp_path: Path) -> None:
         press(user, "Replace it")
         await until(lambda: "three-leg" in path.read_text())
         # what was saved here is saved again without a question, unless another has written it
-        of(user, ui.number, "length").set_value(60.0)
+        await until(lambda: bool(all_of(user, ui.input, LENGTH)))
+        of(user, ui.input, LENGTH).set_value("60")
         await until(lambda: "length_um = 60" in of(user, ui.textarea).value)
         press(user, "Save")
         await until(lambda: "length_um = 60" in path.read_text())
@@ -247,7 +253,7 @@ def test_what_nobody_typed_is_drawn_once(tmp_path: Path, monkeypatch: pytest.Mon
         await drop(user, "second.toml", probe)
         await until(lambda: len(images(user)) == 1)
         await asyncio.sleep(0.5)
-        assert drawn == ["first.toml", "second.toml"]
+        assert drawn == ["my-lever.toml", "first.toml", "second.toml"]
 
     visit(tmp_path, story)
 
@@ -268,7 +274,7 @@ def test_every_medium_of_the_pages_is_kept(tmp_path: Path, page: str, medium: st
 
 CHOSEN: dict[str, Any] = {
     "dark": True,
-    "lever": {"shape": "u-shape", "changes": {"length_um": 60.5}, "text": None, "mesh": True},
+    "lever": {"text": "[probe]", "name": "own.toml", "mesh": True},
     "simulate": {
         "probe": "own.toml",
         "changes": {"n_d": 5e17, "medium": "air", "surface_gap_um": None},
@@ -361,7 +367,7 @@ def test_pages_after_a_restart_show_what_was_chosen(
         ('{"schema": 7, "chosen": {}}', "found schema 7, expected 2"),
         ('{"schema": 1}', "history.0: input should be"),
         ('{"schema": 1, "chosen": {"fit": {"robust": "perhaps"}}}', "fit.robust"),
-        ('{"schema": 1, "chosen": {"lever": {"shape": "round"}}}', "lever.shape"),
+        ('{"schema": 1, "chosen": {"lever": {"mesh": "round"}}}', "lever.mesh"),
         ('{"schema": 1, "chosen": {"simulate": {"changes": {"n_d": "air"}}}}', "n_d = air"),
         ('{"schema": 1, "chosen": {"simulate": {"changes": {"medium": 5}}}}', "medium = 5"),
         ('{"schema": 1, "chosen": {"calibrate": {"rests": "x:y"}}}', "calibrate.rests"),

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from nicegui import ui
 from nicegui.testing import User
-from test_app_pages import shown, until, visit
-from test_lasting import of, press
+from test_app_pages import LENGTH, shown, until, visit
+from test_lasting import all_of, of, press
 
 from hotlever.app import history as history_module
 from hotlever.app.history import CHOICES, History
@@ -146,12 +146,12 @@ def test_a_page_shows_what_was_undone(tmp_path: Path) -> None:
     async def story(user: User, session: Session) -> None:
         await user.open("/lever")
         await until(lambda: "length_um = 54.4" in of(user, ui.textarea).value)
-        field = of(user, ui.number, "length")
-        field.set_value(60.0)
+        await until(lambda: bool(all_of(user, ui.input, LENGTH)))
+        of(user, ui.input, LENGTH).set_value("60")
         await until(lambda: "length_um = 60" in of(user, ui.textarea).value)
         press(user, "Undo")
         await user.open("/lever")
-        assert shown(user, "role=status") == "Undone: lever, length um."
+        assert shown(user, "role=status") == "Undone: lever, text."
         await until(lambda: "length_um = 54.4" in of(user, ui.textarea).value)
         press(user, "Redo")
         await user.open("/lever")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,11 @@ from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.errors import InputError
 from hotlever.probe.file_sections import sections_of
+from hotlever.probe.shapes import DRAWING, PARAMETRIC
 
 #: Numbers of other sections that can be set: keys, in the order in which they are shown.
-_OTHERS = {
-    "probe": ("thickness_um", "tip_um"),
-    "circuit": ("series_resistance_ohm", "base_temperature_K"),
-}
+_OF_A_DRAWING = ("thickness_um", "tip_um")
+_OF_THE_CIRCUIT = ("series_resistance_ohm", "base_temperature_K")
 _TITLES = {"probe": "The lever", "circuit": "Circuit"}
 _LAST = ("heat_capacity", "heat_capacity_scale", "emissivity", "melting_point_K")
 #: Layers of a drawing that are listed.
@@ -25,7 +24,7 @@ _MOST_LAYERS = 40
 
 
 def settable(report: Report, text: str) -> dict[str, Any]:
-    """Return what can be set in a probe file: layers, materials, thickness, tip and circuit.
+    """Return what can be set in a probe file: layers, materials, dimensions, tip and circuit.
 
     Nothing, if the text is no probe file that could be edited so.
     """
@@ -37,13 +36,12 @@ def settable(report: Report, text: str) -> dict[str, Any]:
             return {}
     except (InputError, AttributeError):
         return {}
-    is_drawing = sections["probe"].get("shape") == "drawing"
+    shape = str(sections["probe"].get("shape"))
     cards = [_card(("materials", name), section) for name, section in materials.items()]
-    others = ["circuit", *(["probe"] if is_drawing else [])]
     return {
-        "layers": _rows(sections) if is_drawing else [],
+        "layers": _rows(sections) if shape == DRAWING else [],
         "materials": list(materials),
-        "cards": [_other(name, values.get(name, {})) for name in reversed(others)] + cards,
+        "cards": [_other(name, values.get(name, {}), own) for name, own in _others(shape)] + cards,
         "new": _new_materials(),
     }
 
@@ -92,17 +90,28 @@ def _new_materials() -> dict[str, str]:
     return new
 
 
-def _other(name: str, section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the numbers of a section that is no material."""
-    from hotlever.materials.parameters import label, parameter_named
+def _others(shape: str) -> Iterator[tuple[str, dict[str, str]]]:
+    """Give the sections that are no material, with what their numbers are, for a kind of shape."""
     from hotlever.probe.circuit import Circuit
     from hotlever.probe.drawing.shape import DrawnShape
 
-    of_section = DrawnShape if name == "probe" else Circuit
+    if shape == DRAWING:
+        meanings = DrawnShape.description()
+        yield "probe", {key: meanings[key] for key in _OF_A_DRAWING}
+    elif shape in PARAMETRIC:
+        yield "probe", PARAMETRIC[shape].description()
+    meanings = Circuit.description()
+    yield "circuit", {key: meanings[key] for key in _OF_THE_CIRCUIT}
+
+
+def _other(name: str, section: Mapping[str, Any], meanings: Mapping[str, str]) -> dict[str, Any]:
+    """Return the numbers of a section that is no material."""
+    from hotlever.materials.parameters import label, parameter_named
+    from hotlever.probe.circuit import Circuit
+
     shown = []
-    for key in _OTHERS[name]:
-        field = of_section.model_fields[key]
-        meaning = f"{label(key)}: {field.description} ({parameter_named(key).unit})"
+    for key, words in meanings.items():
+        meaning = f"{label(key)}: {words} ({parameter_named(key).unit})"
         shown.append(_field((name,), key, section, _number(getattr(Circuit(), key, "")), meaning))
     return {"section": (name,), "title": _TITLES[name], "fields": shown}
 

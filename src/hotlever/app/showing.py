@@ -206,22 +206,6 @@ def probe_of_text(report: Report, text: str, title: str, mesh: bool = False) -> 
     return _described(probe, title, mesh)
 
 
-def probe_of_values(
-    report: Report,
-    shape: str,
-    changes: dict[str, Any],
-    title: str,
-    mesh: bool = False,
-) -> dict[str, Any]:
-    """Return the drawing, and the file, of a parametric probe with some values changed."""
-    start = Probe.u_shape() if shape == "u-shape" else Probe.reference()
-    try:
-        probe = start.with_(**changes) if changes else start
-    except InputError as error:
-        return _at_fault(error, str(error), lambda: {**start.shape.model_dump(), **changes})
-    return _described(probe, title, mesh) | {"text": probe.to_toml()}
-
-
 def probe_file(report: Report, name: str, suffix: str, mesh: bool = False) -> bytes:
     """Return the drawing of a probe as the content of a file."""
     probe = probe_of(name)
@@ -303,12 +287,6 @@ def _described(probe: Probe, title: str, with_mesh: bool) -> dict[str, Any]:
         "figure": _svg(figures.probe_drawing(layout, title, mesh=mesh)),
         "fault": "",
         "rows": _regions(layout),
-        "shape": probe.shape.shape,
-        "values": {
-            key: (value, text)
-            for key, text in probe.shape.description().items()
-            if isinstance(value := getattr(probe.shape, key), float)
-        },
         "triangles": 0 if mesh is None else mesh.elements.nelements,
     }
 

@@ -34,15 +34,13 @@ def _fit_together(changes: Changes) -> Changes:
 
 
 class Lever(BaseModel):
-    """The page Lever: a shape with its changes, or the text of a probe file, and its name.
+    """The page Lever: the text of a probe file, and its name.
 
-    The text is None while a parametric shape is open, empty while nothing is; ``saved`` tells the
+    The text is None before the page is opened, empty while nothing is open; ``saved`` tells the
     file as it was when it was opened or saved here, ``save_as`` the name that was typed;
     ``drawing`` is one whose probe file is not shown yet.
     """
 
-    shape: Literal["three-leg", "u-shape"] = "three-leg"
-    changes: dict[str, float] = {}
     text: str | None = None
     name: str = "my-lever.toml"
     save_as: str = ""

@@ -16,17 +16,18 @@ from hotlever.app.pages.frame import (
     drop_zone,
     flat_button,
     hand_over,
+    small_button,
     two_columns,
 )
 from hotlever.app.pages.page import Page, Work
 from hotlever.app.pages.probe_fields import ProbeFields
-from hotlever.app.pages.probe_files import Dimensions, Drawings, Picture, ProbeFile
+from hotlever.app.pages.probe_files import Drawings, Picture, ProbeFile, new_probe
 from hotlever.app.project import DATA, DRAWINGS
 from hotlever.app.session import Session
 from hotlever.app.state import Lever, Simulate
 from hotlever.errors import HotleverError, InputError
 
-_SHAPES = {"three-leg": "three legs", "u-shape": "two legs (U)"}
+_SHAPES = {"three-leg": "New: three legs", "u-shape": "New: two legs (U)"}
 _FILE = "a probe file or a drawing"
 _NEW = Lever().name
 #: Pages that go on with the probe.
@@ -42,16 +43,16 @@ class LeverPage(Page):
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
         self._file = ProbeFile(self)
-        self._shown_text, self._fault = "", ""
+        self._shown_text = ""
         with two_columns() as (left, right):
             with left:
                 drop_zone(session, banner, _DROP, self._dropped)
                 self._pick = ui.select(self._files, label="Open")
                 self._pick.on_value_change(lambda event: self._open(event.value))
                 self._pick.classes("w-full").props("clearable")
-                shape = self.chosen["shape"]
-                self._shape = ui.toggle(_SHAPES, value=shape, on_change=self._take_shape)
-                self._dimensions = Dimensions(self._change)
+                with ui.row():
+                    for shape, words in _SHAPES.items():
+                        small_button(words, partial(self._take_shape, shape))
                 self._fields = ProbeFields(self, self._set)
             with right:
                 self._work = Work(session, self.name, self._ended)
@@ -83,56 +84,37 @@ class LeverPage(Page):
         """Show what was open last; a drawing that was just dropped is opened."""
         with self.banner.caught():
             self._file.take_up()
-        self._quietly(self.chosen["text"] or "")
-        await self._draw(anew=True)
+        if self.chosen["text"] is None:
+            self.chosen["text"] = new_probe(next(iter(_SHAPES)))
+        self._quietly(self.chosen["text"])
+        await self._draw()
         await self._open(self.chosen["drawing"])
 
-    # --- parametric -------------------------------------------------------------------------------
-
-    async def _take_shape(self, event: Any) -> None:
-        if event.value is None:  # a file is open
+    async def _take_shape(self, shape: str) -> None:
+        """Begin with the probe file of a shape."""
+        if not await self._file.may_go():
             return
         self._work.hide()
-        name = self._name.value if self.chosen["text"] is None else _NEW
-        self.chosen |= {"shape": event.value, "changes": {}}
-        self._begin(name, None)
+        self._begin(_NEW)
         self._pick.set_value(None)
-        await self._draw(anew=True)
+        await self._set(new_probe(shape))
 
-    async def _change(self, name: str, value: float | None) -> None:
-        if value is None:
-            self.banner.say(f"{name}: expected a number")
-            return
-        self.chosen["changes"] = {**self.chosen["changes"], name: value}
-        self.chosen["text"] = None
-        await self._draw()
-
-    async def _draw(self, anew: bool = False) -> None:
-        """Draw what is chosen; dimensions that are shown `anew` are those of another shape."""
-        chosen, title = self.chosen, self._name.value
-        text = chosen["text"]
-        if text == "":  # nothing is open
+    async def _draw(self) -> None:
+        """Draw what is open, and show its fields."""
+        text = self.chosen["text"]
+        if not text:
             self._picture.clear()
             await self._fields.show("", "")
             return
         try:
-            if text is not None:
-                drawn = await self._picture.of("probe_of_text", text, title)
-            else:
-                values = chosen["shape"], chosen["changes"]
-                drawn = await self._picture.of("probe_of_values", *values, title)
+            drawn = await self._picture.of(text, self._name.value)
             if drawn is None:
                 return
-            self._fault = drawn["fault"]
+            fault = drawn["fault"]
         except HotleverError as error:
-            drawn, self._fault = {}, str(error)
-        if text is None and not self._fault:
-            self._quietly(drawn["text"])
-            if anew:
-                self._dimensions.show(drawn["values"])
-        self._dimensions.mark(self._fault)
-        self.banner.say(self._fault)
-        await self._fields.show(text or "", self._fault)
+            fault = str(error)
+        self.banner.say(fault)
+        await self._fields.show(text, fault)
         self.show_command()
 
     # --- a file -----------------------------------------------------------------------------------
@@ -165,12 +147,10 @@ class LeverPage(Page):
         else:
             await self._show(name)
 
-    def _begin(self, name: str = "", text: str | None = "") -> None:
+    def _begin(self, name: str = "") -> None:
         """Show no lever until another one is there: none may stand under the other's name."""
-        self._fault = ""
-        self.chosen |= {"name": name, "text": text, "saved": ""}
+        self.chosen |= {"name": name, "text": "", "saved": ""}
         self._name.set_value(name)
-        self._dimensions.clear()
         self._picture.clear()
         self._drawings.clear()
         self._quietly("")
@@ -195,8 +175,6 @@ class LeverPage(Page):
         if event.value == self._shown_text:
             return None
         self.chosen["text"] = self._shown_text = event.value
-        self._dimensions.clear()
-        self._shape.set_value(None)
         return self._draw()
 
     async def _set(self, text: str) -> None:
@@ -210,8 +188,6 @@ class LeverPage(Page):
         """Show a probe file that nobody typed."""
         self._shown_text = text
         self._text.set_value(text)
-        if self.chosen["text"] is not None:
-            self._shape.set_value(None)
 
     # --- what is shown and written ----------------------------------------------------------------
 
@@ -224,8 +200,6 @@ class LeverPage(Page):
     async def _write(self) -> bool:
         """Write the probe file; return whether it is there now."""
         with self.banner.caught():
-            if self._fault and self.chosen["text"] is None:
-                raise InputError(self._fault)
             name = await self._file.save(self._name.value or "", self._shown_text)
             if name is None:
                 return False

@@ -1,11 +1,10 @@
-"""What the page Lever is made of: a probe file, its dimensions and its picture, and drawings."""
+"""What the page Lever is made of: a probe file, its picture, and drawings."""
 
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Awaitable, Callable
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,8 @@ from hotlever.app.pages.page import Page
 from hotlever.app.project import LARGEST_PROBE, safe_name
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import read_text
-from hotlever.materials.parameters import label
+from hotlever.probe import Probe
+from hotlever.tasks.design_requests import NEW_PROBES
 
 
 class ProbeFile:
@@ -33,7 +33,11 @@ class ProbeFile:
     def is_edited(self) -> bool:
         """Whether there are edits of a text that are not saved."""
         text = self._chosen["text"]
-        return bool(text) and _digest(text) != self._chosen["saved"]
+        return bool(text) and not self._is_saved and text not in map(new_probe, NEW_PROBES)
+
+    @property
+    def _is_saved(self) -> bool:
+        return _digest(self._chosen["text"]) == self._chosen["saved"]
 
     def open(self, name: str) -> str:
         """Read a file of the project; return its text.
@@ -56,7 +60,7 @@ class ProbeFile:
             As `open`.
         """
         name = self._chosen["name"]
-        if self._chosen["text"] and not self.is_edited and self._session.project.stamp(name):
+        if self._chosen["text"] and self._is_saved and self._session.project.stamp(name):
             self.open(name)
 
     async def may_go(self) -> bool:
@@ -95,42 +99,16 @@ class ProbeFile:
         return name
 
 
+@cache
+def new_probe(shape: str) -> str:
+    """Return the probe file that a parametric shape begins with."""
+    probe: Probe = getattr(Probe, NEW_PROBES[shape])()
+    return probe.to_toml()
+
+
 def _digest(text: str | None) -> str:
     """Return what tells whether a text is as it was."""
     return "" if text is None else hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()
-
-
-class Dimensions:
-    """The dimensions of a parametric shape, to be changed; `changed` is told name and value."""
-
-    def __init__(self, changed: Callable[[str, float | None], Awaitable[None]]) -> None:
-        self._changed = changed
-        self._column = ui.column().classes("w-full gap-1")
-        self._numbers: dict[str, ui.number] = {}
-
-    def clear(self) -> None:
-        """Show none: another kind of probe is open."""
-        self._column.clear()
-        self._numbers = {}
-
-    def show(self, values: dict[str, tuple[float, str]]) -> None:
-        """Show values with their meanings."""
-        self.clear()
-        with self._column:
-            for name, (value, meaning) in values.items():
-                number = ui.number(label(name), value=value, format="%.4g", step=value / 50)
-                number.props("suffix=µm debounce=200").classes("w-full")
-                number.tooltip(f"{name}: {meaning}")
-                number.on_value_change(lambda event, n=name: self._changed(n, event.value))
-                self._numbers[name] = number
-
-    def mark(self, fault: str) -> None:
-        """Mark those that a line names which says what is wrong; none if nothing is."""
-        words = set(re.findall(r"\w+", fault))
-        for name, number in self._numbers.items():
-            number.props(remove="error")
-            if name in words:
-                number.props("error hide-bottom-space")
 
 
 class Picture:
@@ -153,8 +131,8 @@ class Picture:
         self._latest += 1
         self._column.clear()
 
-    async def of(self, function: str, *arguments: Any) -> dict[str, Any] | None:
-        """Have a probe drawn by a function of the worker.
+    async def of(self, text: str, title: str) -> dict[str, Any] | None:
+        """Have a probe drawn by its file.
 
         Returns
         -------
@@ -171,7 +149,7 @@ class Picture:
         drawn: dict[str, Any] = {}
         failure: HotleverError | None = None
         try:
-            drawn = await self._session.ask("quick", f"showing:{function}", *arguments, mesh)
+            drawn = await self._session.ask("quick", "showing:probe_of_text", text, title, mesh)
         except HotleverError as error:
             failure = error
         if turn != self._latest:
