@@ -31,7 +31,7 @@ from hotlever.probe import Probe
 
 Run = Callable[..., tuple[int, str, str]]
 #: The field of a dimension.
-LENGTH = "length: base to front edge (µm)"
+LENGTH = "length (µm)"
 
 
 class Here(Report):

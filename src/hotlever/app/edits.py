@@ -5,6 +5,7 @@ A text is edited line by line, so that what nobody touched stays as it was writt
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -300,7 +301,9 @@ def typed(key: str, text: str) -> Any:
 
 
 def _as_number(text: str) -> float | None:
+    """Return a finite number; None if it is none: others are no values of a probe file."""
     try:
-        return float(text.replace("−", "-"))
+        number = float(text.replace("−", "-"))
     except ValueError:
         return None
+    return number if math.isfinite(number) else None

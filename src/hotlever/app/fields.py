@@ -111,8 +111,9 @@ def _other(name: str, section: Mapping[str, Any], meanings: Mapping[str, str]) -
 
     shown = []
     for key, words in meanings.items():
-        meaning = f"{label(key)}: {words} ({parameter_named(key).unit})"
-        shown.append(_field((name,), key, section, _number(getattr(Circuit(), key, "")), meaning))
+        unit, default = parameter_named(key).unit, _number(getattr(Circuit(), key, ""))
+        own = _field((name,), key, section, default, f"{label(key)}: {words} ({unit})")
+        shown.append({**own, "label": f"{label(key)} ({unit})"})
     return {"section": (name,), "title": _TITLES[name], "fields": shown}
 
 
@@ -159,7 +160,7 @@ def _field(
     value = section.get(key)
     if isinstance(value, list):
         value = ", ".join(map(_number, value))
-    field = {"section": path, "key": key, "meaning": meaning, "used": True}
+    field = {"section": path, "key": key, "label": meaning, "meaning": meaning, "used": True}
     shown = None if isinstance(value, dict) else "" if value is None else _number(value)
     return {**field, "default": default, "value": shown}
 

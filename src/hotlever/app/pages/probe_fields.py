@@ -40,6 +40,7 @@ class ProbeFields:
         self._text, self._turn = "", 0
         self._built: Any = None
         self._inputs: dict[tuple[Section, str], ui.input] = {}
+        self._shown: dict[tuple[Section, str], str] = {}
         self._cards: dict[Section, ui.element] = {}
         self._column = ui.column().classes("w-full gap-1")
 
@@ -100,7 +101,8 @@ class ProbeFields:
             made_of.on_value_change(lambda event: self._set_layer(row, material=event.value))
             if row.role == FILM and row.material:
                 section = ("layers", row.name)
-                made = self._input(section, "thickness_um", "thickness (µm)", f"{row.label}: ")
+                label = "thickness (µm)"
+                made = self._input(section, "thickness_um", label, f"{row.label}: {label}")
                 made.props('placeholder="a part of the body" stack-label').classes("w-full")
 
     def _set_layer(
@@ -136,7 +138,7 @@ class ProbeFields:
         section, key, value = field["section"], field["key"], field["value"]
         if (section, key) not in self._inputs:
             with self._cards[card]:
-                made = self._input(section, key, field["meaning"])
+                made = self._input(section, key, field["label"], field["meaning"])
                 if field["default"]:
                     made.props(f'placeholder="{field["default"]}" stack-label')
                 if value is None:
@@ -144,21 +146,25 @@ class ProbeFields:
         self._inputs[section, key].set_visibility(field["used"])
         self._set(section, key, value or "")
 
-    def _input(self, section: Section, key: str, meaning: str, of: str = "") -> ui.input:
+    def _input(self, section: Section, key: str, label: str, meaning: str) -> ui.input:
         files = self._session.project.data if section[0] == "materials" else None
-        made = ui.input(meaning, autocomplete=files)
-        made.props(f'debounce=300 hide-bottom-space aria-label="{of}{meaning}"')
-        made.tooltip(".".join((*section, key)))
+        made = ui.input(label, autocomplete=files)
+        made.props(f'debounce=300 hide-bottom-space aria-label="{meaning}"')
+        made.tooltip(f"{'.'.join((*section, key))}: {meaning}")
         made.on_value_change(partial(self._typed, section, key))
         self._inputs[section, key] = made
         return made
 
     def _set(self, section: Section, key: str, value: str) -> None:
         made = self._inputs[section, key]
+        self._shown[section, key] = value
         if typed(key, made.value or "") != typed(key, value):
             made.set_value(value)
 
     def _typed(self, section: Section, key: str, event: Any) -> Awaitable[None] | None:
+        if (event.value or "") == self._shown.get((section, key)):
+            return None  # nobody typed it
+        self._shown[section, key] = event.value or ""
         value = typed(key, event.value or "")
         text = with_value(self._text, section, key, value)
         return None if same(text, self._text) else self._edit(text)
