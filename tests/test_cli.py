@@ -248,6 +248,14 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         (("fit", EXAMPLE, "--observables", "tpi"), "did you mean 'tip'"),
         (("fit", EXAMPLE, "--fix", "nd"), "did you mean 'n_d'"),
         (
+            ("calibrate", EXAMPLE, "--samples", "200"),
+            "--samples: goes with --posterior",
+        ),
+        (
+            ("calibrate", EXAMPLE, "--table-by", "power"),
+            "--table-by: goes with --table",
+        ),
+        (
             ("fit", EXAMPLE, "--posterior", "--samples", "0"),
             "--samples 0: expected a number from 1",
         ),

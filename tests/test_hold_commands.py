@@ -100,6 +100,8 @@ def test_a_loop_that_is_lost_is_told(run):
         (("pulse", *CONTROL, "--filter", "0us"), "found a filter of 0 µs, expected 0.001"),
         (("pulse", *CONTROL, "--gain-map", "map.csv"), "map.csv"),
         (("pulse", "--controller", "1,9", "--report", "page"), "does not go with --report"),
+        (("pulse", "--limit", "9V", "--report", "page"), "--limit: does not go with --report"),
+        (("pulse", "--step", "4V", "--filter", "2us"), "--filter: goes with --controller P,I"),
     ],
 )
 def test_what_cannot_be_is_one_line(run, arguments, message):

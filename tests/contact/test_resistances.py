@@ -41,7 +41,7 @@ def test_a_cold_cone_is_the_integral_of_its_shells(tip):
     assert cold_resistance(tip, 400.0) == pytest.approx(whole, rel=1e-8)
     # a heat that warms it by a microkelvin
     heat = np.array([1e-6 / whole])
-    T, same = up_the_cone(tip, np.array([400.0]), heat, 293.0)
+    T, same, _ = up_the_cone(tip, np.array([400.0]), heat, 293.0)
     assert pytest.approx(1e-6, rel=1e-5) == T - 400.0
     assert same == heat
 
@@ -51,7 +51,7 @@ def test_a_hot_cone_is_the_integral_of_bulk_and_surface():
     wide = Tip(height_um=0.7, half_angle_deg=20.0, apex_radius_um=10.0)
     cosine = np.cos(np.radians(20.0))
     heat = 0.1 * np.pi * 10.0 * wide.base_radius_um / 0.7 * 20.0 * 2.0 * cosine / (1.0 + cosine)
-    T, _ = up_the_cone(wide, np.array([500.0]), np.array([heat]), 293.0)
+    T, *_ = up_the_cone(wide, np.array([500.0]), np.array([heat]), 293.0)
     # almost bulk: Kirchhoff's integral of κ, less the surface's share at the mean diameter
     by_surface = 0.3 / (float(thermal_conductivity(300.0)[0]) * 20.25)
     kappa = lambda K: 1.0 / (1.0 / float(thermal_conductivity(K)[0]) + by_surface)  # noqa: E731
@@ -84,9 +84,12 @@ def test_a_cone_in_air_is_a_fin():
     z = np.linspace(0.0, tip.height_um, 30)
     fixed = lambda a, b: np.array([a[0] - 400.0, a[1] - 1e-3])  # noqa: E731
     exact = solve_bvp(slopes, fixed, z, np.stack([400.0 + 0 * z, 1e-3 + 0 * z]), tol=1e-6)
-    T, heat = up_the_cone(tip, np.array([400.0]), np.array([1e-3]), base, air)
+    T, heat, _ = up_the_cone(tip, np.array([400.0]), np.array([1e-3]), base, air)
     assert pytest.approx(exact.y[0, -1], abs=1e-4) == T
     assert heat == pytest.approx(exact.y[1, -1], rel=1e-4)
+    # of a cold cone it is what it would be in vacuum, where no heat comes through its end too
+    *_, cone = up_the_cone(tip, np.array([base + 0.01]), np.array([0.0]), base, air)
+    assert cone == pytest.approx(cold_resistance(tip, base), rel=1e-4)
 
 
 def by_collocation(kappas: list[float], thicknesses_um: list[float], count: int = 60) -> float:
@@ -186,12 +189,12 @@ def test_the_law_is_a_series_of_resistances():
     law = ContactLaw(probe(interface_K_per_mW=5e4))
     rise = np.array([1.0, 300.0, 600.0])
     heat, _ = law.heat(rise)
-    apex, surface, sample, beside = law.at(293.0 + rise)
+    apex, surface, sample, beside, _ = law.at(293.0 + rise)
     assert sample == pytest.approx(heat)
     assert beside == pytest.approx(0.0, abs=1e-12)
     assert apex - surface == pytest.approx(heat * 5e4, rel=1e-9)
     assert apex - 293.0 == pytest.approx(heat * (5e4 + law.spreading_K_per_mW), rel=1e-9)
-    T, _ = up_the_cone(SHARP, apex, heat, 293.0)
+    T, *_ = up_the_cone(SHARP, apex, heat, 293.0)
     assert pytest.approx(293.0 + rise, rel=1e-7) == T
     cold = 5e4 + law.spreading_K_per_mW + cold_resistance(SHARP, 293.0)
     assert heat[0] == pytest.approx(1.0 / cold, rel=1e-4)

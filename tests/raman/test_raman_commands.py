@@ -187,7 +187,7 @@ BAD = {
     ),
     "reference without calibration": (
         ["raman", "tip", "--reference", "tip"],
-        "--reference needs --calibration",
+        "--reference: needs --calibration",
     ),
     "laser without resistance": (["raman", "tip", "--laser-power", "1"], "belong together"),
     "laser": (
@@ -202,7 +202,7 @@ BAD = {
         ["raman", "tip", "--stress", "1e300", "--calibrate-from", "plate"],
         "stress: found 1e+300, expected 0 to 10000 MPa",
     ),
-    "stress without calibration": (["raman", "tip", "--stress", "5"], "--stress needs --calib"),
+    "stress without calibration": (["raman", "tip", "--stress", "5"], "--stress: needs --calib"),
     "device": (["raman", "/dev/zero"], "/dev/zero: is a device, expected a file"),
     "device as calibration": (["raman", "tip", "--calibration", "/dev/zero"], "is a device"),
     "device as table": (

@@ -9,7 +9,7 @@ from hotlever import Lever, Probe
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reader import over_surface
 from hotlever.lever.similar import SimilarLevers
-from hotlever.studies.optimisation import MOST_DESIGNS, optimise
+from hotlever.studies.optimisation import MOST_DESIGNS, optimise, optimum_text
 from hotlever.studies.working_point import (
     OF_THE_READER,
     QUANTITIES,
@@ -105,6 +105,7 @@ def test_a_search_that_is_cut_off_has_the_best_that_it_saw(monkeypatch):
     point, bounds = WorkingPoint("tip_K", 700.0), {"heater_length_um": (2.0, 60.0)}
     optimum = optimise(Probe.reference(), "power_mW", point, bounds)
     assert "without coming to rest" in optimum.reason
+    assert "limited by no bound\n" in optimum_text(optimum)
     assert optimum.best.value("power_mW") == pytest.approx(optimum.start.value("power_mW"))
 
 
@@ -118,6 +119,9 @@ def test_a_search_that_is_cut_off_has_the_best_that_it_saw(monkeypatch):
         (["--minimise", "power_mW", "--within", "n_d=2e17:1e17"], "expected a rising range"),
         (["--minimise", "power_mW", "--maximise", "tip_K"], "found both, expected one"),
         (["--within", "n_d=1e17:1e18"], "goes with --minimise"),
+        (["--vary", "heater_length_um=3:5:2", "--at", "8V"], "--at: goes with --minimise"),
+        (["--minimise", "bias_V", "--power", "3"], "--power: does not go with --minimise"),
+        (["--minimise", "bias_V", "--no-air"], "--no-air: does not go with --minimise"),
         (["--maximise", "dlnR_dz_per_um", "--within", "n_d=1e17:1e18"], "expected surface_gap_um"),
         (["--minimise", "power_mW", "--at", "7kg"], "or a tip temperature as 700K"),
         (["--minimise", "power_mW", "-o", "best.csv"], "expected .toml"),

@@ -124,6 +124,8 @@ def test_a_case_of_a_user_is_predicted_and_judged(run, tmp_path):
     assert out.startswith("[prediction]\nmedian = 105")
     path.write_text(text + f'{out}[published]\nvalue = 140\nerror = 1\nsays = "x"\n', "utf-8")
     assert run("validate", str(path))[1].endswith("# published 140 ± 1: outside\n")
+    status, _, err = run("validate", str(path), "-o", "page")
+    assert (status, err[:50]) == (2, "hotlever: --output: goes without a case of your own"[:50])
 
 
 @pytest.mark.parametrize(

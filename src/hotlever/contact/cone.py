@@ -66,8 +66,10 @@ def up_the_cone(
     apex_mW: Array,
     base_temperature_K: float,
     air: AirBeside | None = None,
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Return temperature (K) and heat (mW) where a cone meets the lever, by those at its flat end.
+
+    And the resistance of the cone (K/mW), which what its side gives does not change but by κ(T).
 
     Heat flows down. What its side gives to the air goes to the sample, which is at the base
     temperature.
@@ -80,8 +82,8 @@ def up_the_cone(
     air : AirBeside, optional
         None in vacuum.
     """
-    T, heat = _climbed(tip, apex_K, apex_mW, base_temperature_K, air)[1][-1]
-    return T, heat
+    T, heat, resistance = _climbed(tip, apex_K, apex_mW, base_temperature_K, air)[1][-1]
+    return T, heat, resistance
 
 
 def along_the_cone(
@@ -94,13 +96,13 @@ def along_the_cone(
     """Return heights (µm) from the flat end up to the lever, and the temperatures (K) there."""
     ends = np.array([apex_K]), np.array([apex_mW])
     height, states = _climbed(tip, *ends, base_temperature_K, air)
-    return height, np.array([T for (T,), _ in states])
+    return height, np.array([T for (T,), *_ in states])
 
 
 def _climbed(
     tip: Tip, apex_K: Array, apex_mW: Array, base_temperature_K: float, air: AirBeside | None
 ) -> tuple[Array, list[Array]]:
-    """Return heights (µm) up the cone, and temperatures and heats at each of them."""
+    """Return heights (µm) up the cone; temperatures, heats, resistances below at each of them."""
     # the radius and, where air matters, the jumps set the scale of what happens near the end
     scale, steps = tip.apex_radius_um, _STEPS if air is None else _STEPS_IN_AIR
     position = np.linspace(0.0, math.log1p(tip.height_um / scale), 2 * steps + 1)
@@ -111,16 +113,16 @@ def _climbed(
     lost = None if air is None else air.conductance(tip, height)
 
     def slopes(at: int, state: Array) -> Array:
-        T, heat = state
+        T, heat, _ = state
         kappa, _ = thermal_conductivity_of_wire(T, 2.0 * radius[at])
-        rise = heat / (PER_CM_TO_MILLI_PER_UM * kappa * area[at])
+        resistance = 1.0 / (PER_CM_TO_MILLI_PER_UM * kappa * area[at])
         more = np.zeros_like(heat)
         if air is not None and lost is not None:
             theta, _ = kirchhoff_variable(T, base_temperature_K)
             more = PER_CM_TO_MILLI_PER_UM * air.gas_conductivity * lost[at] * theta
-        return np.asarray(per_step[at] * np.stack([rise, more]))
+        return np.asarray(per_step[at] * np.stack([heat * resistance, more, resistance]))
 
-    state = np.stack([apex_K, apex_mW])
+    state = np.stack([apex_K, apex_mW, np.zeros_like(apex_K)])
     states = [state]
     for at in range(0, 2 * steps, 2):  # classical Runge-Kutta
         first = slopes(at, state)

@@ -41,6 +41,7 @@ class AtTheContact(NamedTuple):
     surface_K: Array  #: of the sample under the apex, its mean over the contact
     sample_mW: Array  #: through the contact
     beside_mW: Array  #: from the side of the cone through the air to the sample
+    tip_K_per_mW: Array  #: resistance of the cone
 
 
 class ContactLaw:
@@ -82,7 +83,7 @@ class ContactLaw:
 
     @cached_property
     def _table(self) -> CubicSpline:
-        """Heat at the base, at the apex, and rise of the apex, by the rise at the base."""
+        """Heat at base and apex, rise of the apex, resistance of the cone, by the base's rise."""
         from scipy.interpolate import CubicSpline  # takes long, and few levers are in contact
 
         below = self.below_apex_K_per_mW
@@ -93,11 +94,11 @@ class ContactLaw:
             at_apex = driving / (1.0 + above / below)
             heat = driving / (below + above)
             base, air = self.base_temperature_K, self._air
-            T, into_tip = up_the_cone(self._tip, base + at_apex, heat, base, air)
+            T, into_tip, cone = up_the_cone(self._tip, base + at_apex, heat, base, air)
             rise = T - base
             # a hot cone resists more: no more of the table than is of use
             driving = _rises(float(np.interp(_HIGHEST_K, rise, driving)))
-        return CubicSpline(rise, np.stack([into_tip, heat, at_apex], axis=1))
+        return CubicSpline(rise, np.stack([into_tip, heat, at_apex, cone], axis=1))
 
     def heat(self, rise: Array, names: Sequence[str] = ()) -> Evaluated:
         """Return the heat (mW) that enters the tip at rises (K) of its base.
@@ -118,13 +119,12 @@ class ContactLaw:
 
     def at(self, tip_K: Array) -> AtTheContact:
         """Return where heat goes at temperatures (K) of the tip's base."""
-        into_tip, heat, apex = np.moveaxis(
+        into_tip, heat, apex, cone = np.moveaxis(
             self._table(np.asarray(tip_K) - self.base_temperature_K), -1, 0
         )
         surface = self.spreading_K_per_mW * heat
-        return AtTheContact(
-            self.base_temperature_K + apex, self.base_temperature_K + surface, heat, into_tip - heat
-        )
+        base = self.base_temperature_K
+        return AtTheContact(base + apex, base + surface, heat, into_tip - heat, cone)
 
     def log_odds(self, rise: Array, names: Sequence[str] = ()) -> Evaluated:
         """Return how rises (K) of the tip's base are divided, (n,): at apex and surface, (2, n).
@@ -156,7 +156,7 @@ class ContactLaw:
 
         By the temperature of the tip's base, and for depths (µm) in the sample, above zero.
         """
-        apex, _, heat, _ = self.at(np.array([tip_K]))
+        apex, _, heat, *_ = self.at(np.array([tip_K]))
         ends = float(apex[0]), float(heat[0])
         height, T = along_the_cone(self._tip, *ends, self.base_temperature_K, self._air)
         rise = (ends[0] - self.base_temperature_K) * axis_rise(*self._below, depth_um)

@@ -34,8 +34,6 @@ CONTACT_COLUMNS: tuple[str, ...] = ("bias_V", "current_mA", *_OF_THE_CONTACT)
 HISTORY_COLUMNS: tuple[str, ...] = ("time_us", *CONTACT_COLUMNS)
 #: By this name probes have the radius of the contact.
 _RADIUS = "apex_radius_um"
-#: A heat (mW) that is none but for rounding: nothing is said of resistances without.
-_NOTHING_MW = 1e-12
 
 
 def law_of(lever: Lever) -> ContactLaw:
@@ -144,8 +142,8 @@ def sweep_in_contact(
         One variable for each of `CONTACT_COLUMNS` on the dimension ``bias``; ``beside_mW``, the
         heat through air from the tip's side; ``tip_change_K``, how much the contact cools the
         tip; and ``current_by_resistance``, how the current at this bias changes with the sum of
-        the resistances. An error of the current over this is the error of the sum. Resistances are
-        those of the heat through the contact; a sweep's other variables beside them.
+        the resistances. An error of the current over this is the error of the sum. The resistance
+        of the cone is its own, though in air its side gives heat; and a sweep's other variables.
 
     Raises
     ------
@@ -225,12 +223,8 @@ def _unless(failure: ComputationError | None, reached: xr.Dataset) -> xr.Dataset
 def _columns(lever: Lever, tip_K: Array) -> dict[str, Any]:
     """Return what is between tip and sample, by the tip temperature."""
     law = law_of(lever)
-    contact = law.at(tip_K)
-    flows = np.where(contact.sample_mW > _NOTHING_MW, contact.sample_mW, np.nan)
-    resistance = (tip_K - contact.apex_K) / flows
     return {
-        **contact._asdict(),
-        "tip_K_per_mW": resistance,
+        **law.at(tip_K)._asdict(),
         INTERFACE: np.full_like(tip_K, law.interface_K_per_mW),
         "spreading_K_per_mW": np.full_like(tip_K, law.spreading_K_per_mW),
     }

@@ -355,7 +355,8 @@ def optimum_text(optimum: Optimum) -> str:
     """Return start and best of a design, and what limits it, as lines of text."""
     start, best = optimum.values(optimum.start), optimum.values(optimum.best)
     width = max(map(len, start))
-    limits = "; ".join(optimum.limits) or "no bound: the derivatives vanish"
+    at_rest = "no bound" if optimum.reason else "no bound: the derivatives vanish"
+    limits = "; ".join(optimum.limits) or at_rest
     lines = [
         f"{optimum.quantity} at {optimum.point}: {start[optimum.quantity]:.4g} -> "
         f"{best[optimum.quantity]:.4g}, in {optimum.designs} designs",

@@ -47,9 +47,8 @@ def touch(reporter: Reporter, request: ContactRequest) -> None:
     waveform = request.read_waveform()
     if waveform is not None and request.bias is not None:
         raise InputError("--bias: does not go with a wave form, which has biases of its own")
-    for name, given in (("--until", request.until), ("--at", request.at)):
-        if waveform is None and given is not None:
-            raise InputError(f"{name}: goes with a wave form, such as --pulse")
+    if waveform is None:
+        request.refuse(["until", "at"], "goes with a wave form, such as --pulse")
     probe = probe_in_contact(reporter, request)
     biases = parse_bias(request.bias, probe.lowest_bias_V)
     lever = make_lever(reporter, probe)

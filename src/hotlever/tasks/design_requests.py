@@ -61,6 +61,14 @@ class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
         """Whether the best design is looked for."""
         return self.minimise is not None or self.maximise is not None
 
+    def need_no_others(self) -> None:
+        """Refuse options that do nothing beside what is asked for: the best design, or others."""
+        if self.asks_for_best:
+            others = "vary", "power", "annealing_K", "annealing_min", "air"
+            self.refuse(others, "does not go with --minimise or --maximise")
+        else:
+            self.refuse(["within", "at"], "goes with --minimise or --maximise")
+
     def types_of(self, own: Field[Any]) -> tuple[str, ...]:
         """Return how the name of a file may end: the best design is a probe file."""
         is_probe = own.name == "output" and self.asks_for_best

@@ -22,11 +22,10 @@ _DRAWN = 2
 
 def vary_design(reporter: Reporter, request: DesignRequest) -> None:
     """Find how knee, tip temperature and loss to air depend on a probe's design."""
+    request.need_no_others()
     if request.asks_for_best:
         optimise_design(reporter, request)
         return
-    if request.within is not None:
-        raise InputError("--within: goes with --minimise or --maximise")
     output, plot, outputs = request.output, request.plot, request.outputs()
     asked: Any = {"power_mW": request.power, "air": request.air}
     check_number("--power", request.power, 1e-3, 1000)
@@ -73,8 +72,6 @@ def optimise_design(reporter: Reporter, request: DesignRequest) -> None:
     outputs = request.outputs()
     if request.minimise is not None and request.maximise is not None:
         raise InputError("--minimise, --maximise: found both, expected one")
-    if request.vary is not None:
-        raise InputError("--vary: does not go with --minimise or --maximise")
     probe = request.with_physics(read_probe(reporter, request.probe))
     point = WorkingPoint(*parse_setting(request.at, tip=True))
     quantity, bounds = request.minimise or request.maximise or "", parse_bounds(request.within)

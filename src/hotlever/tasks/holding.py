@@ -138,11 +138,8 @@ def check_control(request: PulseRequest) -> bool:
     """Return whether a controller is asked for, and refuse what does not go with it, or alone."""
     needed = {"--hold-resistance": request.hold_resistance, "--step": request.step}
     if request.controller is None:
-        others = {"--limit": request.limit, "--gain-map": request.gain_map, **needed}
-        del others["--step"]
-        for name, value in others.items():
-            if value is not None:
-                raise InputError(f"{name}: goes with --controller P,I")
+        names = "limit", "gain_map", "hold_resistance", "filter"
+        request.refuse(names, "goes with --controller P,I")
         return False
     for name in request.drive:
         if name != "--step":

@@ -152,6 +152,8 @@ class FitRequest(DriveRequest, LeversRequest):
     def check(self) -> None:
         """Refuse what does not go together."""
         super().check()
+        if not self.posterior:
+            self.refuse(["samples"], "goes with --posterior")
         check_number("--samples", self.samples, 1, 1_000_000)
         if self.posterior or self.profiles:
             self.need_single("--posterior", "--profiles")
@@ -222,6 +224,10 @@ class CalibrateRequest(PlotRequest, LeversRequest):
         from hotlever.estimation.options import UNKNOWN_MEDIUM
 
         super().check()
+        if not self.posterior:
+            self.refuse(["samples"], "goes with --posterior")
+        if self.table is None and not self.several:
+            self.refuse(["table_by", "table_step"], "goes with --table")
         sources = {"--fit": self.fit, "--probe": self.probe, "--power-law": self.power_law}
         stated = [name for name, path in sources.items() if path is not None]
         if len(stated) > 1:

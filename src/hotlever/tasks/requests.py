@@ -8,6 +8,7 @@ share options inherit them.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, get_args
@@ -52,6 +53,14 @@ def written(types: tuple[str, ...], *names: str, default: Any = None, **texts: A
 @dataclass(kw_only=True)
 class Request:
     """What is asked of a task that writes files."""
+
+    def refuse(self, names: Collection[str], why: str) -> None:
+        """Refuse options that would do nothing: fields that are other than if left out."""
+        for own in fields(self):
+            if own.name in names and getattr(self, own.name) != own.default:
+                usual = f"--{'no-' * (own.default is True)}{own.name.replace('_', '-')}"
+                stated = [name for name in own.metadata["names"] if name.startswith("--")]
+                raise InputError(f"{(*stated, usual)[0]}: {why}")
 
     def inputs(self) -> list[Path]:
         """Return the files that are read: all that fields name and that are not written."""
@@ -304,11 +313,9 @@ class PulseRequest(TableRequest, LeverRequest, TimesRequest):
 
     def need_no_waveform(self) -> None:
         """Refuse what does not go with a page, which has wave forms of its own."""
-        others = {"--until": self.until, "--at": self.at, "--output": self.output}
-        others |= {"--controller": self.controller, "--hold-resistance": self.hold_resistance}
-        others |= {"--plot": self.plot, "--fields": self.fields, "--film": self.film}
-        for name in (*self.drive, *(name for name, value in others.items() if value)):
-            raise InputError(f"{name}: does not go with --report, which has wave forms of its own")
+        others = {own.name for own in fields(self)} - {own.name for own in fields(LeverRequest)}
+        why = "does not go with --report, which has wave forms of its own"
+        self.refuse(others - {"report"}, why)
 
 
 @dataclass(kw_only=True)

@@ -159,10 +159,8 @@ def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
             )
         _describe(chosen, listener)
     if chosen is None:
-        unused = {"--reference": reference, "--stress": stress, "--laser-power": laser_power}
-        for name, value in unused.items():
-            if value:
-                raise InputError(f"{name} needs --calibration or --calibrate-from")
+        unused = "reference", "stress", "laser_power", "law"
+        request.refuse(unused, "needs --calibration or --calibrate-from")
         return Thermometry(listener, options, corrections=by_hand, corrected_by=corrected_by)
     if chosen.reference_cm is None and not reference:
         raise InputError(

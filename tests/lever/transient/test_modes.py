@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.lever.transient import pulse, rise_times, simulate, step, time_constants, with_times
+from hotlever.lever.transient import (
+    pulse,
+    rise_times,
+    simulate,
+    sine,
+    time_constants,
+    with_times,
+)
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper
@@ -81,8 +88,10 @@ def test_a_history_says_how_fast_it_is(coarse, rises):
     # cold at both ends, but without a bias nothing feeds back
     constants = [found[f"time_constants_us_at_{end}"] for end in ("start", "end")]
     assert constants[0][0] > constants[1][0] == pytest.approx(slowest(coarse, 1e-3), rel=1e-3)
-    flat = with_times(simulate(coarse, step(0.0)), states[0], states[-1]).attrs
-    assert np.isnan(flat["heating_us"])
+    at_rest = simulate(coarse, sine(4.0, 0.0, 2e4), 100.0)
+    assert 0.0 < np.ptp(at_rest.tip_K.values) < 1e-4
+    flat = with_times(at_rest, states[0], states[-1]).attrs
+    assert np.isnan([flat["heating_us"], flat["cooling_us"]]).all()
     few = with_times(history, states[0], states[-1], resolved=False).attrs
     assert "heating_us" not in few
 

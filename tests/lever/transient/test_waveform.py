@@ -56,7 +56,7 @@ def test_a_sine_has_offset_amplitude_and_frequency():
     [
         "time (us),bias (V)\n0,0\n10,5\n10,2\n30,2\n",
         "t (ms);V_b (mV)\n0;0\n0,01;5000\n0,01;2000\n0,03;2000\n",
-        "time_us,current_mA,bias_V\n5,1,0\n15,1,5\n15,1,2\n35,1,2\n",
+        "time_us,current_mA,bias_V\n0,1,0\n10,1,5\n10,1,2\n30,1,2\n",
         "# from a supply\nTime [s]\tV [V]\n0\t0\n1e-5\t5\n1e-5\t2\n3e-5\t2\n",
     ],
 )
@@ -69,6 +69,15 @@ def test_a_file_is_straight_lines_between_its_rows(tmp_path, text):
     assert waveform.usual_end == pytest.approx(30.0)
 
 
+def test_times_of_a_file_stand_as_they_are(tmp_path):
+    path = tmp_path / "wave.csv"
+    path.write_text("time (us),bias (V)\n5,1\n15,6\n")
+    waveform = read_waveform(path)
+    at = np.array([0.0, 4.0, 10.0, 20.0])
+    np.testing.assert_allclose(waveform.bias(at), [1.0, 1.0, 3.5, 6.0])
+    assert (waveform.before_V, waveform.usual_end) == (1.0, 15.0)
+
+
 @pytest.mark.parametrize(
     ("text", "found"),
     [
@@ -77,6 +86,7 @@ def test_a_file_is_straight_lines_between_its_rows(tmp_path, text):
         ("time (V),bias (V)\n1,2\n", "unit"),
         ("time,bias (V)\n1,2\n", "unit"),
         ("time (us),bias (V)\n0,1\n2,1\n1,1\n", "line 4: expected a time not before"),
+        ("time (us),bias (V)\n-5,1\n2,1\n", "line 2: expected a time from 0 on"),
         ("time (us),bias (V)\n0,1\n1,\n", "line 3"),
         ("time (us),bias (V)\n0,1\n1,1e9\n", "line 3"),
         ("time (us),bias (V)\n0,1\n1e30,1\n", "lasts"),

@@ -43,6 +43,8 @@ _ACCURATE = 1e-9
 _STEADY, _MOST_ROUNDS = 1e-4, 6
 #: Points of a history for each step of the solver.
 _PER_STEP = 8
+#: A rise (K) of which less is no heating: beside it count errors of steps and of a state at rest.
+_LEAST_RISE = 1e-4
 
 
 @one_blas_thread
@@ -182,16 +184,17 @@ def with_times(
         circuit; and, of a resolved one, the highest temperature of the tip, when it has that, and
         its mean over the whole time, ``tip_highest_K``, ``tip_highest_at_us`` and ``tip_mean_K``;
         ``heating_us`` and ``cooling_us``: from 10 to 90 % of the way from the colder of its ends to
-        its hottest tip, NaN where there is no such time.
+        its hottest tip, NaN where there is no such time, or no rise.
     """
     attributes: dict[str, Any] = {}
     if resolved and history.time.size > 1:
         time, tip = history.time.values, history.tip_K.values
         low, high = min(tip[0], tip[-1]), tip.max()
+        heats = high - low > _LEAST_RISE
         attributes["tip_highest_K"], attributes["tip_highest_at_us"] = high, time[tip.argmax()]
         attributes["tip_mean_K"] = np.trapezoid(tip, time) / (time[-1] - time[0])
         attributes["heating_us"], attributes["cooling_us"] = (
-            _swing(time, (tip - low) / (high - low)) if high > low else (np.nan, np.nan)
+            _swing(time, (tip - low) / (high - low)) if heats else (np.nan, np.nan)
         )
     for name, state in (("start", start), ("end", end)):
         with suppress(ComputationError):  # none are known, such as where silicon melts

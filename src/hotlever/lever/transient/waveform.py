@@ -264,13 +264,13 @@ def check_bias(volts: float, length: float = 1.0) -> None:
 def read_waveform(path: str | os.PathLike[str]) -> Waveform:
     """Read a wave form from a table of times and biases, with straight lines between its rows.
 
-    Times count from the first row; a time given twice is a jump. The lever rests at the first
-    bias before, and the last one stays.
+    A time given twice is a jump. The lever rests at the first bias before the first row, and the
+    last one stays.
 
     Raises
     ------
     InputError
-        If a column is missing, has no known unit, or the times fall.
+        If a column is missing, has no known unit, or the times fall or begin before 0.
     """
     expected = "a header row like 'time (us),bias (V)'"
     table = read_table(path, expected)
@@ -285,17 +285,19 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
             )
         columns.append(table.values(column, inside, what))
     times, volts = columns
-    times = times - times[0]
     for wrong, meant in (
         (~np.isfinite(times + volts), "a time and a bias"),
         (np.abs(volts) > MOST_BIAS, f"a bias of at most {MOST_BIAS:g} V"),
+        (times < 0.0, "a time from 0 on, where a wave form begins"),
         (np.diff(times, prepend=0.0) < 0, "a time not before the last"),
     ):
         if wrong.any():
             raise InputError(f"{table.where(int(wrong.argmax()))}: expected {meant}")
     if times[-1] > LONGEST:
-        raise InputError(f"{path}: lasts {times[-1]:g} µs, expected at most {LONGEST:g} µs")
+        raise InputError(f"{path}: lasts until {times[-1]:g} µs, expected at most {LONGEST:g} µs")
     name = os.path.basename(os.fspath(path))
     end = float(times[-1]) or _SETTLING
+    if times[0] > 0.0:
+        times, volts = np.append(0.0, times), np.append(volts[0], volts)
     points = tuple(times.tolist()), tuple(volts.tolist())
     return Polyline(f"wave form of {name}", *points, end, float(volts[0]))
