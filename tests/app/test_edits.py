@@ -48,15 +48,27 @@ def test_layers_change_what_they_are_made_of(tmp_path: Path) -> None:
     text = (EXAMPLES / name).read_text(encoding="utf-8")
     row = _row(text, tmp_path, "track")
     assert (row.role, row.material, row.thickness_um) == ("film", "film", 0.05)
-    changed = with_layer(text, row, "film", "+metal-film/Pt", 0.1)
+    # what was typed since the row was shown stays
+    text = with_value(text, ("layers", "track"), "thickness_um", 0.1)
+    changed = with_layer(text, row, "film", "+metal-film/Pt")
     path = tmp_path / name
     path.write_text(changed, encoding="utf-8")
     probe = Probe.from_file(path)
     # the material that nothing is made of any more is gone, and the layer's own name stays
     assert list(probe.materials) == ["nitride", "Pt"]
     assert tomllib.loads(changed)["layers"]["track"]["thickness_um"] == 0.1
-    without = with_layer(changed, _row(changed, tmp_path, "track"), "", "", None)
+    without = with_layer(changed, _row(changed, tmp_path, "track"), "", "")
     assert "track" not in tomllib.loads(without)["layers"]
+
+
+def test_a_layer_that_got_another_name_since_it_was_shown_is_still_one_layer(
+    tmp_path: Path,
+) -> None:
+    text = "[probe]\nshape = 'drawing'\n[layers]\nheater = '2/0'\n"
+    row = _row(text, tmp_path, "heater")
+    once = with_layer(text, row, "film", "+metal-film/Pt")
+    assert list(tomllib.loads(once)["layers"]) == ["Pt"]
+    assert list(tomllib.loads(with_layer(once, row, "", ""))["layers"]) == []
 
 
 def _row(text: str, folder: Path, name: str) -> LayerRow:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import tempfile
+import tomllib
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -254,6 +255,27 @@ def test_what_nobody_typed_is_drawn_once(tmp_path: Path, monkeypatch: pytest.Mon
         await until(lambda: len(images(user)) == 1)
         await asyncio.sleep(0.5)
         assert drawn == ["my-lever.toml", "first.toml", "second.toml"]
+
+    visit(tmp_path, story)
+
+
+def test_what_is_typed_of_a_material_that_is_being_replaced_goes_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (EXAMPLES / "palladium-on-nitride.toml").read_text(encoding="utf-8")
+
+    async def story(user: User, session: Session) -> None:
+        session.chosen["lever"] = {"text": text, "name": "mine.toml"}
+        await user.open("/lever")
+        await until(lambda: bool(all_of(user, ui.select, "made of")))
+        typed = of(user, ui.input, "temperature coefficient of the resistivity, α (K⁻¹)")
+        of(user, ui.select, "made of").set_value("+metal-film/Pt")
+        typed.set_value("0.0123")  # before the fields of the former material are gone
+        await until(lambda: "Pt" in of(user, ui.textarea).value)
+        assert list(tomllib.loads(of(user, ui.textarea).value)["materials"]) == ["nitride", "Pt"]
+        await until(lambda: "Pt: metal film" in str([one.text for one in all_of(user, ui.label)]))
+        assert shown(user, "role=alert").strip() == ""
 
     visit(tmp_path, story)
 

@@ -9,7 +9,7 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hotlever.errors import InputError, shown
@@ -119,6 +119,17 @@ def _after(entries: list[_Entry], last: _Entry | None, *new: _Entry) -> list[_En
     return [*entries[:at], *new, *entries[at:]]
 
 
+def has_section(text: str, section: Section) -> bool:
+    """Return whether a probe file has a section."""
+    try:
+        content: Any = tomllib.loads(text)
+    except ValueError:
+        return False
+    for name in section:
+        content = content.get(name) if isinstance(content, dict) else None
+    return isinstance(content, dict)
+
+
 def without_section(text: str, section: Section) -> str:
     """Return a probe file without a section."""
     return _text([entry for entry in _entries(text) if entry.section != section])
@@ -220,12 +231,26 @@ class LayerRow:
         return self.name
 
 
-def with_layer(text: str, row: LayerRow, role: str, material: str, thickness: float | None) -> str:
+def drawn_in(layer: Any) -> Any:
+    """Return what a layer or terminal of a probe file is drawn in: a name, or outlines."""
+    return layer.get("drawn", layer.get("area")) if isinstance(layer, dict) else layer
+
+
+def with_layer(text: str, row: LayerRow, role: str, material: str) -> str:
     """Return a probe file in which a layer of a drawing is something else.
 
-    A ``material`` that begins with ``+`` is a new one: its kind, and behind ``/`` its preset.
-    Materials that no layer is made of any more go.
+    The row says what it was when it was shown; that it may have got another name or thickness
+    since, the text says. A ``material`` that begins with ``+`` is a new one: its kind, and behind
+    ``/`` its preset. Materials that no layer is made of any more go.
     """
+    values = tomllib.loads(text)
+    if row.name not in values.get(row.part, {}):
+        for part in ("layers", "terminals"):
+            for name, layer in values.get(part, {}).items():
+                if drawn_in(layer) == row.drawn:
+                    row = replace(row, part=part, name=name)
+    now = values.get(row.part, {}).get(row.name)
+    thickness = now.get("thickness_um") if isinstance(now, dict) else None
     if material.startswith("+"):
         kind, _, preset = material[1:].partition("/")
         material = _free(preset or kind, _names(text))

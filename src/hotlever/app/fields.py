@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from hotlever.app.edits import LayerRow, Section
+from hotlever.app.edits import LayerRow, Section, drawn_in
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.errors import InputError
@@ -50,12 +50,11 @@ def _rows(sections: Mapping[str, Any]) -> list[LayerRow]:
     rows = []
     for part in ("layers", "terminals"):
         for name, given in sections[part].items():
-            inner = given if isinstance(given, dict) else {}
-            drawn = inner.get("drawn", inner.get("area")) if inner else given
+            drawn = drawn_in(given)
             label = drawn if isinstance(drawn, str) else f"{name} (points)"
-            thickness = inner.get("thickness_um")
+            inner = given if isinstance(given, dict) else {}
             material = str(inner.get("material", ""))
-            rows.append(LayerRow(label, drawn, part, name, material, thickness))
+            rows.append(LayerRow(label, drawn, part, name, material, inner.get("thickness_um")))
     probe = sections["probe"]
     if isinstance(file := probe.get("file"), str):
         used = {row.label for row in rows}

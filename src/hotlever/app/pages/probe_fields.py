@@ -14,6 +14,7 @@ from hotlever.app.edits import (
     TERMINALS,
     LayerRow,
     Section,
+    has_section,
     same,
     typed,
     with_layer,
@@ -114,7 +115,7 @@ class ProbeFields:
             role = FILM
         role = row.role if role is None else role
         material = row.material if material is None else material
-        return self._edit(with_layer(self._text, row, role, material, row.thickness_um))
+        return self._edit(with_layer(self._text, row, role, material))
 
     async def _rename(self, old: str) -> None:
         """Ask for another name of a material."""
@@ -164,6 +165,8 @@ class ProbeFields:
     def _typed(self, section: Section, key: str, event: Any) -> Awaitable[None] | None:
         if (event.value or "") == self._shown.get((section, key)):
             return None  # nobody typed it
+        if len(section) > 1 and not has_section(self._text, section):
+            return None  # it went meanwhile with the layer or the material that it was of
         self._shown[section, key] = event.value or ""
         value = typed(key, event.value or "")
         text = with_value(self._text, section, key, value)
