@@ -32,7 +32,7 @@ class Task:
         Such as ``fit``; see `hotlever.tasks.commands`.
     files : tuple of str
     options : dict
-        By their names, in the order in which they are typed; empty ones are none.
+        By their names, in the order in which they are typed.
 
     Examples
     --------
@@ -46,16 +46,26 @@ class Task:
     options: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def given(self) -> dict[str, Any]:
+        """The options that say something: a 0 does, an empty text or list says nothing."""
+        return {
+            name: value
+            for name, value in self.options.items()
+            if value is not None and value is not False and value not in ("", [])
+        }
+
+    @property
     def line(self) -> str:
         """The command line that does the same."""
-        words = [*self.command.split(), *map(_plain, self.files)]
-        for name, value in self.options.items():
+        files = (f"./{name}" if name.startswith("-") else name for name in self.files)
+        words = [*self.command.split(), *files]
+        for name, value in self.given.items():
             option = "-o" if name == "output" else f"--{name.replace('_', '-')}"
             if value is True:
                 words.append(option)
-            elif value not in (None, "", False):
+            else:
                 values = value if isinstance(value, list) else [value]
-                words += [word for text in values for word in (option, _plain(str(text)))]
+                words += [word for text in values for word in (option, str(text))]
         return shlex.join(["hotlever", *words])
 
     def writing(self, files: Mapping[str, str]) -> Task:
@@ -68,11 +78,6 @@ class Task:
     def written(self) -> str:
         """The file or folder that shows whether it has written what was asked for."""
         return str([value for value in self.options.values() if value][-1])
-
-
-def _plain(name: str) -> str:
-    """Return a file's name as an argument that is no option."""
-    return f"./{name}" if name.startswith("-") else name
 
 
 @dataclass

@@ -8,11 +8,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from hotlever.app.changes import Changes
 from hotlever.app.jobs import Task
 from hotlever.app.workers import Report
+from hotlever.errors import InputError
 from hotlever.probe import Probe
 from hotlever.tasks.commands import COMMANDS
 
@@ -35,20 +36,22 @@ def request_of(task: Task) -> Any:
 
     Raises
     ------
-    ValidationError
-        If an option is none of the command's.
+    InputError
+        As the command line says, if a value is not of its option's type.
     """
-    command = COMMANDS[task.command]
-    options = {
-        name: value for name, value in task.options.items() if value not in (None, "", False, [])
-    }
+    command, options = COMMANDS[task.command], task.given
     switched_off = [name for name in options if name.startswith("no_")]
     options |= {name.removeprefix("no_"): not options.pop(name) for name in switched_off}
     if task.files:
         (argument,) = command.arguments
         several = "list" in str(argument.type)
         options[argument.name] = list(task.files) if several else task.files[0]
-    return TypeAdapter(command.request).validate_python(options)
+    try:
+        return TypeAdapter(command.request).validate_python(options)
+    except ValidationError as error:
+        (first, *_) = error.errors()
+        name = str(first["loc"][0]).replace("_", "-")
+        raise InputError(f"Invalid value for '--{name}': {first['msg']}") from None
 
 
 def probe_of(name: str | None) -> Probe:

@@ -101,7 +101,7 @@ class DesignPage(DrawnPage):
                 ends = [self.chosen[f"{key}_{end}"] for end in ("from", "to", "count")]
                 if None in ends:
                     raise InputError(f"{name}: expected the first and the last value, and a count")
-                texts.append(f"{name}={ends[0]:.12g}:{ends[1]:.12g}:{int(ends[2])}")
+                texts.append(f"{name}={ends[0]:.12g}:{ends[1]:.12g}:{ends[2]:g}")
         if not texts:
             raise InputError("choose what is varied")
         return texts

@@ -83,7 +83,7 @@ class ReaderPage(LiveTaskPage):
             "medium": "air",
             "set": changes,
             "amplifier": f"{self.chosen['amplifier_nV']:g}nV",
-            "hooge": self.chosen["hooge"],
+            "hooge": self.chosen["hooge"] or None,
         }
         return Task("reader", probe_files(self.chosen), options)
 
