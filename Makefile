@@ -33,7 +33,7 @@ test-slow: env
 
 test-app: env
 	sh tools/get_chromium.sh
-	$(BIN)/python -m pytest -m browser -p no:cacheprovider tests/app tests/report
+	$(BIN)/python -m pytest -m browser -p no:cacheprovider -n 2 --dist loadfile tests/app tests/report
 
 test-hostile: env
 	HOTLEVER_HOSTILE=1 $(BIN)/python -m pytest tests/hostile -rP

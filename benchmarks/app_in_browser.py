@@ -38,6 +38,28 @@ _DROP = """async ([zone, name, content]) => {
     input.files = given.files;
     input.dispatchEvent(new Event('change', {bubbles: true}));
 }"""
+#: Waits until nothing in a page has changed for so many milliseconds, and nothing moves but what
+#: moves for ever.
+_STILL = """([quiet, most]) => new Promise(done => {
+    const began = performance.now();
+    let changed = began;
+    const watch = new MutationObserver(() => { changed = performance.now(); });
+    watch.observe(document, {
+        subtree: true, childList: true, attributes: true, characterData: true,
+    });
+    const moves = one => one.playState === 'running'
+        && one.effect.getComputedTiming().endTime !== Infinity;
+    const look = () => {
+        const now = performance.now();
+        if (document.getAnimations().some(moves)) changed = now;
+        if (now - changed < quiet && now - began < most) return setTimeout(look, 25);
+        watch.disconnect();
+        done();
+    };
+    requestAnimationFrame(look);
+})"""
+#: Milliseconds after which a page that never stands still is as it is.
+_RESTLESS_MS = 3_000
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -145,6 +167,11 @@ def go(page: Page, app: App, address: str) -> None:
     # an upload that the last page broke off may count as under way for ever
     with suppress(Error):
         page.wait_for_load_state("networkidle", timeout=_IDLE_MS)
+
+
+def stand_still(page: Page, quiet_ms: float = 200.0) -> None:
+    """Wait until nothing in a page has changed for so many milliseconds."""
+    page.evaluate(_STILL, [quiet_ms, _RESTLESS_MS])
 
 
 class Seen:

@@ -7,6 +7,7 @@ covered, squeezed, unreachable, without a name), and keeps a picture of each loo
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -18,7 +19,7 @@ from typing import Any
 
 from playwright.sync_api import Page
 
-from app_in_browser import App, browsing, go, running
+from app_in_browser import App, browsing, go, running, stand_still
 from hotlever.app.pages.frame import PAGES
 from hotlever.app.project import Project
 from problems import table
@@ -33,8 +34,10 @@ _NAMED = (
     *("button", "link", "textbox", "combobox", "checkbox", "switch", "slider", "spinbutton"),
     *("tab", "menuitem", "radio", "image", "img", "dialog"),
 )
-#: Times that Tab is pressed at most, and milliseconds for a page to come to rest.
-_MOST_TABS, _REST_MS = 200, 700
+#: Times that Tab is pressed at most.
+_MOST_TABS = 200
+#: Milliseconds without a change after which there is nothing more to come.
+_ALL_MS = 500
 #: Milliseconds that a task may take.
 _WORK_MS = 120_000
 
@@ -81,6 +84,10 @@ def _designed(page: Page) -> None:
     _drawn(page, "Knee, tip temperature", "Vary")
 
 
+def _proposed(page: Page) -> None:
+    _drawn(page, "Error by temperature", "Propose")
+
+
 def _menu(page: Page) -> None:
     page.set_viewport_size({"width": WIDTHS[0], "height": _HEIGHTS[WIDTHS[0]]})
     page.get_by_label("Pages: ").click()
@@ -99,6 +106,7 @@ VIEWS: dict[str, tuple[str, Callable[[Page], None], tuple[int, ...]]] = {
     "compared": ("simulate", _compared, WIDTHS),
     "read": ("reader", _read, WIDTHS),
     "designed": ("design", _designed, WIDTHS),
+    "proposed": ("calibrate", _proposed, WIDTHS),
     "menu": ("materials", _menu, WIDTHS[:1]),
     "changes": ("materials", lambda page: page.get_by_label("What the app wrote").click(), WIDTHS),
     "question": ("lever", _question, WIDTHS),
@@ -125,16 +133,22 @@ def furnish(folder: Path) -> None:
     for name in ("lever-b.csv", "reference-probe.gds", "lever-a.csv"):
         project.take_example(name)
     project.take_example_folders("raman", "hot-plate", "tip")
+    command(folder, "fit lever-a.csv lever-b.csv -o fits")
+    # as the fit of one lever is called
+    shutil.copy(folder / "fits" / "lever-a.json", folder / "lever-a.fit.json")
     for line in (
-        "fit lever-a.csv -o lever-a.fit.json",
-        "fit lever-a.csv lever-b.csv -o fits",
         "calibrate lever-a.csv --fit lever-a.fit.json -o lever-a.calibration.json "
         "--table lever-a.table.csv",
         "raman tip --calibrate-from hot-plate --save-calibration raman.json -o tip.raman.csv "
         "--plot raman.svg",
     ):
-        command = [sys.executable, "-m", "hotlever", *line.split()]
-        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        command(folder, line)
+
+
+def command(folder: Path, line: str) -> None:
+    """Run a command in a folder."""
+    words = [sys.executable, "-m", "hotlever", *line.split()]
+    subprocess.run(words, cwd=folder, check=True, capture_output=True)
 
 
 def look(page: Page, app: App, view: str, folder: Path) -> Look:
@@ -149,11 +163,11 @@ def look(page: Page, app: App, view: str, folder: Path) -> Look:
         _settle(page)
         if opened is not None:
             opened(page)
-            page.wait_for_timeout(_REST_MS)
+            stand_still(page)
         for width in widths:
             page.set_viewport_size({"width": width, "height": _HEIGHTS[width]})
             page.evaluate("scrollTo(0, 0)")
-            page.wait_for_timeout(_REST_MS)
+            stand_still(page)
             picture = folder / f"{made.page}-{theme}-{width}.png"
             page.screenshot(path=picture, full_page=True)
             seen = page.evaluate(f"(look => [look.colours(), look.faults()])({_SCRIPT})")
@@ -172,9 +186,9 @@ def look(page: Page, app: App, view: str, folder: Path) -> Look:
 
 def _settle(page: Page) -> None:
     """Wait until there is nothing more to come, with all that can be unfolded open."""
-    page.wait_for_timeout(2 * _REST_MS)
+    stand_still(page, _ALL_MS)
     while page.evaluate(f"({_SCRIPT}).unfolded()"):
-        page.wait_for_timeout(_REST_MS)
+        stand_still(page, _ALL_MS)
 
 
 def _walk(page: Page, made: Look, where: str) -> None:

@@ -29,6 +29,7 @@ from app_in_browser import (
     give,
     go,
     running,
+    stand_still,
 )
 from bad_files import bad_files
 
@@ -79,7 +80,7 @@ def drop(page: Page, *paths: Any, zone: int = 0) -> None:
 def picture(page: Page, name: str) -> None:
     SCREENSHOTS.mkdir(exist_ok=True)
     page.evaluate("window.scrollTo(0, 0)")
-    page.wait_for_timeout(500)
+    stand_still(page)
     page.screenshot(path=SCREENSHOTS / f"{name}.png", full_page=True)
 
 
@@ -139,7 +140,9 @@ def test_sliders_move_the_lever(app: App, page: Page) -> None:
     expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
     tip = page.locator("[data-number=tip_K]")
     cold = tip.inner_text()
-    page.get_by_role("slider", name="Bias", exact=True).locator("[tabindex]").press("ArrowRight")
+    page.get_by_role("slider", name="Bias V_b", exact=True).locator("[tabindex]").press(
+        "ArrowRight"
+    )
     expect(tip).not_to_have_text(cold)
     expect(page.locator(".js-plotly-plot image").first).to_be_attached()
     picture(page, "simulate")
@@ -193,7 +196,7 @@ def test_work_survives_a_reload_and_is_cancelled(app: App, page: Page, folder: P
     before = (folder / "lever-a.fit.json").read_bytes()
     button(page, "Fit").click()
     expect(button(page, "Cancel")).to_be_visible()
-    page.wait_for_timeout(2000)
+    page.wait_for_timeout(500)
     page.reload()
     expect(button(page, "Cancel")).to_be_visible()
     picture(page, "fit-running")
@@ -206,7 +209,7 @@ def test_a_killed_process_is_a_message(app: App, page: Page) -> None:
     go(page, app, "fit")
     button(page, "Fit").click()
     expect(button(page, "Cancel")).to_be_visible()
-    page.wait_for_timeout(1500)
+    page.wait_for_timeout(500)
     for pid in _children(app.process.pid):
         if _is_worker(pid):
             os.kill(pid, signal.SIGKILL)
@@ -247,7 +250,7 @@ def test_raman_spectra_become_temperatures(app: App, page: Page) -> None:
     said = page.locator("[data-spectrum]")
     expect(said).to_contain_text("551.11 ± 2.52 K")
     page.evaluate("window.scrollTo(0, 0)")
-    page.wait_for_timeout(500)
+    stand_still(page)
     box = page.locator(".js-plotly-plot .nsewdrag").first.bounding_box()
     page.mouse.click(box["x"] + box["width"] * 77.0 / 160.0, box["y"] + 100)  # at 517 cm⁻¹
     expect(said).to_contain_text("by-hand")
@@ -325,7 +328,7 @@ def test_the_pages_fit_on_a_tablet(app: App, page: Page) -> None:
     page.set_viewport_size({"width": 820, "height": 1180})
     for address in ("", "simulate", "fit"):
         go(page, app, address)
-        page.wait_for_timeout(1500)
+        stand_still(page, 500)
         wide = page.evaluate("document.documentElement.scrollWidth")
         picture(page, f"tablet-{address or 'start'}")
         assert wide <= 830, address
