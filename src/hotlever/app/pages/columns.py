@@ -18,11 +18,16 @@ _UNITS |= {"us": ("s", "ms", "us", "ns")}
 
 
 class ColumnPicker:
-    """Which column is which; `tell` is told the words of ``--column`` for those that are picked."""
+    """Which column is which; `tell` is told the words of ``--column`` for those that are picked.
+
+    Fields stay while the file is read anew: the next one may be open meanwhile.
+    """
 
     def __init__(self, tell: Callable[[list[str]], Any]) -> None:
         self._tell = tell
         self._told: list[str] = []
+        self._columns: dict[str, FileColumn] = {}
+        self._fields: dict[str, tuple[ui.select, ui.select]] = {}
         opened = ui.expansion("Columns of the file").props("header-class=text-bold")
         with opened as self._opened:
             caption("The first values of each, and what it is used as.")
@@ -34,13 +39,25 @@ class ColumnPicker:
         self._opened.set_visibility(bool(columns))
         if not is_understood:
             self._opened.set_value(True)
-        self._rows.clear()
-        with self._rows:
-            for column in columns:
-                self._row(column)
+        before = [(column.name, column.heading, column.cells) for column in self._columns.values()]
+        self._columns = {column.name: column for column in columns}
+        if before != [(column.name, column.heading, column.cells) for column in columns]:
+            self._rows.clear()
+            with self._rows:
+                self._fields = {column.name: self._row(column) for column in columns}
+        for column in columns:
+            picked, unit = self._fields[column.name]
+            picked.set_value(column.symbol)
+            has_unit = bool(column.symbol and not column.unit)
+            unit.set_visibility(has_unit)
+            if has_unit:
+                units = list(_UNITS[MEASURANDS[column.symbol].unit])
+                unit.set_options(units, value=self._unit_of(column, units))
 
-    def _row(self, column: FileColumn) -> None:
-        head = column.heading or f"column {column.name}"
+    def _row(self, column: FileColumn) -> tuple[ui.select, ui.select]:
+        """Show a column; return the fields of what it is, and of its unit."""
+        name = column.name
+        head = column.heading or f"column {name}"
         with ui.row().classes("w-full items-center gap-2"):
             with ui.column().classes("gap-0 col min-w-40"):
                 ui.label(head).classes("text-sm text-bold remark")
@@ -50,15 +67,12 @@ class ColumnPicker:
                 for symbol, measurand in MEASURANDS.items()
             }
             picked = ui.select(options, value=column.symbol).classes("w-64")
-            picked.props(f'aria-label="Column {column.name} is"')
-            picked.on_value_change(lambda event: self._pick(column, event.value))
-            if column.symbol and not column.unit:
-                units = list(_UNITS[MEASURANDS[column.symbol].unit])
-                unit = ui.select(units, label="in", value=self._unit_of(column, units)).classes(
-                    "w-24"
-                )
-                unit.props(f'aria-label="Unit of column {column.name}"')
-                unit.on_value_change(lambda e: self._pick(column, column.symbol, e.value))
+            picked.props(f'aria-label="Column {name} is"')
+            picked.on_value_change(lambda event: self._pick(name, event.value))
+            unit = ui.select([], label="in").classes("w-24")
+            unit.props(f'aria-label="Unit of column {name}"')
+            unit.on_value_change(lambda event: self._pick_unit(name, event.value))
+        return picked, unit
 
     def _unit_of(self, column: FileColumn, units: list[str]) -> str | None:
         """Return the unit that was told of a column, which is offered then."""
@@ -70,17 +84,27 @@ class ColumnPicker:
                 return told
         return None
 
-    def _pick(self, column: FileColumn, symbol: str, unit: str | None = None) -> Any:
+    def _pick(self, name: str, symbol: str, unit: str | None = None) -> Any:
         """Tell what a column is, and nothing else of it, nor of that quantity."""
-        others = [text for text in self._told if not self._is_of(text, column.name, symbol)]
+        column = self._columns[name]
+        if symbol == column.symbol and unit is None:
+            return None  # nobody picked it
+        others = [text for text in self._told if not self._is_of(text, name, symbol)]
+        inside = f" ({unit})" if unit else ""  # a unit is not guessed: the reader asks for one
+        own = [f"{symbol}{inside}={name}"]
         if not symbol:
             # what was only told to be used is taken back; what the file itself says is not
             was_told = len(others) < len(self._told)
             by_itself = quantity_of(column.heading) is not None or not was_told
-            return self._tell([*others, *([f"{UNUSED}={column.name}"] if by_itself else [])])
-        # a unit is not guessed: the reader asks for one
-        inside = f" ({unit})" if unit else ""
-        return self._tell([*others, f"{symbol}{inside}={column.name}"])
+            own = [f"{UNUSED}={name}"] if by_itself else []
+        # at once: the next may be picked before the file is read with this
+        self._told = [*others, *own]
+        return self._tell(self._told)
+
+    def _pick_unit(self, name: str, unit: str | None) -> Any:
+        column = self._columns[name]
+        is_new = unit is not None and unit != self._unit_of(column, [])
+        return self._pick(name, column.symbol, unit) if is_new else None
 
     @staticmethod
     def _is_of(text: str, name: str, symbol: str) -> bool:
