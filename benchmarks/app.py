@@ -83,7 +83,7 @@ def sliders(page, app, count):
     page.wait_for_timeout(1000)
     page.evaluate(_COUNT)
     before = _spent(app)
-    bias = moves(page, "Bias", count)
+    bias = moves(page, "Bias V_b", count)
     by_bias = 1000 * (_spent(app) - before) / count
     # the reduced lever is made in the background
     deadline, model = time.monotonic() + 240, ""

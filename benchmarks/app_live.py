@@ -17,6 +17,7 @@ from hotlever import Lever, Probe
 from hotlever.app import approaching, touching
 from hotlever.app.jobs import Task
 from hotlever.lever.reader import over_surface
+from hotlever.tasks.approaching import jumping_at_tip
 from problems import table
 
 
@@ -72,13 +73,14 @@ def contact() -> None:
 def reader() -> None:
     """Print what is read off between distances beside the full lever there."""
     surface = {"medium": "air", "accommodation": 1.0}
-    task = Task("reader", (), {"distance": "0.2um:5um:10", "medium": "air"})
-    full = Lever(Probe.reference().with_(**surface, surface_gap_um=0.5))
+    full = Lever(Probe.reference().with_(**surface, surface_gap_um=0.2))
     rows = []
     for bias, z in ((9.0, 0.5), (9.0, 0.9), (10.0, 0.5), (11.0, 2.0), (6.0, 0.25), (4.0, 3.3)):
-        ask = (REPORT, task, bias, z)
+        options = {"distance": "0.2um:5um:10", "medium": "air", "bias": f"{bias}V"}
+        ask = (REPORT, Task("reader", (), options), z, False)
+        approaching.answer(*ask)
         seconds, now = timed(lambda ask=ask: approaching.answer(*ask))
-        data = over_surface(full, [z], [bias])
+        data = over_surface(jumping_at_tip(REPORT, full, bias), [z], [bias])
         off = [
             f"{100 * (now[key] / data[key].item() - 1):+.3f}"
             for key in ("reader_V", "reader_ohm", "dlnR_dz_per_um", "resolution_nm_per_rtHz")

@@ -32,6 +32,8 @@ from hotlever.probe import Probe
 Run = Callable[..., tuple[int, str, str]]
 #: The field of a dimension.
 LENGTH = "length (µm)"
+#: A sweep of the reference probe.
+REFERENCE = Task("sweep")
 
 
 class Here(Report):
@@ -142,9 +144,8 @@ def test_simulate_shows_the_numbers_of_the_sweep(tmp_path: Path, run: Run) -> No
         answer = await session.ask(
             "full",
             "live:answer",
-            None,
-            {"n_d": 5e17},
-            {"bias": 8.0, "most": 12.0, "quick": False},
+            Task("sweep", (), {"set": ["n_d=5e17"]}),
+            *(8.0, 12.0, False),
         )
         for key in ("tip_K", "current_mA", "lever_V", "reader_V", "power_mW"):
             assert f"{answer['now'][key]:.10g}" == row[key]
@@ -162,13 +163,14 @@ def test_simulate_shows_the_numbers_of_the_sweep(tmp_path: Path, run: Run) -> No
 
 def test_simulate_goes_as_far_as_the_lever(tmp_path: Path) -> None:
     """Beyond the slider's end too, where only the curves shown at first ended."""
-    changes, ask = {"series_resistance_ohm": 8000.0}, {"most": 12.0, "quick": False}
-    here: Any = Here()
-    found = live.answer(here, None, changes, {**ask, "bias": 14.0})
-    tip_K = Lever(Probe.reference().with_(**changes)).sweep([14.0]).tip_K.item()
+    resistance, here = 8000.0, Here()
+    task = Task("sweep", (), {"set": [f"series_resistance_ohm={resistance}"]})
+    found = live.answer(here, task, 14.0, 12.0, quick=False)
+    probe = Probe.reference().with_(series_resistance_ohm=resistance)
+    tip_K = Lever(probe).sweep([14.0]).tip_K.item()
     assert found["now"]["tip_K"] == pytest.approx(tip_K, abs=1e-6)
     with pytest.raises(BranchEndError, match=r"^silicon melts at a bias of 13\.2"):
-        live.answer(here, None, {}, {**ask, "bias": 14.0})
+        live.answer(here, REFERENCE, 14.0, 12.0, quick=False)
 
 
 def test_where_the_reduced_lever_ends_another_answers(
@@ -176,10 +178,8 @@ def test_where_the_reduced_lever_ends_another_answers(
 ) -> None:
     monkeypatch.setattr(live, "_reduced", lambda probe: (coarse, reduced))
     live._quick.cache_clear()
-    here: Any = Here()
-    ask = {"most": 12.0, "quick": True, "reduced": True}
     for bias, model in ((8.0, "reduced lever"), (13.0, "coarse lever")):
-        found = live.answer(here, None, {}, {**ask, "bias": bias})
+        found = live.answer(Here(), REFERENCE, bias, 12.0, quick=True, reduced=True)
         assert found["model"] == model
         assert found["now"]["tip_K"] == pytest.approx(coarse.sweep([bias]).tip_K.item(), abs=0.2)
     live._quick.cache_clear()
@@ -195,7 +195,7 @@ def test_numbers_of_another_bias_are_not_shown(tmp_path: Path) -> None:
         (number,) = (
             one
             for one in user.client.elements.values()
-            if one.props.get("aria-label") == "Bias in volts"
+            if isinstance(one, ui.number) and one.props.get("aria-label") == "Bias V_b"
         )
         number.set_value(14.0)
         await until(lambda: "silicon melts" in shown(user, "role=alert"))
@@ -210,10 +210,8 @@ def test_numbers_of_another_bias_are_not_shown(tmp_path: Path) -> None:
 
 
 def test_a_lever_that_moves_shows_nearly_what_it_shows_at_rest(tmp_path: Path) -> None:
-    ask = {"bias": 8.0, "most": 12.0, "quick": True, "reduced": False}
-    here: Any = Here()
-    coarse = live.answer(here, None, {"n_d": 5e17}, ask)
-    full = live.answer(here, None, {"n_d": 5e17}, {**ask, "quick": False})
+    task = Task("sweep", (), {"set": ["n_d=5e17"]})
+    coarse, full = (live.answer(Here(), task, 8.0, 12.0, quick) for quick in (True, False))
     assert coarse["model"] == "coarse lever"
     assert abs(coarse["now"]["tip_K"] - full["now"]["tip_K"]) < 2.0
     assert np.abs(coarse["now"]["line"] - full["now"]["line"]).max() < 5.0

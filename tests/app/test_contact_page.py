@@ -54,8 +54,8 @@ def test_contact_shows_the_numbers_of_the_command(
         assert float(moving.split()[0]) == pytest.approx(float(row["apex_K"]), abs=2.0)
         await user.should_see("interface 1e+07 K/W")
         await user.should_see(
-            "hotlever contact --sample 'SiO2, 100nm, silicon' --radius 10nm --interface 1e+07K/W "
-            "--bias 0.36:9:25 -o reference.contact.csv"
+            "hotlever contact --bias 0.36:9:25 --sample 'SiO2, 100nm, silicon' --radius 10nm "
+            "--interface 10000000K/W -o reference.contact.csv"
         )
         layer.set_value("SiO3")
         await until(lambda: "did you mean 'SiO2'" in shown(user, "role=alert"))

@@ -16,11 +16,10 @@ from nicegui import ui
 from nicegui.testing import User
 from nicegui.testing.user_interaction import UserInteraction
 from test_app_pages import LENGTH, drop, shown, until, visit
-from test_pages_at_work import done
+from test_pages_at_work import at_once
 
 from hotlever.app import live, showing
 from hotlever.app.history import CHOICES, SCHEMA
-from hotlever.app.jobs import Task
 from hotlever.app.pages.page import MEDIA
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.session import Session
@@ -28,16 +27,6 @@ from hotlever.probe import Probe
 
 DROPPED = "dropped own.gds"
 OWN = (EXAMPLES / "reference-probe.gds").read_bytes()
-
-
-def at_once(session: Session) -> None:
-    """Have commands run in this process, before they are said to have been started."""
-
-    def start(page: str, task: Task) -> Any:
-        job = session.jobs.by_page[page] = done(task, session.project.folder)[0]
-        return job
-
-    session.jobs.start = start  # type: ignore[method-assign]
 
 
 def all_of(user: User, kind: Any, label: str = "") -> list[Any]:
@@ -55,7 +44,7 @@ async def tell_columns(user: User) -> None:
     """Pick what the columns a and b of the file are that Fit shows: bias in V, current in mA."""
     for column, symbol, unit in (("a", "V_b", "V"), ("b", "I_h", "mA")):
         named(user, f"Column {column} is").set_value(symbol)
-        await until(lambda c=column: named(user, f"Unit of column {c}") is not None)  # type: ignore
+        await until(lambda c=column: named(user, f"Unit of column {c}").visible)  # type: ignore
         named(user, f"Unit of column {column}").set_value(unit)
         await until(lambda c=column: named(user, f"Column {c} is").value)  # type: ignore
         await asyncio.sleep(0.3)

@@ -46,7 +46,7 @@ def test_a_project_is_what_it_was(tmp_path: Path) -> None:
         expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
         n_d = page.get_by_label("doping concentration of the heater, n_d").first
         n_d.fill("5e17")
-        bias = page.get_by_label("Bias in volts")
+        bias = page.get_by_role("spinbutton", name="Bias V_b")
         bias.fill("6.5")
         words = "hotlever sweep own.toml --bias 0:12:49 --set n_d=5e+17"
         expect(page.get_by_text(words)).to_be_visible(timeout=_WORK)
@@ -55,7 +55,7 @@ def test_a_project_is_what_it_was(tmp_path: Path) -> None:
     with running(folder) as app, browsing(app) as (page, seen):
         go(page, app, "simulate")
         expect(page.get_by_text(words)).to_be_visible(timeout=_WORK)
-        expect(page.get_by_label("Bias in volts")).to_have_value("6.500")
+        expect(page.get_by_role("spinbutton", name="Bias V_b")).to_have_value("6.5")
         expect(page.get_by_text("full lever:")).to_be_visible(timeout=_WORK)
         picture(page, "after-a-restart")
         go(page, app, "fit")

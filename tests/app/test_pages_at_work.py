@@ -57,6 +57,16 @@ def done(task: Task, folder: Path) -> tuple[Job, list[Any]]:
     return job, [content for kind, content in here.sent if kind == "curve"]
 
 
+def at_once(session: Session) -> None:
+    """Have tasks of pages done in this process, before the page goes on."""
+
+    def start(page: str, task: Task) -> Job:
+        session.jobs.by_page[page], _ = done(task, session.project.folder)
+        return session.jobs.by_page[page]
+
+    session.jobs.start = start  # type: ignore[method-assign]
+
+
 def understood(folder: Path) -> dict[str, Any]:
     """Return what a measurement is understood as, in this process."""
     here: Any = Here()
@@ -180,7 +190,8 @@ def test_a_refused_calibration_says_nothing_of_what_to_set(tmp_path: Path) -> No
     for reason in ("", "current differs by 7%"):
         replace(calibrated, reason=reason).write(tmp_path / f"mine{CALIBRATION}")
 
-        async def story(user: User, _: Session, reason: str = reason) -> None:
+        async def story(user: User, session: Session, reason: str = reason) -> None:
+            at_once(session)
             await user.open("/calibrate")
             mark = "data-answer=none" if reason else "data-answer=tip_K"
             await until(lambda: len(shown(user, mark)) > 10)
@@ -189,7 +200,7 @@ def test_a_refused_calibration_says_nothing_of_what_to_set(tmp_path: Path) -> No
                 for along in ("none", "tip_K", "bias_V", "power_mW")
             )
             if not reason:
-                user.find("What to measure next").click()
+                user.find("Propose").click()
                 # by the paper's rule there is no posterior to ask
                 await user.should_see("expected one of a probe with priors", retries=50)
 

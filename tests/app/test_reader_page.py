@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
+from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import shown, until, visit
 
@@ -27,12 +29,20 @@ def test_reader_shows_what_the_lever_reads_between_the_distances_that_are_solved
         monkeypatch.setattr(approaching, name, value)
     over = {"medium": "air", "accommodation": 1.0, "surface_gap_um": 0.5}
     lever = Lever(Probe.reference().with_(**over), CHEAP)
-    data = over_surface(lever, [0.5], [9.0]).squeeze()
+
+    def read_at(bias: float) -> xr.Dataset:
+        """Return what is read where the air jumps as the command has it: as at the tip, nearest."""
+        near = Lever(lever.probe.with_(surface_gap_um=0.4), CHEAP)
+        jump_K = round(near.solve([bias])[0].tip_K)
+        jumping = lever.with_probe(lever.probe.with_(jump_temperature_K=jump_K))
+        return over_surface(jumping, [0.5], [bias]).squeeze()
+
+    data = read_at(9.0)
 
     async def story(user: User, session: Session) -> None:
         session.chosen["reader"] = {"probe": None, "distance_um": 0.5, "bias": 9.0}
         await user.open("/reader")
-        await until(lambda: "coarse lever" in shown(user, "aria-live=polite"))
+        await until(lambda: "coarse lever: voltage" in shown(user, "aria-live=polite"))
 
         def number(key: str) -> float:
             return float(shown(user, f"data-number={key}").split()[0].partition("·")[0])
@@ -46,9 +56,19 @@ def test_reader_shows_what_the_lever_reads_between_the_distances_that_are_solved
         assert number("resolution_nm_per_rtHz") == pytest.approx(resolution, rel=2e-2)
         await user.should_see("it is taken as 1")
         await user.should_see(
-            "hotlever reader --distance 0.4um:1.6um:10 --medium air --amplifier 5nV --bias 9:9:1 "
+            "hotlever reader --distance 0.4um:1.6um:10 --medium air --amplifier 5nV --bias 9V "
             "-o reference.reader.csv"
         )
+        # another tip temperature, at which the air jumps by less
+        (bias,) = (
+            one
+            for one in user.client.elements.values()
+            if isinstance(one, ui.number) and one.props.get("aria-label") == "Bias V_b"
+        )
+        bias.set_value(5.0)
+        await until(lambda: "moving" in shown(user, "aria-live=polite"))
+        await until(lambda: "coarse lever: voltage" in shown(user, "aria-live=polite"))
+        assert number("reader_V") == pytest.approx(read_at(5.0).reader_V.item(), rel=2e-4)
 
     visit(tmp_path, story)
 

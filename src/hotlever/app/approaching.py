@@ -26,8 +26,8 @@ from hotlever.lever.reader import Reader, Signal, at_distance
 from hotlever.probe import Layout, Probe
 from hotlever.probe.shapes import Shape
 from hotlever.steps import each
-from hotlever.tasks.approaching import noise_of, probe_over_surface
-from hotlever.tasks.ranges import parse_distances
+from hotlever.tasks.approaching import jumping_at_tip, needs_jump, noise_of, probe_over_surface
+from hotlever.tasks.ranges import parse_bias, parse_distances
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
@@ -35,6 +35,8 @@ from hotlever.types import Array, Index
 _DISTANCES, _KEPT, _PIECES = 9, 3, 80
 #: The nearest and the farthest distance (µm), and the least below any part of the lever.
 _NEAREST_UM, _FARTHEST_UM, _CLEAR_UM = 0.2, 5.0, 0.1
+#: Temperatures (K) as at which the air jumps alike: the voltage is the same within 0.1 %.
+_SAME_JUMP_K = 5.0
 #: What is read off by the distance.
 _READ = tuple(name for name in Signal._fields if not name.startswith(("source", "crosstalk")))
 #: What is drawn by the distance.
@@ -60,15 +62,17 @@ def described(report: Report, name: str | None, tilt_deg: float | None) -> dict[
 
 
 @one_blas_thread
-def answer(report: Report, task: Task, bias: float, distance: float) -> dict[str, Any]:
-    """Return what a reader shows at a bias (V) and a distance (µm), and by the distance.
+def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str, Any]:
+    """Return what a reader shows at a distance (µm), and by the distance.
 
     Parameters
     ----------
     report : Report
     task : Task
-        That of ``hotlever reader``, over the distances of the curves.
-    bias, distance : float
+        That of ``hotlever reader``, at a bias, over the distances of the curves.
+    distance : float
+    quick : bool
+        By levers that are solved already, with the air's temperature jump of another bias.
 
     Raises
     ------
@@ -79,6 +83,8 @@ def answer(report: Report, task: Task, bias: float, distance: float) -> dict[str
     ends = parse_distances(request.distance)
     distances = np.geomspace(ends[0], ends[-1], _DISTANCES)
     probe = probe_over_surface(report, request, distances)
+    bias = float(parse_bias(request.bias, probe.lowest_bias_V).item())
+    probe = _jumping(report, probe, bias, quick)
     reader = Reader(probe, noise_of(request))
     levers = _levers(report, probe, tuple(distances.tolist()))
     signals: dict[float, Signal] = {}
@@ -111,6 +117,33 @@ def answer(report: Report, task: Task, bias: float, distance: float) -> dict[str
         "slope": math.tan(math.radians(around.surface_tilt_deg)),
         "read_at": reader.terminal,
     }
+
+
+def _jumping(report: Report, probe: Probe, bias: float, quick: bool) -> Probe:
+    """Return a probe with the jump of the air as the command has it, or quickly as it was last."""
+    if not needs_jump(probe):
+        return probe
+    last = _jumps.get(probe)
+    if last is None or not quick:
+        jumping = jumping_at_tip(report, _nearest(probe), bias).probe
+        if last is None or not math.isclose(
+            last.surroundings.jump_temperature_K,
+            jumping.surroundings.jump_temperature_K,
+            abs_tol=_SAME_JUMP_K,
+        ):
+            _jumps.clear()
+            last = _jumps[probe] = jumping
+    return last
+
+
+#: The last probe with the jump of the air at its tip, by what it is without.
+_jumps: dict[Probe, Probe] = {}
+
+
+@lru_cache(maxsize=_KEPT)
+def _nearest(probe: Probe) -> Lever:
+    """Return a coarse lever at the nearest distance."""
+    return Lever(probe, COARSE)
 
 
 @lru_cache(maxsize=_KEPT)

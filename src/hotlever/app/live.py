@@ -12,7 +12,6 @@ import os
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,8 @@ from matplotlib import colormaps
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from hotlever.app.project import file_stamp
+from hotlever.app.jobs import Task
+from hotlever.app.work import probe_of, request_of
 from hotlever.app.workers import Report
 from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError
@@ -147,8 +147,8 @@ class LiveLever:
         """Whether its branch has a state at a bias (V)."""
         return bool(np.isfinite(self.branch.read(self.circuit, np.array([bias])).u).all())
 
-    def at(self, bias: float) -> dict[str, Any]:
-        """Return what the lever shows at a bias (V): numbers, map and profile.
+    def at(self, report: Report, bias: float) -> dict[str, Any]:
+        """Return what the lever shows at a bias (V): numbers, map and profile; tell its notes.
 
         Raises
         ------
@@ -158,6 +158,7 @@ class LiveLever:
         reading = self.branch.read(self.circuit, np.array([bias]))
         if not np.isfinite(reading.u).all():
             raise self.branch.ended(reading)
+        report.note(*reading.notes(np.array([bias])))
         shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
         x = self.branch.equations.space.expanded(self.branch.states(reading.u))
         low, knee = self.branch.base_temperature_K, self.branch.knee
@@ -175,7 +176,6 @@ class LiveLever:
             "scale_K": (low, high),
             "picture": drawn.picture(T, low, high),
             "line": drawn.line(T),
-            "notes": reading.notes(np.array([bias])),
         }
 
 
@@ -184,20 +184,20 @@ class LiveLever:
 
 @one_blas_thread
 def answer(
-    report: Report, name: str | None, changes: dict[str, Any], ask: dict[str, Any]
+    report: Report, task: Task, bias: float, most: float, quick: bool, reduced: bool = False
 ) -> dict[str, Any]:
-    """Return what a probe of the project shows with some values changed.
+    """Return what a lever shows at a bias (V), and its curves.
 
     Parameters
     ----------
     report : Report
-    name : str or None
-        A probe file; None is the reference probe.
-    changes : dict
-        Values by the names of a probe file.
-    ask : dict
-        ``bias`` and ``most`` (V), how far the curves go at least; whether it must be ``quick``, and
-        whether the ``reduced`` lever of the geometry has been made.
+    task : Task
+        That of ``hotlever sweep``.
+    bias, most : float
+        V; how far the curves go at least.
+    quick : bool
+    reduced : bool
+        Whether the reduced lever of the geometry has been made.
 
     Raises
     ------
@@ -205,16 +205,15 @@ def answer(
         If the lever has no state at this bias; a reduced lever that ends below leaves the answer to
         a coarse one.
     """
-    probe = _probe(name, changes)
-    most = max(ask["most"], ask["bias"])
-    live = _quick(probe, most, ask["reduced"]) if ask["quick"] else _full(report, probe, most)
-    if live.model == REDUCED and not live.reaches(ask["bias"]):
+    probe, most = request_of(task).read_probe(report), max(most, bias)
+    live = _quick(probe, most, reduced) if quick else _full(report, probe, most)
+    if live.model == REDUCED and not live.reaches(bias):
         live = _quick(probe, most, False)
     drawn = live.map
     return {
         "model": live.model,
         "curves": live.curves,
-        "now": live.at(ask["bias"]),
+        "now": live.at(report, bias),
         "box": drawn.box,
         "outline": drawn.outline,
         "along": drawn.along,
@@ -222,11 +221,11 @@ def answer(
     }
 
 
-def prepare(report: Report, name: str | None, changes: dict[str, Any]) -> bool:
-    """Make the reduced lever of a probe, if it can have one; return whether it has."""
+def prepare(report: Report, task: Task) -> bool:
+    """Make the reduced lever of a task's probe, if it can have one; return whether it has."""
     with suppress(OSError, AttributeError):
         os.nice(_NICE)  # sliders come first
-    probe = _probe(name, changes)
+    probe = request_of(task).read_probe(report)
     if not _can_be_reduced(probe):
         return False
     with report.progress_bars("air", "live sliders") as (meshing, training):
@@ -236,7 +235,7 @@ def prepare(report: Report, name: str | None, changes: dict[str, Any]) -> bool:
 
 def described(report: Report, name: str | None) -> dict[str, Any]:
     """Return what sliders need of a probe: by group names, values, bounds and units."""
-    probe = _probe(name, {})
+    probe = probe_of(name)
     sliders: dict[str, list[Any]] = {"material": [], "dimensions": [], "circuit": []}
     parameters = of_materials(probe)
     values = probe.values(list(parameters)).tolist()
@@ -268,18 +267,6 @@ def described(report: Report, name: str | None) -> dict[str, Any]:
         },
         "reduced": _can_be_reduced(probe),
     }
-
-
-def _probe(name: str | None, changes: dict[str, Any]) -> Probe:
-    path = None if name is None else Path(name)
-    stamp = 0.0 if path is None else file_stamp(path)
-    return _read_probe(path, stamp, tuple(sorted(changes.items())))
-
-
-@lru_cache(maxsize=64)
-def _read_probe(path: Path | None, stamp: float, changes: tuple[tuple[str, Any], ...]) -> Probe:
-    probe = Probe.reference() if path is None else Probe.from_file(path)
-    return probe.with_(**dict(changes)) if changes else probe
 
 
 @lru_cache(maxsize=_KEPT)

@@ -31,7 +31,7 @@ FITS, CALIBRATIONS = "fits", "calibrations"
 _WRITTEN = (
     *(TABLE, ".raman.csv", ".corrections.csv"),
     *(".sweep.csv", ".pulse.csv", ".spectrum.csv", ".design.csv"),
-    *(".contact.csv", ".reader.csv"),
+    *(".contact.csv", ".reader.csv", ".next.csv"),
 )
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

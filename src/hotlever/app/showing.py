@@ -22,7 +22,7 @@ from hotlever import figures
 from hotlever.app.project import CALIBRATIONS, file_stamp
 from hotlever.app.work import probe_of
 from hotlever.app.workers import Report
-from hotlever.calibration import Calibration, plan_next, read_calibration
+from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.levers import calibration_rows, compare_calibrations
 from hotlever.errors import InputError
 from hotlever.estimation import Fit, read_fit
@@ -174,23 +174,6 @@ def settings(report: Report, name: str, along: str, value: float) -> dict[str, f
         for column in calibration.columns
     }
     return {**row, "bias_V": bias, **({along: value} if along != "bias_V" else {})}
-
-
-def proposed(
-    report: Report, name: str, at_K: float | None, stay_below_K: float | None
-) -> dict[str, Any]:
-    """Return what to measure next after a calibration, as a table, words and a figure.
-
-    Raises
-    ------
-    InputError
-        If nothing can be proposed.
-    """
-    calibration = _calibration(Path(name), file_stamp(Path(name)))
-    plan = plan_next(calibration, at_K=at_K, stay_below_K=stay_below_K)
-    figure = _svg(figures.planned_measurements(plan))
-    remarks = [plan.safety, *plan.notes]
-    return {"now": plan.now, "rows": plan.rows, "remarks": remarks, "figure": figure}
 
 
 def probe_of_text(report: Report, text: str, title: str, mesh: bool = False) -> dict[str, Any]:

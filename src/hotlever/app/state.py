@@ -181,6 +181,13 @@ class Calibrate(BaseModel):
     pulse: str = ""
 
 
+class Next(BaseModel):
+    """What to measure next: where the error counts (K), and what the tip is to stay below."""
+
+    at: float | None = None
+    stay_below: float | None = None
+
+
 class Levers(BaseModel):
     """The page Levers."""
 
@@ -210,13 +217,14 @@ class Choices(BaseModel):
     raman: Raman = Raman()
     fit: Fit = Fit()
     calibrate: Calibrate = Calibrate()
+    next: Next = Next()
     levers: Levers = Levers()
     files: dict[str, Told] = {}
     asked: dict[str, float] = {"tip_K": 600.0, "bias_V": 8.0, "power_mW": 2.0}
 
 
 class Result(BaseModel):
-    """What a task drew last for a page: the task, the numbers of it, and when its figure was drawn.
+    """What a task drew last for a page: the task, what it told, and when its figure was drawn.
 
     A result is of its files, which are not undone with what is chosen.
     """
@@ -225,4 +233,5 @@ class Result(BaseModel):
     files: list[str]
     options: dict[str, Any]
     numbers: list[tuple[str, str]]
+    text: str = ""
     stamp: float

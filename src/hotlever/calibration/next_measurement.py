@@ -23,6 +23,7 @@ from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.optimal_design import Candidate, Information, best_first
+from hotlever.materials.parameters import sentence
 from hotlever.measurands import FITTED
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
@@ -102,17 +103,18 @@ class Plan:
         return [head, *map(list, cells)]
 
     @property
-    def now(self) -> str:
+    def _now(self) -> str:
         """How sure the tip temperature is now, in words."""
         stderr = self.proposals.stderr_now_K.values[0]
         return f"the tip at {self.at_K:.0f} K is known to ± {stderr:.1f} K now (standard error)"
 
     def text(self) -> str:
         """Return what is proposed as lines of text."""
-        return "\n".join([self.now, "", *aligned(self.rows, right=True), "", self.safety])
+        table = aligned(self.rows, right=True)
+        return "\n".join([sentence(self._now), "", *table, "", sentence(self._safety)])
 
     @property
-    def safety(self) -> str:
+    def _safety(self) -> str:
         """How far the bias may go now, and will be allowed to go then, in words."""
         limit = (
             "leaves all below melting"
@@ -120,10 +122,11 @@ class Plan:
             else f"keeps the tip below {self.stay_below_K:.0f} K"
         )
         text = f"a bias of up to {self.safe_V:.3g} V {limit} with a certainty of {SURE:.0%}"
-        if self.safe_then_V == self.safe_V:
+        then = f"{self.safe_then_V:.3g} V"
+        if then == f"{self.safe_V:.3g} V":
             return text
         return (
-            f"{text}; after these measurements probably one of up to {self.safe_then_V:.3g} V: "
+            f"{text}; after these measurements probably one of up to {then}: "
             "calibrate and ask again before going there"
         )
 

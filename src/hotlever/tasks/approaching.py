@@ -50,7 +50,7 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
                 f"of all biases up to {_HIGHEST_V:g} V {biases.item():.4g} V resolves these "
                 "distances best (--bias chooses others)"
             )
-        if probe.surroundings.jump_temperature_K == _USUAL_K:
+        if needs_jump(probe):
             lever = jumping_at_tip(reporter, lever, float(biases[biases.size // 2]))
         data = over_surface(lever, distances, biases, noise, pressures, progress=update)
     if not reader.is_held and probe.circuit.swept != "reader":
@@ -89,6 +89,11 @@ def probe_over_surface(reporter: Reporter, request: ReaderRequest, distances: Ar
             "no accommodation is stated: it is taken as 1 (--set accommodation=0.9 states one)"
         )
     return probe.with_(**changes)
+
+
+def needs_jump(probe: Probe) -> bool:
+    """Return whether a probe leaves it open of which temperature the air is that jumps."""
+    return probe.surroundings.jump_temperature_K == _USUAL_K
 
 
 def jumping_at_tip(reporter: Reporter, lever: Lever, bias_V: float) -> Lever:

@@ -8,6 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
+from hotlever.app.pages.drawn import sweep_of
 from hotlever.app.pages.live_page import texts_of
 from hotlever.app.pages.page import Page
 from hotlever.app.pages.plots import LivePlots
@@ -87,13 +88,13 @@ class PlotsWithBeside(LivePlots):
         self._text = ui.label().classes("text-sm remark").props("data-number=beside")
         super().__init__()
 
-    async def show_beside(self, ask: dict[str, Any]) -> None:
-        """Show the lever beside as `hotlever.app.live.answer` is asked; none of a quick answer."""
+    async def show_beside(self, at: list[float], quick: bool) -> None:
+        """Show the lever beside in a state; none beside a quick answer."""
         lever, answer, text = lever_beside(self._chosen), None, ""
-        if lever is not None and not ask["quick"]:
+        if lever is not None and not quick:
             text = f"Dashed: {beside_in_words(self._chosen)}"
-            asked = lever["probe"], lever["changes"], {**ask, "reduced": False}
             try:
+                asked = sweep_of(lever), *at, False
                 answer = await self._session.ask("beside", "live:answer", *asked)
                 texts = texts_of(answer["now"], NUMBERS)
                 text += ": " + ", ".join(f"{NUMBERS[key][0]} {texts[key]}" for key in texts)

@@ -91,7 +91,7 @@ class CalibratePage(MeasuredPage):
                 ui.label(refusal).classes("remark").props("data-answer=none")
                 return
             questions = [_Question(self.session, name, along) for along in _ASKED]
-        Proposals(self.session, self.banner, name)
+        Proposals(self.session, self.banner, name, self.stem)
         for question in questions:
             await question.answer()
 

@@ -11,11 +11,10 @@ from hotlever.app.jobs import Task
 from hotlever.app.pages.contact_plots import ContactPlots
 from hotlever.app.pages.drawn import probe_files
 from hotlever.app.pages.frame import ErrorBanner, flat_button
-from hotlever.app.pages.live_page import LiveTaskPage
+from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage
 from hotlever.app.pages.page import MEDIA
 from hotlever.app.pages.sample import SampleLayers
 from hotlever.app.session import Session
-from hotlever.app.workers import Heard
 
 #: Biases of a table that is written.
 _BIASES = 25
@@ -42,10 +41,10 @@ _MOVING = (
 _AT_REST = "full lever: the numbers of hotlever contact"
 
 
-class ContactPage(LiveTaskPage):
+class ContactPage(LivePage):
     """One tab of the page."""
 
-    name = "contact"
+    name, live = "contact", "touching"
     numbers: ClassVar = {
         "tip_K": ("tip at the lever", "{:.1f} K", 1.0),
         "apex_K": ("apex", "{:.1f} K", 1.0),
@@ -71,7 +70,7 @@ class ContactPage(LiveTaskPage):
 
     def show_sliders(self) -> None:
         """Show bias, radius, interface, and the layers of the sample."""
-        self.slider_of_bias()
+        self.slider_of_bias(LEAST_BIAS_V)
         for key, words, ends, unit, hint in _OF_THE_CONTACT:
             zero = key == "interface"
             self.slider(key, words, *ends, unit, hint, by_decades=True, from_zero=zero)
@@ -88,22 +87,16 @@ class ContactPage(LiveTaskPage):
         radius, interface = self.chosen["radius_nm"], self.chosen["interface"]
         options = {
             "sample": self.value("sample"),
-            "radius": "" if radius is None else f"{radius:g}nm",
-            "interface": "" if interface is None else f"{interface:g}K/W",
+            "radius": "" if radius is None else f"{radius:.12g}nm",
+            "interface": "" if interface is None else f"{interface:.12g}K/W",
             "medium": self.chosen["medium"],
         }
         return Task("contact", probe_files(self.chosen), options)
 
-    def of_table(self, task: Task) -> dict[str, Any]:
+    def of_table(self, kind: str) -> dict[str, Any]:
         """Return the biases of a table."""
         most = self.chosen["most"]
-        return {"bias": f"{most / _BIASES:g}:{most:g}:{_BIASES}"}
-
-    async def ask(self, lever: Task, at: list[float], quick: bool, heard: Heard) -> dict[str, Any]:
-        """Return what the tip in contact shows."""
-        asked = "quick" if quick else "full", "touching:answer"
-        answer: dict[str, Any] = await self.session.ask(*asked, lever, *at, quick, heard=heard)
-        return answer
+        return {"bias": f"{most / _BIASES:.12g}:{most:.12g}:{_BIASES}"}
 
     def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return whose numbers these are, and the resistances."""

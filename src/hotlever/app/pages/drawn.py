@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
-from hotlever.app.pages.frame import caption, figure, number_shown
+from hotlever.app.pages.frame import caption, figure, number_shown, text_shown
 from hotlever.app.pages.page import KINDS, Page, Work, outputs
 from hotlever.app.state import Result
 
@@ -36,6 +36,11 @@ def settings(lever: Mapping[str, Any]) -> dict[str, Any]:
     return {"medium": medium, "set": [f"{name}={changes[name]}" for name in sorted(changes)]}
 
 
+def sweep_of(lever: Mapping[str, Any]) -> Task:
+    """Return the task of a sweep of the lever that is chosen, whatever the biases."""
+    return Task("sweep", probe_files(lever), settings(lever))
+
+
 def in_python(lever: Mapping[str, Any]) -> str:
     """Return what makes the probe that is chosen in Python."""
     name, changes = lever["probe"], dict(sorted(lever["changes"].items()))
@@ -47,13 +52,14 @@ def in_python(lever: Mapping[str, Any]) -> str:
     return f"{made}.with_(**{changes!r})"
 
 
-def result_of(task: Task, numbers: list[Any], stamp: float) -> Result:
+def result_of(task: Task, numbers: list[Any], stamp: float, text: str = "") -> Result:
     """Return a task as what is kept of its result."""
     return Result(
         command=task.command,
         files=list(task.files),
         options=dict(task.options),
         numbers=numbers,
+        text=text,
         stamp=stamp,
     )
 
@@ -87,8 +93,8 @@ class DrawnPage(Page):
             return False
         if self.written(job):
             stamp = self.session.project.stamp(job.task.written)
-            numbers = job.shown.get("table", [])
-            self.session.results[self.name] = result_of(job.task, numbers, stamp)
+            told = job.shown.get("table", []), stamp, job.shown.get("result", "")
+            self.session.results[self.name] = result_of(job.task, *told)
         return True
 
     def _show(self) -> None:
@@ -98,13 +104,16 @@ class DrawnPage(Page):
         if result is None:
             return
         task = Task(result.command, tuple(result.files), result.options)
-        path = self.session.project.path(task.written)
-        if self.session.project.stamp(task.written) != result.stamp:
-            return  # it is gone, or another one by now, of which these are not the numbers
+        path, stamp = self.session.project.path(task.written), self.session.project.stamp
+        latest = max(map(stamp, task.files), default=0.0)
+        if stamp(task.written) != result.stamp or latest > result.stamp:
+            return  # it is gone, or another one by now, or of files that have changed since
         with self._result:
-            with ui.row().classes("w-full items-end gap-6"):
-                for title, value in result.numbers:
-                    number_shown(title, title, value)
+            if result.numbers:
+                with ui.row().classes("w-full items-end gap-6"):
+                    for title, value in result.numbers:
+                        number_shown(title, title, value)
+            text_shown(result.text)
             self.show_figure(path)
             with ui.row().classes("w-full items-center"):
                 caption(task.writing({}).line).classes("remark col min-w-60")

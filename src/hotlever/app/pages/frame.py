@@ -33,7 +33,11 @@ PAGES = {
     "levers": ("Levers", "table_rows"),
 }
 #: What else of the state of a project pages show, beside what has their name.
-_ALSO = {"simulate": {"pulse", "signals"}, "fit": {"files"}, "calibrate": {"files", "asked"}}
+_ALSO = {
+    "simulate": {"pulse", "signals"},
+    "fit": {"files"},
+    "calibrate": {"files", "asked", "next"},
+}
 #: Types of files that figures leave as.
 FIGURE_FILES = (".svg", ".png", ".pdf")
 #: Changes that are listed, and files of each that are named; refused files that are named.
@@ -242,10 +246,10 @@ def lines_shown(lines: str, kind: str, what: str) -> None:
 
 def text_shown(text: str) -> None:
     """Show a text as one would on a terminal: its tables scroll, other lines are broken."""
-    lines = text.split("\n")
-    for is_table, part in groupby(lines, lambda line: "   " in line):
-        style = "remark" if len(lines) == 1 else "lines tabular" if is_table else "lines"
-        ui.label("\n".join(part)).classes(f"w-full {style}")
+    lines = filter(str.strip, text.split("\n"))
+    for is_table, part in groupby(lines, lambda line: "  " in line.strip()):
+        for shown in ["\n".join(part)] if is_table else part:
+            ui.label(shown).classes(f"w-full {'lines tabular' if is_table else 'remark'}")
 
 
 def number_shown(key: str, title: str, value: str = "…") -> ui.label:

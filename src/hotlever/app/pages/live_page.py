@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from nicegui import ui
 
@@ -18,62 +18,164 @@ from hotlever.app.session import Session
 from hotlever.app.workers import Heard
 from hotlever.errors import HotleverError
 
-_LEAST_BIAS_V = 0.1
-
-
-class Plots(Protocol):
-    """What is drawn of an answer."""
-
-    def show(self, answer: dict[str, Any]) -> None:
-        """Draw it."""
-
-
+#: The least bias (V) of pages that show what is of a current.
+LEAST_BIAS_V = 0.1
 # Title of a number, its form, and a factor; a form may name others of the same answer.
 Numbers = Mapping[str, tuple[str, str, float]]
 
 
 class LivePage(Page):
-    """A page that shows the state of a lever, which sliders move, in numbers and plots."""
+    """A page whose task is shown at once, at a state that sliders move, and gives its table.
 
-    #: What is shown of ``now`` in an answer, by its name there.
+    Attributes
+    ----------
+    of_file : dict
+        What the probe's file says, or what is usual, of what can be chosen.
+    """
+
+    #: The module that answers, and what is shown of ``now`` in an answer, by its name there.
+    live: ClassVar[str]
     numbers: ClassVar[Numbers]
+    #: What is chosen of a state, beside the task, in the order in which it is asked for.
+    state: ClassVar[tuple[str, ...]]
+    #: What the table may be asked for as, and the processes that answer in full, and quickly.
+    kinds, workers = DrawnPage.kinds, ("full", "quick")
+
+    def __init__(self, session: Session, banner: ErrorBanner, plots: Callable[[], Any]) -> None:
+        super().__init__(session, banner)
+        self.of_file: dict[str, Any] = {}
+        with two_columns("live") as (left, right):
+            with left:
+                self.probe_choice()
+                self.controls()
+                self._sliders = ui.column().classes("w-full gap-1")
+            with right, ui.column().classes("w-full gap-3 parts"):
+                self.results(plots)
 
     # --- for the page to say ----------------------------------------------------------------------
 
+    def controls(self) -> None:
+        """Show what is chosen beside sliders."""
+
     @abstractmethod
-    async def ask(self, lever: Any, at: Any, quick: bool, heard: Heard) -> dict[str, Any]:
-        """Return what a lever shows in a state, quickly or in full; `heard` is told meanwhile."""
+    async def described(self) -> dict[str, Any]:
+        """Return what the probe's file says."""
+
+    @abstractmethod
+    def show_sliders(self) -> None:
+        """Show the sliders."""
+
+    @abstractmethod
+    def of_lever(self) -> Task:
+        """Return the task, whatever the state; its probe and options are the lever's."""
+
+    def about_table(self) -> None:
+        """Ask what is chosen of the table."""
+
+    @abstractmethod
+    def of_table(self, kind: str) -> dict[str, Any]:
+        """Return the options that a table, or what else is asked for, has more than the task."""
 
     @abstractmethod
     def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return what the numbers are of, and what else is said of an answer."""
 
-    async def shown(self, lever: Any, at: Any, quick: bool) -> None:
+    async def shown(self, at: list[Any], quick: bool) -> None:
         """Follow an answer that is shown."""
 
     async def rested(self) -> None:
         """Follow a lever that is shown in full."""
 
+    # --- what is chosen ---------------------------------------------------------------------------
+
+    async def open(self) -> None:
+        """Show the sliders of the probe, and so the first state."""
+        with self.banner.caught():
+            self.of_file = await self.described()
+            self._sliders.clear()
+            with self._sliders:
+                self.show_sliders()
+            self.moved()
+            return
+        self.blank()
+
+    async def changed(self) -> None:
+        """Show another probe, or another value of what is no slider."""
+        await self.open()
+
+    def value(self, key: str) -> Any:
+        """Return what is chosen, or what the probe's file says."""
+        chosen = self.chosen[key]
+        return self.of_file[key] if chosen in (None, "") else chosen
+
+    def slider(self, key: str, words: str, low: float, high: float, *more: str, **how: Any) -> None:
+        """Show the slider of a value; more is its unit and what it says on hover."""
+        number = slider(words, self.value(key), low, high, *more, **how)
+        number.on_value_change(lambda event: self.set_value(key, event.value))
+
+    def slider_of_bias(self, least: float = 0.0) -> None:
+        """Show the slider of the bias; one may type more than it has, and the curves go as far."""
+
+        def set_bias(bias: float | None) -> None:
+            if bias is not None:
+                most = max(self.chosen["most"], float(math.ceil(bias)))
+                self.chosen |= {"bias": float(bias), "most": most}
+                self.moved()
+
+        number = slider("Bias V_b", self.chosen["bias"], least, self.chosen["most"], "V")
+        number.on_value_change(lambda event: set_bias(event.value))
+
+    def set_value(self, key: str, value: Any) -> None:
+        """Choose a value, and have what is shown follow."""
+        if value is not None:
+            self.chosen[key] = value
+            self.moved()
+
+    def moved(self) -> None:
+        """Have what is shown follow; only what is wanted last counts."""
+        self.show_command()
+        self._follower.follow(self.of_lever(), [self.chosen[key] for key in self.state])
+
+    def task(self) -> Task | None:
+        """Return the task that writes the table."""
+        return self._writing("CSV") if self.of_file else None
+
+    def _writing(self, kind: str) -> Task:
+        task = self.of_lever()
+        files = outputs(f"{stem(self.chosen)}.{task.command}", kind)
+        options = {**self.of_table(kind), **task.options, **files}
+        return Task(task.command, task.files, options)
+
     # --- what is shown ----------------------------------------------------------------------------
 
-    def show_live(self, plots: Callable[[], Plots]) -> None:
-        """Show numbers and plots here."""
+    def results(self, plots: Callable[[], Any]) -> None:
+        """Show numbers and plots here, and what can be taken of them."""
         with ui.row().classes("w-full items-end gap-6 numbers"):
             titles = {key: title for key, (title, *_) in self.numbers.items()}
             self._numbers = {key: number_shown(key, title) for key, title in titles.items()}
         self._model = caption("starting").props("aria-live=polite")
         self._remarks = ui.label().classes("text-sm remark")
         with ui.column().classes("w-full gap-1") as self._drawn:
-            self._plots = plots()
+            self.plots = plots()
         # plots without data would be of nothing
         self._drawn.set_visibility(False)
         self._follower = Follower(self._model, self._show, self.rested)
+        with ui.card().classes("w-full last").props("flat bordered"):
+            ui.label("Take it with you").classes("text-bold")
+            self.about_table()
+            self.kind_buttons(lambda kind: self.run(self._writing(kind)), self.kinds)
+            Work(self.session, self.name, self.give)
+            self.command()
 
-    def follow(self, lever: Any, at: Any) -> None:
-        """Have a state of a lever shown; only what is wanted last counts."""
-        self._follower.follow(lever, at)
+    async def ask(
+        self, lever: Task, at: list[Any], quick: bool, heard: Heard, *more: Any
+    ) -> dict[str, Any]:
+        """Return what a lever shows in a state, quickly or in full; `heard` is told meanwhile."""
+        asked = self.workers[quick], f"{self.live}:answer", lever, *at, quick, *more
+        answer: dict[str, Any] = await self.session.ask(*asked, heard=heard)
+        return answer
 
-    async def _show(self, lever: Any, at: Any, quick: bool) -> bool:
+    async def _show(self, lever: Task, at: list[Any], quick: bool) -> bool:
         notes = dict[str, None]()
 
         def heard(kind: str, content: Any) -> None:
@@ -100,14 +202,17 @@ class LivePage(Page):
         model, remark = self.said(answer, quick)
         self._model.set_text(model)
         self._remarks.set_text("; ".join(filter(None, [remark, *notes])))
-        self._plots.show(answer)
+        self.plots.show(answer)
         if not self._drawn.visible:
             self._drawn.set_visibility(True)
-            # what was hidden had no size that figures could be drawn for
-            resized = "setTimeout(() => window.dispatchEvent(new Event('resize')))"
-            self._drawn.client.run_javascript(resized)
-        await self.shown(lever, at, quick)
+            self.resized()
+        await self.shown(at, quick)
         return True
+
+    def resized(self) -> None:
+        """Have figures drawn anew: what was hidden had no size that they could be drawn for."""
+        resize = "setTimeout(() => window.dispatchEvent(new Event('resize')))"
+        self._drawn.client.run_javascript(resize)
 
     def blank(self) -> None:
         """Show no numbers where there are none: the last ones were of another state."""
@@ -116,110 +221,6 @@ class LivePage(Page):
         self._model.set_text("no state is shown")
         self._remarks.set_text("")
         self._drawn.set_visibility(False)
-
-
-class LiveTaskPage(LivePage):
-    """A page whose task is shown at once, at a state that sliders move, and gives its table.
-
-    Attributes
-    ----------
-    of_file : dict
-        What the probe's file says, or what is usual, of what can be chosen.
-    """
-
-    #: What is chosen of a state, beside the task, in the order in which it is asked for.
-    state: ClassVar[tuple[str, ...]]
-
-    def __init__(self, session: Session, banner: ErrorBanner, plots: Callable[[], Plots]) -> None:
-        super().__init__(session, banner)
-        self.of_file: dict[str, Any] = {}
-        with two_columns("live") as (left, right):
-            with left:
-                self.probe_choice()
-                self.controls()
-                self._sliders = ui.column().classes("w-full gap-1")
-            with right, ui.column().classes("w-full gap-3 parts"):
-                self.show_live(plots)
-                with ui.card().classes("w-full last").props("flat bordered"):
-                    ui.label("Take it with you").classes("text-bold")
-                    self.kind_buttons(lambda kind: self.run(self._writing(kind)), DrawnPage.kinds)
-                    Work(session, self.name, self.give)
-                    self.command()
-
-    # --- for the page to say ----------------------------------------------------------------------
-
-    def controls(self) -> None:
-        """Show what is chosen beside sliders."""
-
-    @abstractmethod
-    async def described(self) -> dict[str, Any]:
-        """Return what the probe's file says."""
-
-    @abstractmethod
-    def show_sliders(self) -> None:
-        """Show the sliders."""
-
-    @abstractmethod
-    def of_lever(self) -> Task:
-        """Return the task, whatever the state; its probe and options are the lever's."""
-
-    @abstractmethod
-    def of_table(self, task: Task) -> dict[str, Any]:
-        """Return the options that a table has more than the task."""
-
-    # --- what is chosen ---------------------------------------------------------------------------
-
-    async def open(self) -> None:
-        """Show the sliders of the probe, and so the first state."""
-        with self.banner.caught():
-            self.of_file = await self.described()
-            self._sliders.clear()
-            with self._sliders:
-                self.show_sliders()
-            self._moved()
-            return
-        self.blank()
-
-    async def changed(self) -> None:
-        """Show another probe, or another value of what is no slider."""
-        await self.open()
-
-    def value(self, key: str) -> Any:
-        """Return what is chosen, or what the probe's file says."""
-        chosen = self.chosen[key]
-        return self.of_file[key] if chosen in (None, "") else chosen
-
-    def slider(self, key: str, words: str, low: float, high: float, *more: str, **how: Any) -> None:
-        """Show the slider of a value; more is its unit and what it says on hover."""
-        number = slider(words, self.value(key), low, high, *more, **how)
-        number.on_value_change(lambda event: self.set_value(key, event.value))
-
-    def slider_of_bias(self) -> None:
-        """Show the slider of the bias; one may type more than it has."""
-        self.slider("bias", "Bias V_b", _LEAST_BIAS_V, self.chosen["most"], "V")
-
-    def set_value(self, key: str, value: Any) -> None:
-        """Choose a value, and have what is shown follow."""
-        if value is None:
-            return
-        self.chosen[key] = value
-        if key == "bias" and value > self.chosen["most"]:
-            self.chosen["most"] = float(math.ceil(value))
-        self._moved()
-
-    def _moved(self) -> None:
-        self.show_command()
-        self.follow(self.of_lever(), [self.chosen[key] for key in self.state])
-
-    def task(self) -> Task | None:
-        """Return the task that writes the table."""
-        return self._writing("CSV") if self.of_file else None
-
-    def _writing(self, kind: str) -> Task:
-        task = self.of_lever()
-        files = outputs(f"{stem(self.chosen)}.{task.command}", kind)
-        options = {**task.options, **self.of_table(task), **files}
-        return Task(task.command, task.files, options)
 
 
 def texts_of(now: Mapping[str, Any], numbers: Numbers) -> dict[str, str]:

@@ -1,60 +1,47 @@
-"""What to measure next, asked beside a calibration: a table, how far is safe, and a figure."""
+"""What to measure next, asked beside a calibration."""
 
 from __future__ import annotations
+
+from typing import ClassVar
 
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.frame import ErrorBanner, figure, lines_shown, small_button, table
+from hotlever.app.pages.drawn import DrawnPage
+from hotlever.app.pages.frame import ErrorBanner
+from hotlever.app.pages.page import outputs
 from hotlever.app.session import Session
-from hotlever.materials.parameters import sentence
 
-#: What can be told: where the error counts, and what the tip is to stay below.
-_TOLD = {"at_K": ("Sure at", "hottest measured"), "stay_below_K": ("Stay below", "melting")}
+#: What can be told: where the error counts, what the tip is to stay below, and what counts without.
+_TOLD = {"at": ("Sure at", "hottest measured"), "stay_below": ("Stay below", "what melts")}
 
 
-class Proposals:
-    """A card in the element that is open, of a calibration file."""
+class Proposals(DrawnPage):
+    """A card in the element that is open, of a calibration file; what it makes begins with a stem.
 
-    def __init__(self, session: Session, banner: ErrorBanner, name: str) -> None:
-        self._session, self._banner, self._name = session, banner, name
-        self._asked = session.choices("asked")
-        with ui.card().classes("w-full").props("flat bordered"):
-            with ui.row().classes("items-center"):
-                self._fields = {key: self._field(key) for key in _TOLD}
-                small_button("What to measure next", self.show, icon="add_location_alt")
-            self._shown = ui.column().classes("w-full gap-2").props("data-proposals")
+    Each calibration has proposals of its own.
+    """
 
-    def _field(self, key: str) -> ui.number:
-        title, empty = _TOLD[key]
-        field = ui.number(title, value=self._asked.get(key)).classes("w-44")
-        return field.props(f'suffix=K clearable stack-label placeholder="{empty}"')
+    name = "next"
+    alt = "Error by temperature now and after more measurements; tip temperature by bias"
+    kinds: ClassVar = {kind: text for kind, text in DrawnPage.kinds.items() if kind != "NetCDF"}
 
-    async def show(self) -> None:
-        """Ask, and show the answer."""
-        told = {key: field.value for key, field in self._fields.items()}
-        for key, value in told.items():
-            self._asked.pop(key, None)
-            if value is not None:
-                self._asked[key] = value
-        self._shown.clear()
-        with self._shown:
-            ui.spinner(size="lg").props('aria-label="Being computed"')
-        answer = None
-        with self._banner.caught():
-            asked = self._name, told["at_K"], told["stay_below_K"]
-            answer = await self._session.ask("full", "showing:proposed", *asked)
-        self._shown.clear()
-        if answer is None:
-            return
-        options = {"at": told["at_K"], "stay_below": told["stay_below_K"]}
-        kelvins = {name: f"{value:g}K" for name, value in options.items() if value is not None}
-        with self._shown:
-            ui.label(sentence(answer["now"]))
-            head, *rows = answer["rows"]
-            table(head, rows)
-            for remark in answer["remarks"]:
-                ui.label(sentence(remark)).classes("text-sm remark")
-            figure(answer["figure"], "Error by temperature now and then; tip temperature by bias")
-            line = Task("next", (self._name,), kelvins).line
-            lines_shown(line, "command line", "The same on the command line")
+    def __init__(self, session: Session, banner: ErrorBanner, calibration: str, stem: str) -> None:
+        super().__init__(session, banner)
+        self.name, self._calibration, self._stem = f"next {calibration}", calibration, stem
+        with ui.card().classes("w-full").props("flat bordered data-proposals"):
+            ui.label("What do I measure next?").classes("text-bold")
+            with ui.row().classes("w-full items-center"):
+                for key, (title, empty) in _TOLD.items():
+                    self.number(key, title, "K", empty).classes("w-44", remove="w-36")
+                ui.space()
+                ui.button("Propose", icon="add_location_alt", on_click=self.start)
+            self.show_result()
+        self.show_command()
+
+    def task(self) -> Task:
+        """Return the task that writes the proposals as a table and a figure."""
+        told = {key: self.chosen[key] for key in _TOLD}
+        kelvins = {key: "" if T is None else f"{T:.12g}K" for key, T in told.items()}
+        files = outputs(f"{self._stem}.next", "SVG")
+        return Task("next", (self._calibration,), {**kelvins, **files})

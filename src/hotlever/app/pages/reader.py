@@ -9,10 +9,9 @@ from nicegui import ui
 from hotlever.app.jobs import Task
 from hotlever.app.pages.drawn import probe_files
 from hotlever.app.pages.frame import ErrorBanner
-from hotlever.app.pages.live_page import LiveTaskPage
+from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage
 from hotlever.app.pages.reader_plots import ReaderPlots
 from hotlever.app.session import Session
-from hotlever.app.workers import Heard
 
 #: Distances of a table that is written.
 _DISTANCES = 10
@@ -21,16 +20,22 @@ _OF_THE_SURFACE = (
     ("tilt_deg", "Tilt", "°", "surface_tilt_deg: of the surface; positive: the base is farther"),
     ("accommodation", "Accommodation", "", "for the temperature jump at surfaces, 0.01 to 1"),
 )
-_MODEL = (
+_MOVING = (
+    "moving: coarse lever, the air's temperature jumps as at the bias before: within some 5 %, and "
+    "10 % for slope and resolution"
+)
+_AT_REST = (
     "coarse lever: voltage and resistance within some 0.1 %, the rest within 1 %, and 10 % where "
     "the voltage turns with the distance; the files below are of the full lever"
 )
 
 
-class ReaderPage(LiveTaskPage):
+class ReaderPage(LivePage):
     """One tab of the page."""
 
-    name = "reader"
+    name, live = "reader", "approaching"
+    # levers at some distances are kept in one process, which answers from them
+    workers = "quick", "quick"
     numbers: ClassVar = {
         "resolution_nm_per_rtHz": ("resolution", "{:.3g} pm/√Hz", 1e3),
         "dlnR_dz_per_um": ("d ln R/dz", "{:.3g}·10⁻⁴/nm", 10.0),
@@ -40,7 +45,7 @@ class ReaderPage(LiveTaskPage):
         "noise_V_per_rtHz": ("noise", "{:.3g} nV/√Hz", 1e9),
         "tip_K": ("tip", "{:.1f} K", 1.0),
     }
-    state = ("bias", "distance_um")
+    state = ("distance_um",)
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner, ReaderPlots)
@@ -65,38 +70,33 @@ class ReaderPage(LiveTaskPage):
         ends = self.of_file["nearest_um"], self.of_file["farthest_um"]
         below = "surface_gap_um: lower face of the lever to the surface, at the tip"
         self.slider("distance_um", "distance to the surface", *ends, "µm", below, by_decades=True)
-        self.slider_of_bias()
+        self.slider_of_bias(LEAST_BIAS_V)
         self.slider("amplifier_nV", "noise of the amplifier", 0.0, 20.0, "nV/√Hz")
         hooge = "of the silicon, for 1/f noise; none at the lowest"
         words = "Hooge's parameter"
         self.slider("hooge", words, 1e-8, 1e-3, "", hooge, by_decades=True, from_zero=True)
 
     def of_lever(self) -> Task:
-        """Return the command of the reader, whatever bias and distance."""
+        """Return the command of the reader at the bias, whatever the distance."""
         nearest, farthest = self.of_file["nearest_um"], self.of_file["farthest_um"]
         tilt, accommodation = self.chosen["tilt_deg"], self.chosen["accommodation"]
-        changes = [f"surface_gap_um={nearest:g}"] if tilt is not None else []
-        changes += [] if tilt is None else [f"surface_tilt_deg={tilt:g}"]
-        changes += [] if accommodation is None else [f"accommodation={accommodation:g}"]
+        changes = [f"surface_gap_um={nearest:.12g}"] if tilt is not None else []
+        changes += [] if tilt is None else [f"surface_tilt_deg={tilt:.12g}"]
+        changes += [] if accommodation is None else [f"accommodation={accommodation:.12g}"]
         options = {
-            "distance": f"{nearest:g}um:{farthest:g}um:{_DISTANCES}",
+            "distance": f"{nearest:.12g}um:{farthest:.12g}um:{_DISTANCES}",
             "medium": "air",
             "set": changes,
-            "amplifier": f"{self.chosen['amplifier_nV']:g}nV",
+            "amplifier": f"{self.chosen['amplifier_nV']:.12g}nV",
             "hooge": self.chosen["hooge"] or None,
+            "bias": f"{self.chosen['bias']:.12g}V",
         }
         return Task("reader", probe_files(self.chosen), options)
 
-    def of_table(self, task: Task) -> dict[str, Any]:
-        """Return the bias of a table."""
-        return {"bias": f"{self.chosen['bias']:g}:{self.chosen['bias']:g}:1"}
-
-    async def ask(self, lever: Task, at: list[float], quick: bool, heard: Heard) -> dict[str, Any]:
-        """Return what the reader shows; levers are solved in one process, be it quick or not."""
-        asked = "quick", "approaching:answer"
-        answer: dict[str, Any] = await self.session.ask(*asked, lever, *at, heard=heard)
-        return answer
+    def of_table(self, kind: str) -> dict[str, Any]:
+        """Return nothing more: the table is of all distances."""
+        return {}
 
     def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return whose numbers these are, and where they are read."""
-        return _MODEL, f"Read at the terminal {answer['read_at']}"
+        return _MOVING if quick else _AT_REST, f"Read at the terminal {answer['read_at']}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -10,26 +10,24 @@ from nicegui import ui
 
 from hotlever.app.jobs import Task
 from hotlever.app.pages.beside import NUMBERS, Beside, PlotsWithBeside
-from hotlever.app.pages.drawn import in_python, probe_files, settings, stem
-from hotlever.app.pages.frame import ErrorBanner, two_columns
+from hotlever.app.pages.drawn import in_python, sweep_of
+from hotlever.app.pages.frame import ErrorBanner, flat_button
 from hotlever.app.pages.live_page import LivePage
-from hotlever.app.pages.page import Work, outputs
+from hotlever.app.pages.page import KINDS
 from hotlever.app.pages.pulses import Pulses
-from hotlever.app.pages.sliders import Sliders
 from hotlever.app.pages.small_signals import SmallSignals
 from hotlever.app.session import Session
 from hotlever.app.workers import Heard
 from hotlever.errors import HotleverError, InputError
 from hotlever.lever.set_points import HELD
+from hotlever.materials.parameters import label
+from hotlever.probe.physics import Physics
 from hotlever.tasks.ranges import parse_set_points
 
 #: Biases of a sweep that is written.
 _BIASES = 49
-#: What is chosen of a lever, which has to be solved for it, and of a state.
-_STATE = ("probe", "changes"), ("bias", "most")
 #: What surrounds a lever: each combination gets a reduced lever of its own.
-_AROUND = {"medium", "surface_gap_um"}
-_NUMBERS = NUMBERS | {"knee": ("knee of the I-V curve", "{:.0f} K, {knee_V:.3f} V", 1.0)}
+_MEDIUM, _GAP = _AROUND = "medium", "surface_gap_um"
 _MODELS = {
     "full lever": "full lever: the numbers of hotlever sweep",
     "reduced lever": "moving: reduced lever, within some 0.1 K",
@@ -39,109 +37,151 @@ _MODELS = {
 _TABLES = {"": "by the bias", "resistance": "held at a resistance", "power": "held at a power"}
 _SET_POINTS = {"resistance": "2.5kohm:3kohm:6", "power": "1mW:4mW:7"}
 _VIEWS = {"rest": "at a bias", "time": "in time", "signals": "small signals"}
+#: Sliders of the probe.
+_GROUPS = {"material": "Material", "dimensions": "Dimensions", "circuit": "Circuit"}
 
 
 class SimulatePage(LivePage):
     """One tab of the page."""
 
-    name = "simulate"
-    numbers = _NUMBERS
+    name, live = "simulate", "live"
+    numbers = NUMBERS | {"knee": ("knee of the I-V curve", "{:.0f} K, {knee_V:.3f} V", 1.0)}
+    state = ("bias", "most")
+    kinds = KINDS
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
-        super().__init__(session, banner)
-        with two_columns("live") as (left, right):
-            with left:
-                self.probe_choice()
-                Beside(self, self._moved)
-                self._sliders = Sliders(self, self._moved)
-            with right:
-                view = ui.toggle(_VIEWS, value=self.chosen["view"])
-                view.props('aria-label="What is shown"').on_value_change(self._view)
-                with ui.column().classes("w-full gap-3 parts") as rest:
-                    self.show_live(self._make_plots)
-                    with ui.card().classes("w-full last").props("flat bordered"):
-                        ui.label("Take it with you").classes("text-bold")
-                        self._show_table()
-                        self.kind_buttons(lambda kind: self.run(self._sweep(kind)))
-                        Work(session, self.name, self.give)
-                        self.command()
-                with ui.column().classes("w-full gap-3 last") as time:
-                    self._pulses = Pulses(session, banner, self.chosen)
-                with ui.column().classes("w-full gap-3") as signals:
-                    self._signals = SmallSignals(session, banner, self.chosen)
-                for name, shown in (("rest", rest), ("time", time), ("signals", signals)):
-                    shown.bind_visibility_from(view, "value", value=name)
-                of_bias = self._sliders.of_bias
-                of_bias.bind_visibility_from(view, "value", backward=lambda name: name != "time")
+        #: What may change without another reduced lever.
+        self._free = set[str]()
+        super().__init__(session, banner, lambda: PlotsWithBeside(self))
 
-    async def open(self) -> None:
-        """Ask for the sliders of the probe, and so for the first state."""
-        await self._sliders.open()
+    # --- what is shown ----------------------------------------------------------------------------
 
-    def changed(self) -> Awaitable[None]:
+    def controls(self) -> None:
+        """Ask for a lever to be compared."""
+        Beside(self, self.moved)
+
+    def results(self, plots: Callable[[], PlotsWithBeside]) -> None:
+        """Show the lever at a bias, in time, or under small signals."""
+        self._view = ui.toggle(_VIEWS, value=self.chosen["view"])
+        self._view.props('aria-label="What is shown"').on_value_change(self._viewed)
+        with ui.column().classes("w-full gap-3 parts") as rest:
+            super().results(plots)
+        with ui.column().classes("w-full gap-3 last") as time:
+            self._pulses = Pulses(self.session, self.banner, self.chosen)
+        with ui.column().classes("w-full gap-3") as signals:
+            self._signals = SmallSignals(self.session, self.banner, self.chosen)
+        for name, shown in (("rest", rest), ("time", time), ("signals", signals)):
+            shown.bind_visibility_from(self._view, "value", value=name)
+
+    def _viewed(self, event: Any) -> None:
+        self.chosen["view"] = event.value
+        self.resized()
+
+    async def changed(self) -> None:
         """Show another probe, as it stands in its file."""
         self.chosen["changes"] = {}
-        return self.open()
+        await self.open()
 
-    def _view(self, event: Any) -> None:
-        self.chosen["view"] = event.value
-        # what was hidden had no size that figures could be drawn for
-        ui.run_javascript("setTimeout(() => window.dispatchEvent(new Event('resize')))")
-
-    def _moved(self) -> None:
-        self.follow(*({key: self.chosen[key] for key in keys} for keys in _STATE))
-        self.show_command()
+    def moved(self) -> None:
+        """Follow what was moved, in all views."""
+        super().moved()
         self._pulses.show_command()
         self._signals.show_command()
 
-    # --- at a bias --------------------------------------------------------------------------------
+    # --- what is moved ----------------------------------------------------------------------------
 
-    def _make_plots(self) -> PlotsWithBeside:
-        self._beside = PlotsWithBeside(self)
-        return self._beside
+    async def described(self) -> dict[str, Any]:
+        """Return what the probe's file says of all that can be moved."""
+        probe = await self.session.ask("quick", "live:described", self.chosen["probe"])
+        self._of_probe = probe
+        values = {name: value for group in _GROUPS for name, value, *_ in probe["sliders"][group]}
+        of_material = {name for name, *_ in probe["sliders"]["material"]}
+        self._free = of_material | {"series_resistance_ohm"} if probe["reduced"] else set()
+        return {**values, **probe["around"]}
 
-    def _asked(self, lever: dict[str, Any], at: dict[str, Any], quick: bool) -> dict[str, Any]:
-        """Return what `hotlever.app.live.answer` is asked of a lever."""
-        reduced = self.session.reduced.get(self._geometry(**lever), False)
-        return {**at, "quick": quick, "reduced": reduced}
+    def show_sliders(self) -> None:
+        """Show what is around the lever, the bias, and all numbers of the probe."""
+        with ui.row().classes("items-center w-full no-wrap"):
+            ui.label("in")
+            medium = self._field(_MEDIUM, ui.toggle(["vacuum", "air"]))
+            gap = self._field(_GAP, ui.number("surface (µm)", min=0.01, max=1e4))
+            gap.props("clearable placeholder=none stack-label")
+            gap.bind_visibility_from(medium, "value", value="air")
+        with ui.row().classes("items-center w-full"):
+            for effect, meaning in Physics.description().items():
+                self._field(effect, ui.checkbox(effect).tooltip(meaning))
+        with ui.column().classes("w-full gap-0") as of_bias:
+            self.slider_of_bias()
+        of_bias.bind_visibility_from(self._view, "value", backward=lambda name: name != "time")
+        meanings = self._of_probe["meanings"]
+        for group, title in _GROUPS.items():
+            opened = ui.expansion(title, value=group == "material")
+            with opened.props("dense-toggle header-class=text-bold"):
+                for name, _, low, high, unit in self._of_probe["sliders"][group]:
+                    hint = f"{name}: {meanings[name]}" if name in meanings else name
+                    unit = "" if unit == "1" else unit
+                    self.slider(name, label(name), low, high, unit, hint)
+        flat_button("All as in the probe file", self.changed, icon="restart_alt")
 
-    async def ask(
-        self, lever: dict[str, Any], at: dict[str, Any], quick: bool, heard: Heard
-    ) -> dict[str, Any]:
-        """Return what a lever shows at a bias."""
-        asked = lever["probe"], lever["changes"], self._asked(lever, at, quick)
-        worker = "quick" if quick else "full"
-        answer: dict[str, Any] = await self.session.ask(worker, "live:answer", *asked, heard=heard)
-        return answer
+    def _field(self, name: str, field: Any) -> Any:
+        field.set_value(self.value(name))
+        field.on_value_change(lambda event: self.set_value(name, event.value))
+        return field
+
+    def value(self, key: str) -> Any:
+        """Return a value of the probe as it is changed, or the bias."""
+        return self.chosen["changes"].get(key, self.of_file[key])
+
+    def set_value(self, key: str, value: Any) -> None:
+        """Change a value of the probe; what is as in its file is no change."""
+        if value is None and key != _GAP:
+            return
+        changes = {name: old for name, old in self.chosen["changes"].items() if name != key}
+        if value != self.of_file[key]:
+            changes[key] = value
+        if changes != self.chosen["changes"]:
+            self.chosen["changes"] = changes
+            self.moved()
+
+    # --- a lever at a bias ------------------------------------------------------------------------
+
+    def of_lever(self) -> Task:
+        """Return the command of a sweep, whatever the biases."""
+        return sweep_of(self.chosen)
+
+    async def ask(self, lever: Task, at: list[float], quick: bool, heard: Heard) -> dict[str, Any]:
+        """Return what a lever shows at a bias, by the reduced lever of its geometry if need be."""
+        reduced = self.session.reduced.get(self._geometry(), False)
+        return await super().ask(lever, at, quick, heard, reduced)
 
     def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
-        """Return of which lever the numbers are, and its notes."""
-        return _MODELS[answer["model"]], "; ".join(answer["now"]["notes"])
+        """Return of which lever the numbers are."""
+        return _MODELS[answer["model"]], ""
 
-    async def shown(self, lever: dict[str, Any], at: dict[str, Any], quick: bool) -> None:
+    async def shown(self, at: list[float], quick: bool) -> None:
         """Show the lever beside."""
-        await self._beside.show_beside(self._asked(lever, at, quick))
+        await self.plots.show_beside(at, quick)
 
-    def _geometry(self, probe: str | None, changes: dict[str, Any]) -> Any:
+    def _geometry(self) -> Any:
         """Return what a reduced lever belongs to."""
-        free = self._sliders.free
-        fixed = {name: value for name, value in changes.items() if name not in free}
-        return probe, tuple(sorted(fixed.items(), key=str))
+        changes = self.chosen["changes"].items()
+        fixed = {name: value for name, value in changes if name not in self._free}
+        return self.chosen["probe"], tuple(sorted(fixed.items(), key=str))
 
     async def rested(self) -> None:
         """Have the reduced lever of the geometry made, so that sliders are answered by it."""
-        probe, reduced = self.chosen["probe"], self.session.reduced
-        geometry = self._geometry(probe, self.chosen["changes"])
+        geometry, reduced = self._geometry(), self.session.reduced
         around = dict(geometry[1])
-        if not self._sliders.free or geometry in reduced or set(around) - _AROUND:
+        if not self._free or geometry in reduced or set(around) - set(_AROUND):
             return
         reduced[geometry] = False
+        task = sweep_of({"probe": geometry[0], "changes": around})
         with suppress(HotleverError):
-            reduced[geometry] = await self.session.ask("making", "live:prepare", probe, around)
+            reduced[geometry] = await self.session.ask("making", "live:prepare", task)
 
     # --- the table --------------------------------------------------------------------------------
 
-    def _show_table(self) -> None:
+    def about_table(self) -> None:
         """Ask what the table is of."""
 
         def keep(key: str) -> Callable[[Any], None]:
@@ -165,19 +205,13 @@ class SimulatePage(LivePage):
         """What states are held at, as the options of commands have it."""
         return self.chosen["set_points"] or _SET_POINTS[self.chosen["held"]]
 
-    def task(self) -> Task:
-        """Return the task that writes the table of a sweep."""
-        return self._sweep("CSV")
-
-    def _sweep(self, kind: str) -> Task:
-        """Return the task that writes a sweep, or the fields at the bias that is shown."""
+    def of_table(self, kind: str) -> dict[str, Any]:
+        """Return what a table is of; the fields are those at the bias that is shown."""
         chosen = self.chosen
-        bias = f"{chosen['bias']:g}:{chosen['bias']:g}:1"
-        bias = bias if kind == "VTU" else f"0:{chosen['most']:g}:{_BIASES}"
-        files = outputs(f"{stem(chosen)}.sweep", kind)
-        held = chosen["held"]
-        states = {f"hold_{held}": self._set_points} if held else {"bias": bias}
-        return Task("sweep", probe_files(chosen), {**states, **settings(chosen), **files})
+        if held := chosen["held"]:
+            return {f"hold_{held}": self._set_points}
+        table = f"0:{chosen['most']:.12g}:{_BIASES}"
+        return {"bias": f"{chosen['bias']:.12g}V" if kind == "VTU" else table}
 
     def python(self) -> str:
         """Return the lines of Python that make the sweep."""

@@ -39,19 +39,19 @@ class SmallSignals(DrawnPage):
                 ui.button("Respond", icon="graphic_eq", on_click=self.start)
         self.show_result()
 
-    def _range(self) -> tuple[float, float, int]:
-        chosen = self.chosen
-        if None in (values := [chosen[key] for key in ("lowest_Hz", "highest_Hz", "count")]):
+    def _range(self) -> list[str]:
+        values = [self.chosen[key] for key in ("lowest_Hz", "highest_Hz", "count")]
+        if None in values:
             raise InputError("frequencies: expected lowest, highest and their count")
-        return values[0], values[1], int(values[2])
+        return [f"{value:.12g}" for value in values]
 
     def task(self) -> Task:
         """Return the task that writes table and figure."""
         low, high, count = self._range()
         amplitude = self.chosen["amplitude_V"]
         options = {
-            "bias": f"{self._lever['bias']:g}",
-            "frequency": f"{low:.12g}Hz:{high:.12g}Hz:{count}",
+            "bias": f"{self._lever['bias']:.12g}",
+            "frequency": f"{low}Hz:{high}Hz:{count}",
             "amplitude": "" if amplitude is None else f"{amplitude:.12g}",
         }
         files = outputs(f"{stem(self._lever)}.spectrum", "SVG")
@@ -62,7 +62,7 @@ class SmallSignals(DrawnPage):
         """Return the lines of Python that do the same."""
         low, high, count = self._range()
         bias, swing = self._lever["bias"], self.chosen["amplitude_V"]
-        frequencies = f"np.geomspace({low:g}, {high:g}, {count})"
+        frequencies = f"np.geomspace({low}, {high}, {count})"
         function, call = "spectrum", f"spectrum(lever.solve([{bias:g}])[0], {frequencies})"
         if swing is not None:
             function, call = "harmonics", f"harmonics(lever, {bias:g}, {swing:g}, {frequencies})"
