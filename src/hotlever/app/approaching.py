@@ -36,7 +36,7 @@ _DISTANCES, _KEPT, _PIECES = 9, 3, 80
 #: The nearest and the farthest distance (µm), and the least below any part of the lever.
 _NEAREST_UM, _FARTHEST_UM, _CLEAR_UM = 0.2, 5.0, 0.1
 #: Temperatures (K) as at which the air jumps alike: the voltage is the same within 0.1 %.
-_SAME_JUMP_K = 5.0
+_SAME_JUMP_K = 2.0
 #: What is read off by the distance.
 _READ = tuple(name for name in Signal._fields if not name.startswith(("source", "crosstalk")))
 #: What is drawn by the distance.

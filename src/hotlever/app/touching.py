@@ -25,7 +25,7 @@ from hotlever.lever.lever import COARSE, State
 from hotlever.probe import Probe
 from hotlever.probe.contact import OUT_OF_CONTACT
 from hotlever.probe.tip import EXAMPLE
-from hotlever.tasks.contacting import probe_in_contact
+from hotlever.tasks.contacting import notes_of, probe_in_contact
 from hotlever.tasks.probes import make_lever
 from hotlever.threads import one_blas_thread
 
@@ -78,7 +78,8 @@ def answer(report: Report, task: Task, bias: float, most: float, quick: bool) ->
         now, _near[free] = state_in_contact(free, probe, bias, _near.get(free))
     else:
         free, lever = _touching(report, probe, max(most, bias))
-        data = sweep_in_contact(lever, [bias], free=free, sensitivities=False)
+        data = sweep_in_contact(lever, [bias], free=free)
+        report.note(*notes_of(data))
         now = {str(name): float(values.item()) for name, values in data.data_vars.items()}
         curves = _curves(report, probe, max(most, bias))
     drawn = contact_picture(probe, now["tip_K"])

@@ -61,9 +61,7 @@ def touch(reporter: Reporter, request: ContactRequest) -> None:
         data, failure = as_far_as_possible(lambda: solve(progress=update))
     if failure is not None and not data.tip_K.size:
         raise failure
-    reporter.note(*filter(None, data.attrs["notes"].split("\n")))
-    if waveform is None and (told := what_the_current_tells(data)):
-        reporter.note(told)
+    reporter.note(*notes_of(data))
     with outputs.together():
         if request.output is not None:
             write_dataset(data, request.output, columns)
@@ -116,6 +114,12 @@ def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
             f"{tip.half_angle_deg:g}°"
         )
     return touching
+
+
+def notes_of(data: xr.Dataset) -> list[str]:
+    """Return what should be known of a lever in contact, by the bias or in time."""
+    told = what_the_current_tells(data) if "current_by_resistance" in data else ""
+    return list(filter(None, [*data.attrs["notes"].split("\n"), told]))
 
 
 def what_the_current_tells(data: xr.Dataset) -> str:

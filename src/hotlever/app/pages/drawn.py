@@ -41,15 +41,25 @@ def sweep_of(lever: Mapping[str, Any]) -> Task:
     return Task("sweep", probe_files(lever), settings(lever))
 
 
-def in_python(lever: Mapping[str, Any]) -> str:
-    """Return what makes the probe that is chosen in Python."""
+def in_python(lever: Mapping[str, Any], last: str, *imports: str) -> str:
+    """Return lines of Python that end with what is done with the lever that is chosen.
+
+    Examples
+    --------
+    >>> print(in_python({"probe": None, "changes": {"n_d": 5e17}}, "sweep = lever.sweep([8.0])"))
+    from hotlever import Lever, Probe
+    <BLANKLINE>
+    lever = Lever(Probe.reference().with_(n_d=5e+17))
+    sweep = lever.sweep([8.0])
+    """
     name, changes = lever["probe"], dict(sorted(lever["changes"].items()))
-    made = f"Probe.from_file({name!r})" if name else "Probe.reference()"
-    if not changes:
-        return made
-    if all(name.isidentifier() for name in changes):
-        return f"{made}.with_({', '.join(f'{key}={value!r}' for key, value in changes.items())})"
-    return f"{made}.with_(**{changes!r})"
+    probe = f"Probe.from_file({name!r})" if name else "Probe.reference()"
+    if changes and all(name.isidentifier() for name in changes):
+        probe += f".with_({', '.join(f'{key}={value!r}' for key, value in changes.items())})"
+    elif changes:
+        probe += f".with_(**{changes!r})"
+    heads = sorted(["from hotlever import Lever, Probe", *imports], key=lambda line: line[0] == "f")
+    return "\n".join([*heads, "", f"lever = Lever({probe})", last])
 
 
 def result_of(task: Task, numbers: list[Any], stamp: float, text: str = "") -> Result:

@@ -116,14 +116,9 @@ class Pulses(DrawnPage):
         """Return the lines of Python that simulate the lever."""
         values, form = self._values(), "step" if self.chosen["kind"] == "step" else "pulse"
         until = f", until={values.pop('until')}" if "until" in values else ""
-        return "\n".join(
-            [
-                "from hotlever import Lever, Probe, simulate",
-                f"from hotlever.lever.transient import {form}",
-                "",
-                f"lever = Lever({in_python(self._lever)})",
-                f"history = simulate(lever, {form}({', '.join(values.values())}){until})",
-            ]
+        last = f"history = simulate(lever, {form}({', '.join(values.values())}){until})"
+        return in_python(
+            self._lever, last, f"from hotlever.lever.transient import {form}, simulate"
         )
 
     def show_figure(self, path: Path) -> None:

@@ -40,7 +40,7 @@ class RamanPage(Page):
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
-        self._given, self._again = False, False
+        self._again = False
         with two_columns() as (left, right):
             with left:
                 self._folder(_PLATE, "Drop the spectra of the hot plate here (temperatures known)")
@@ -126,18 +126,20 @@ class RamanPage(Page):
             self.start()
 
     async def _measured(self, job: Job) -> None:
-        given, self._given = self._given, False
         if self._again:
             self._again = False
             self.start()
-        elif job.standing == "done" and given:
-            ui.download.file(self.session.project.path(job.task.written))
+        elif not job.task.written.endswith(FIGURE_FILES[0]):
+            await self.give(job)
         elif job.standing == "done":
             self._show()
 
     def _give(self, suffix: str) -> None:
-        """Have the figure written as a file, and given."""
-        self._given = self.run(self.task(suffix))
+        """Give the figure that there is, or have it written as another file."""
+        if suffix == FIGURE_FILES[0]:
+            ui.download.file(self.session.project.path(f"{_FIGURE}{suffix}"))
+        else:
+            self.run(self.task(suffix))
 
     def _show(self) -> None:
         self._result.clear()

@@ -215,28 +215,13 @@ class SimulatePage(LivePage):
 
     def python(self) -> str:
         """Return the lines of Python that make the sweep."""
-        held = self.chosen["held"]
-        if held:
-            unit = HELD[held].unit
-            try:
-                points = parse_set_points(self._set_points, unit, "set points").tolist()
-            except InputError:
-                return ""  # the command will say what is wrong
-            return "\n".join(
-                [
-                    "from hotlever import Lever, Probe",
-                    "from hotlever.lever.set_points import hold",
-                    "",
-                    f"lever = Lever({in_python(self.chosen)})",
-                    f'data = hold(lever, "{held}", {points}).data  # {unit}',
-                ]
-            )
-        return "\n".join(
-            [
-                "import numpy as np",
-                "from hotlever import Lever, Probe",
-                "",
-                f"lever = Lever({in_python(self.chosen)})",
-                f"sweep = lever.sweep(np.linspace(0, {self.chosen['most']:g}, {_BIASES}))",
-            ]
-        )
+        if not (held := self.chosen["held"]):
+            last = f"sweep = lever.sweep(np.linspace(0, {self.chosen['most']:g}, {_BIASES}))"
+            return in_python(self.chosen, last, "import numpy as np")
+        unit = HELD[held].unit
+        try:
+            points = parse_set_points(self._set_points, unit, "set points").tolist()
+        except InputError:
+            return ""  # the command will say what is wrong
+        last = f'data = hold(lever, "{held}", {points}).data  # {unit}'
+        return in_python(self.chosen, last, "from hotlever.lever.set_points import hold")

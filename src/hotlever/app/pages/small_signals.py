@@ -63,16 +63,10 @@ class SmallSignals(DrawnPage):
         low, high, count = self._range()
         bias, swing = self._lever["bias"], self.chosen["amplitude_V"]
         frequencies = f"np.geomspace({low}, {high}, {count})"
-        function, call = "spectrum", f"spectrum(lever.solve([{bias:g}])[0], {frequencies})"
+        function, call = "spectrum", f"spectrum(lever.solve([{bias:.12g}])[0], {frequencies})"
         if swing is not None:
-            function, call = "harmonics", f"harmonics(lever, {bias:g}, {swing:g}, {frequencies})"
-        return "\n".join(
-            [
-                "import numpy as np",
-                "from hotlever import Lever, Probe",
-                f"from hotlever.lever.transient.frequency_domain import {function}",
-                "",
-                f"lever = Lever({in_python(self._lever)})",
-                f"response = {call}",
-            ]
-        )
+            function = "harmonics"
+            call = f"harmonics(lever, {bias:.12g}, {swing:.12g}, {frequencies})"
+        module = "hotlever.lever.transient.frequency_domain"
+        imports = "import numpy as np", f"from {module} import {function}"
+        return in_python(self._lever, f"response = {call}", *imports)
