@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -22,33 +22,18 @@ NUMBERS = {
     "power_mW": ("power P_l", "{:.4f} mW", 1.0),
     "reader_V": ("reader V_r", "{:.4f} V", 1.0),
 }
-_NONE, _NOW, _PROBE = "", "now", "probe:"
+_NONE, NOW, _PROBE = "", "now", "probe:"
 _OPTIONS = {
     _NONE: "nothing",
     "vacuum": "the same in vacuum",
     "air": "the same in air",
-    _NOW: "the lever as it is now",
+    NOW: "the lever as it is now",
 }
 
 
-class Beside:
-    """Which lever is shown beside the one that is chosen; `changed` is called for another one."""
-
-    def __init__(self, page: Page, changed: Callable[[], None]) -> None:
-        self._chosen, self._changed = page.chosen, changed
-        probes = {f"{_PROBE}{name}": name for name in page.session.project.probes}
-        options = {**_OPTIONS, f"{_PROBE}": "reference probe", **probes}
-        chosen = self._chosen["beside"]
-        if chosen not in options:
-            options[chosen] = f"{chosen.removeprefix(_PROBE)} (not in the folder)"
-        beside = ui.select(options, label="Compare with", value=chosen).classes("w-full")
-        beside.on_value_change(lambda event: self._take(event.value))
-
-    def _take(self, chosen: str) -> None:
-        if chosen == _NOW:
-            self._chosen["kept"] = {key: self._chosen[key] for key in ("probe", "changes")}
-        self._chosen["beside"] = chosen
-        self._changed()
+def options_beside(probes: Iterable[str]) -> dict[str, str]:
+    """Return which levers may be shown beside the one that is chosen, in words."""
+    return {**_OPTIONS, _PROBE: "reference probe", **{f"{_PROBE}{name}": name for name in probes}}
 
 
 def lever_beside(chosen: dict[str, Any]) -> dict[str, Any] | None:
@@ -62,7 +47,7 @@ def lever_beside(chosen: dict[str, Any]) -> dict[str, Any] | None:
     beside = chosen["beside"]
     if beside == _NONE:
         return None
-    if beside == _NOW:
+    if beside == NOW:
         return dict(chosen["kept"])
     if beside.startswith(_PROBE):
         return {"probe": beside.removeprefix(_PROBE) or None, "changes": {}}
@@ -71,7 +56,7 @@ def lever_beside(chosen: dict[str, Any]) -> dict[str, Any] | None:
 
 def beside_in_words(chosen: dict[str, Any]) -> str:
     """Return what the lever beside is called."""
-    if chosen["beside"] == _NOW:
+    if chosen["beside"] == NOW:
         kept = chosen["kept"]
         changes = ", ".join(f"{name} = {value}" for name, value in kept["changes"].items())
         name = Path(kept["probe"] or "reference probe").stem

@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.beside import NUMBERS, Beside, PlotsWithBeside
+from hotlever.app.pages.beside import NOW, NUMBERS, PlotsWithBeside, options_beside
 from hotlever.app.pages.drawn import in_python, sweep_of
 from hotlever.app.pages.frame import ErrorBanner, flat_button
 from hotlever.app.pages.live_page import LivePage
@@ -58,7 +58,8 @@ class SimulatePage(LivePage):
 
     def controls(self) -> None:
         """Ask for a lever to be compared."""
-        Beside(self, self.moved)
+        self._shown_of = self.chosen["probe"], self.chosen["beside"]
+        self.choice("beside", "Compare with", options_beside(self.session.project.probes))
 
     def results(self, plots: Callable[[], PlotsWithBeside]) -> None:
         """Show the lever at a bias, in time, or under small signals."""
@@ -78,7 +79,17 @@ class SimulatePage(LivePage):
         self.resized()
 
     async def changed(self) -> None:
-        """Show another probe, as it stands in its file."""
+        """Show another probe, as it stands in its file, another one beside, or another table."""
+        probe, beside = self._shown_of
+        self._shown_of = self.chosen["probe"], self.chosen["beside"]
+        if self.chosen["beside"] == NOW != beside:
+            self.chosen["kept"] = {key: self.chosen[key] for key in ("probe", "changes")}
+        if self.chosen["probe"] == probe:
+            self.moved()
+        else:
+            await self._reset()
+
+    async def _reset(self) -> None:
         self.chosen["changes"] = {}
         await self.open()
 
@@ -121,7 +132,7 @@ class SimulatePage(LivePage):
                     hint = f"{name}: {meanings[name]}" if name in meanings else name
                     unit = "" if unit == "1" else unit
                     self.slider(name, label(name), low, high, unit, hint)
-        flat_button("All as in the probe file", self.changed, icon="restart_alt")
+        flat_button("All as in the probe file", self._reset, icon="restart_alt")
 
     def _field(self, name: str, field: Any) -> Any:
         field.set_value(self.value(name))
@@ -184,20 +195,12 @@ class SimulatePage(LivePage):
     def about_table(self) -> None:
         """Ask what the table is of."""
 
-        def keep(key: str) -> Callable[[Any], None]:
-            def keep_value(event: Any) -> None:
-                self.chosen[key] = event.value
-                self.show_command()
-
-            return keep_value
-
         with ui.row().classes("w-full items-end"):
-            held = ui.select(_TABLES, label="A table of states", value=self.chosen["held"])
-            held.on_value_change(keep("held")).classes("w-48")
-            points = ui.input("Set points", value=self.chosen["set_points"])
-            points.on_value_change(keep("set_points")).props("debounce=200 stack-label")
+            held = self.choice("held", "A table of states", _TABLES)
+            held.classes("w-48", remove="w-full")
+            points = self.text("set_points", "Set points").props("debounce=200 stack-label")
             examples = (f"{what}: {text}" for what, text in _SET_POINTS.items())
-            points.props(f'placeholder="{", ".join(examples)}"').classes("col")
+            points.props(f'placeholder="{", ".join(examples)}"').classes("col", remove="w-full")
             points.bind_visibility_from(held, "value")
 
     @property
