@@ -47,7 +47,7 @@ def curved(share):
     probe = SimpleNamespace(values=lambda names: origin)
     at = SimpleNamespace(probe=probe, slopes=slopes, surrogate=data)
     posterior = SimpleNamespace(objective=objective, at=at, covariance=np.diag([share**2, 0.25]))
-    return CurvedQuantity(posterior, SimpleNamespace(surrogate=_Shown(False)), 0)
+    return CurvedQuantity(posterior, _Shown(False), 0)
 
 
 def exact(share, errors):

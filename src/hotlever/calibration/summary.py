@@ -105,8 +105,8 @@ def linear_words(stated: TemperatureBudget) -> str:
         return ""
     if np.isnan(interval.low):
         return (
-            "not linear: levers within its errors have no state at this bias, so that the Monte "
-            "Carlo method (JCGM 101) fails"
+            "not linear: levers within its errors melt at this bias, or are hotter than those that "
+            "were solved, so that the Monte Carlo method (JCGM 101) fails"
         )
     trials = (
         f"95 % of {interval.trials} Monte Carlo trials lie from {interval.low:.0f} to "

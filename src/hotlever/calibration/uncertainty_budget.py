@@ -19,6 +19,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.curvature import CurvedQuantity
 from hotlever.estimation.gum import Budget, CoverageInterval, InputQuantity, propagate
 from hotlever.estimation.inverse_problem import Estimate
+from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.outcome import IF_ANY, Matrix, Section
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.measurands import FITTED
@@ -30,6 +31,8 @@ from hotlever.types import Array
 
 #: Where the density of priors comes from an earlier estimate.
 _FIT = "fit"
+#: Where the Monte Carlo method fails.
+_NO_INTERVAL = CoverageInterval(0, np.nan, np.nan)
 
 
 def correction(quantity: str, u: float) -> InputQuantity:
@@ -51,7 +54,8 @@ class TemperatureBudget:
         What 95 % of the temperatures lie between as the table says: the errors say no more, where
         levers that are hotter and colder, or samples of the posterior, do not tell otherwise.
     monte_carlo : CoverageInterval, optional
-        Of 95 %, in K; NaN if levers so near by have no states. None in files without one.
+        Of 95 %, in K; NaN if levers so near by have no states, or none as hot as its upper end or
+        that of the budget was solved. None in files without one.
     """
 
     budget: Budget
@@ -126,6 +130,8 @@ def budget_of_estimate(
     residuals, objective = estimate.residuals, estimate.objective
     predicted = estimate.predicted(np.array([bias_V]))
     observable = list(FITTED).index("tip")
+    # a ramp of levers like it may not have jumped yet, where it is known that this one has
+    surrogate = predicted.surrogate.reading(Rows(predicted.surrogate.rows.bias_V, predicted.values))
     slopes = predicted.slopes[observable, 0, objective.columns]
     moved = {name: slopes @ by for name, by in estimate.posterior.influences.items()}
     u = residuals.noise(estimate.prediction.values).tolist()
@@ -162,15 +168,18 @@ def budget_of_estimate(
         return made
     free = dict(zip(residuals.observables, dof, strict=True))
     try:
-        curved = CurvedQuantity(estimate.posterior, predicted, observable)
+        curved = CurvedQuantity(estimate.posterior, surrogate, observable)
     except (ComputationError, np.linalg.LinAlgError):
-        return replace(made, monte_carlo=CoverageInterval(0, np.nan, np.nan))
+        return replace(made, monte_carlo=_NO_INTERVAL)
     errors = _Errors(curved, estimate.posterior.influences, free)
 
     def draw(count: int) -> Array:
         return value + curved.changes(errors.draw(count)) + other * errors.random.normal(size=count)
 
-    return replace(made, monte_carlo=propagate(draw, budget.tolerance))
+    interval = propagate(draw, budget.tolerance)
+    # of what is hotter no lever was solved, and it may melt
+    beyond = max(interval.high, made.interval_K[1]) > surrogate.branch.hottest_K
+    return replace(made, monte_carlo=_NO_INTERVAL if beyond else interval)
 
 
 def _rows_of_fit(

@@ -12,9 +12,9 @@ import numpy as np
 from scipy import optimize
 from scipy.interpolate import PchipInterpolator
 
-from hotlever.estimation.experiment import Prediction
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.subproblem import Subproblem
+from hotlever.estimation.surrogate import Surrogate
 from hotlever.types import Array
 
 #: Standard errors on either side over which derivatives are compared.
@@ -33,7 +33,7 @@ class CurvedQuantity:
     Parameters
     ----------
     posterior : Posterior
-    predicted : Prediction
+    surrogate : Surrogate
         Of the estimated lever, in one row.
     observable : int
         Place of the quantity among its values.
@@ -44,9 +44,9 @@ class CurvedQuantity:
         If a lever half a standard error away has no such states.
     """
 
-    def __init__(self, posterior: Posterior, predicted: Prediction, observable: int) -> None:
+    def __init__(self, posterior: Posterior, surrogate: Surrogate, observable: int) -> None:
         objective = posterior.objective
-        self._near, self._surrogate = Subproblem(objective, posterior.at), predicted.surrogate
+        self._near, self._surrogate = Subproblem(objective, posterior.at), surrogate
         self._parameters = posterior.at.probe.values(objective.names)
         self._observable = observable
         self._axes = np.linalg.cholesky(posterior.covariance)
