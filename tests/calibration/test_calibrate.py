@@ -31,7 +31,7 @@ from synthetic_curves import measured_curve, measurement_of
 #: Keys of the budget after the GUM, which older files have not.
 GUM = (
     *("gum", "gum_bias_V", "effective_dof", "coverage_factor", "expanded_uncertainty_K"),
-    *("gum_monte_carlo", "gum_linear"),
+    *("gum_monte_carlo", "gum_linear", "gum_of"),
 )
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
@@ -367,6 +367,7 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
         (("--prior", "edge_bias_um=0.1x/2"), "edge_bias_um may be negative: expected a spread"),
         (("--prior", "heater=±3%"), "unknown prior 'heater'"),
         (("--fit", "none.json"), "none.json: no such file"),
+        (("--budget-of", "peak"), "an uncertainty budget of 'peak': expected tip or apex"),
     ],
 )
 def test_calibrate_command_errors_are_one_line(run, example, arguments, message):

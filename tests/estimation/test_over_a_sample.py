@@ -127,7 +127,8 @@ def calibration(probe, measured):
     held = dict.fromkeys(name for name in usual_parameters(probe) if name not in known)
     with on_coarse_meshes():
         found = estimate(measured, probe, FitOptions(fixed=held, priors=known))
-        return calibrated_by_estimate(measured, found, found.options.priors, "probe")
+        of_apex = {"at_V": 8.0, "of": "apex"}
+        return calibrated_by_estimate(measured, found, found.options.priors, "probe", **of_apex)
 
 
 def test_the_apex_joins_the_calibration_with_its_error_by_source(calibration, touching):
@@ -140,6 +141,11 @@ def test_the_apex_joins_the_calibration_with_its_error_by_source(calibration, to
     whole = np.sqrt((table.apex_budget_K**2).sum("source"))
     np.testing.assert_allclose(whole, table.apex_stderr_K)
     assert table.apex_budget_K.sel(source="contact").max() > 0.0
+    stated, row = calibration.gum, table.sel(bias=8.0)
+    assert stated.estimate_K == row.apex_K.item() != row.tip_K.item()
+    assert stated.budget.u == pytest.approx(row.apex_stderr_K.item(), rel=1e-6)
+    low, high = (stated.estimate_K + way * 1.96 * stated.budget.u for way in (-1.0, 1.0))
+    assert stated.limits_K == pytest.approx((low, high), rel=1e-3)
     use = calibration.priors[INTERFACE]
     assert use.left < 0.1
     assert "apex (K)" in calibration_text(calibration)
@@ -152,6 +158,8 @@ def test_a_calibration_with_an_apex_is_read_as_it_was_written(calibration, tmp_p
     again = read_calibration(tmp_path / "cal.json")
     assert again.columns == calibration.columns
     np.testing.assert_allclose(again.table.apex_budget_K, calibration.table.apex_budget_K)
+    assert again.gum.measurand == "apex temperature in contact at a bias of 8 V"
+    assert again.gum.limits_K == pytest.approx(calibration.gum.limits_K)
     content = json.loads((tmp_path / "cal.json").read_text())
     del content["apex_budget_K"]["contact"]
     (tmp_path / "cal.json").write_text(json.dumps(content))

@@ -12,6 +12,7 @@ from hotlever.calibration.calibration import Calibration, CalibrationFile
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.pulses import PulseTiming
+from hotlever.calibration.uncertainty_budget import BudgetOf
 from hotlever.estimation import FitOptions
 from hotlever.estimation.batch import Batch, Work, estimate_many
 from hotlever.files import CALIBRATION
@@ -29,6 +30,7 @@ def calibrate_many(
     priors: Mapping[str, Prior | str] | None = None,
     pulse: PulseTiming | None = None,
     samples: int = 0,
+    budget_of: BudgetOf = "tip",
     **how: Any,
 ) -> Batch[Calibration]:
     """Calibrate many levers and write a calibration file for each as soon as it is done.
@@ -41,7 +43,7 @@ def calibrate_many(
         Where the calibration files go, named after the data files.
     probe : Probe, optional
         What the levers are like; the reference probe by default.
-    law, medium, priors, pulse, samples
+    law, medium, priors, pulse, samples, budget_of
         See `hotlever.calibration.procedure.calibrate`.
     **how
         As `hotlever.estimation.batch.estimate_many` has them.
@@ -58,6 +60,7 @@ def calibrate_many(
         "power_law": None if law is None else law.model_dump(),
         "pulse": None if pulse is None else asdict(pulse),
         "samples": samples,
+        "budget_of": budget_of,
     }
     calibration = partial(
         calibrate,
@@ -67,6 +70,7 @@ def calibrate_many(
         priors=priors,
         pulse=pulse,
         samples=samples,
+        budget_of=budget_of,
     )
     work = Work("calibration", calibration, CalibrationFile, CALIBRATION, like, options, asked)
     return estimate_many(paths, folder, work, **how)

@@ -16,7 +16,6 @@ from hotlever.calibration.calibration import Calibration, rms
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.plausibility import misfit, what_data_lack
 from hotlever.calibration.power_law import law_of_model, power_turns
-from hotlever.calibration.table import budget_of
 from hotlever.calibration.tip_temperature import (
     OF_THE_MEASUREMENT,
     highest_bias,
@@ -24,7 +23,7 @@ from hotlever.calibration.tip_temperature import (
     tip_by_bias,
     tips_in_contact,
 )
-from hotlever.calibration.uncertainty_budget import budget_of_estimate
+from hotlever.calibration.uncertainty_budget import BudgetOf, budget_of_estimate
 from hotlever.errors import ComputationError
 from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
@@ -144,6 +143,7 @@ def calibrated_by_estimate(
     route: str,
     samples: int = 0,
     at_V: float | None = None,
+    of: BudgetOf = "tip",
     progress: Progress | None = None,
 ) -> Calibration:
     """Return the calibration of an estimated lever, of which some was known beforehand.
@@ -187,17 +187,11 @@ def calibrated_by_estimate(
         notes.append("the outline is taken to be as drawn: no error of it is in the result")
     bias = tip.table.bias_V.values
     row = int(np.nanargmax(tip.table.tip_K) if at_V is None else np.searchsorted(bias, at_V))
-    model = {
-        source: float(error[row])
-        for source, error in budget_of(tip.table).items()
-        if source in ("model", "jump")
-    }
-    limits = tip.table.tip_low_K.values[row].item(), tip.table.tip_high_K.values[row].item()
     if by_power:
         law, residual = law_of_model(vacuum, None if threshold is None else threshold.power_mW)
     return Calibration(
         table=tip.table,
-        gum=budget_of_estimate(estimate, priors, float(bias[row]), limits, model),
+        gum=budget_of_estimate(estimate, priors, tip.table.isel(bias=row), of),
         weights=_weights(measured, estimate),
         route=route,
         medium=medium,

@@ -14,7 +14,9 @@ from hotlever.calibration.knee_scaling import calibrated_by_knee
 from hotlever.calibration.plausibility import check_plausible
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
-from hotlever.calibration.table import BUDGETS, budget_of, table_with_budget
+from hotlever.calibration.table import BUDGETS, table_with_budget
+from hotlever.calibration.table import budget_of as table_budget
+from hotlever.calibration.uncertainty_budget import BudgetOf, check_budget_of, limits_of
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
@@ -37,6 +39,7 @@ def calibrate(
     pulse: PulseTiming | None = None,
     samples: int = 0,
     at_V: float | None = None,
+    budget_of: BudgetOf = "tip",
     progress: Progress | None = None,
 ) -> Calibration:
     """Find the tip temperature of a lever from its I-V curve.
@@ -72,6 +75,8 @@ def calibrate(
         default they follow from its linearised error, or estimates of hotter and colder levers.
     at_V : float, optional
         Bias of the uncertainty budget; that of the hottest tip by default.
+    budget_of : {"tip", "apex"}
+        What the uncertainty budget is of: the tip, or its apex that touches a sample.
     progress : callable, optional
         Called with solved branches, then with steps of the sampler and followed pulses, and how
         many there usually are.
@@ -105,10 +110,11 @@ def calibrate(
             "V_bridge, of a probe with bridge_upper_ohm and bridge_lower_ohm in [circuit]"
         )
     notes = note_on_averages(whole, measured)
+    check_budget_of(budget_of, origin.contact is not None)
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
         if samples:
             raise InputError("the paper's rule has no posterior; expected a probe or a fit")
-        if at_V is not None:
+        if at_V is not None or budget_of != "tip":
             raise InputError(
                 "the paper's rule has no uncertainty budget; expected a probe or a fit, in the "
                 "medium of the data"
@@ -135,7 +141,7 @@ def calibrate(
         try:
             estimate, stated = estimate_lever(measured, probe, fit, priors, progress)
             result = calibrated_by_estimate(
-                measured, estimate, stated, route, samples, at_V, progress
+                measured, estimate, stated, route, samples, at_V, budget_of, progress
             )
         except ComputationError as error:
             raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
@@ -170,13 +176,13 @@ def _in_either(result: Calibration, other: Calibration) -> Calibration:
     parts, of_apex = (
         budget and budget | {"medium": choices[name]}
         for budget, name in (
-            (budget_of(result.table), "tip_K"),
-            (budget_of(result.table, BUDGETS[1]), "apex_K"),
+            (table_budget(result.table), "tip_K"),
+            (table_budget(result.table, BUDGETS[1]), "apex_K"),
         )
     )
-    gum = result.gum
+    table, gum = table_with_budget(columns, parts, of_apex=of_apex), result.gum
     if gum is not None and other.gum is not None:
         row = columns["bias_V"].tolist().index(gum.bias_V)
-        limits = columns["tip_low_K"][row].item(), columns["tip_high_K"][row].item()
-        gum = gum.in_either(other.gum, choices["tip_K"][row].item(), limits)
-    return replace(result, table=table_with_budget(columns, parts, of_apex=of_apex), gum=gum)
+        limits = limits_of(table.isel(bias=row), gum.of)
+        gum = gum.in_either(other.gum, choices[f"{gum.of}_K"][row].item(), limits)
+    return replace(result, table=table, gum=gum)

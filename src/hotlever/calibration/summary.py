@@ -93,7 +93,7 @@ def _budget_line(stated: TemperatureBudget) -> str:
     away = significant(stated.budget.expanded())
     linear = linear_words(stated)
     return (
-        f"uncertainty budget at a bias of {stated.bias_V:.4g} V: {stated.estimate_K:.0f} K ± "
+        f"uncertainty budget, {stated.measurand}: {stated.estimate_K:.0f} K ± "
         f"{away} K (95 %, k = {stated.budget.coverage_factor():.2f})" + (linear and f"; {linear}")
     )
 

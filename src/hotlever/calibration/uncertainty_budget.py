@@ -10,25 +10,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import xarray as xr
 
+from hotlever.calibration.table import BUDGETS, budget_of
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.curvature import CurvedQuantity
+from hotlever.estimation.experiment import TIP
 from hotlever.estimation.gum import Budget, CoverageInterval, InputQuantity, propagate
 from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.outcome import IF_ANY, Matrix, Section
 from hotlever.estimation.prior_density import PriorDensity
-from hotlever.measurands import FITTED
+from hotlever.measurands import FITTED, OBSERVABLES
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import SCALES, PriorUse
 from hotlever.records import Number
 from hotlever.text import BAND
 from hotlever.types import Array
 
+#: Of what there are budgets: a tip, or its apex that touches a sample.
+BudgetOf = Literal["tip", "apex"]
 #: Where the density of priors comes from an earlier estimate.
 _FIT = "fit"
 #: Where the Monte Carlo method fails.
@@ -53,6 +57,7 @@ class TemperatureBudget:
     limits_K : (float, float)
         What 95 % of the temperatures lie between as the table says: the errors say no more, where
         levers that are hotter and colder, or samples of the posterior, do not tell otherwise.
+    of : {"tip", "apex"}
     monte_carlo : CoverageInterval, optional
         Of 95 %, in K; NaN if levers so near by have no states, or none as hot as its upper end or
         that of the budget was solved. None in files without one.
@@ -62,7 +67,14 @@ class TemperatureBudget:
     bias_V: float
     estimate_K: float
     limits_K: tuple[float, float]
+    of: BudgetOf = "tip"
     monte_carlo: CoverageInterval | None = None
+
+    @property
+    def measurand(self) -> str:
+        """What it is of, in words."""
+        kind = "apex temperature in contact" if self.of == "apex" else "tip temperature"
+        return f"{kind} at a bias of {self.bias_V:.4g} V"
 
     @property
     def linear(self) -> bool | None:
@@ -107,29 +119,56 @@ class TemperatureBudget:
         )
 
 
+def check_budget_of(of: str, in_contact: bool = True) -> None:
+    """Raise an error if there is no uncertainty budget of a quantity."""
+    expected = get_args(BudgetOf)
+    if of not in expected:
+        raise InputError(
+            f"an uncertainty budget of '{of}': expected {' or '.join(expected)}, of which it is at "
+            "rest (the errors of a pulse by source are in its table)"
+        )
+    if of == "apex" and not in_contact:
+        raise InputError(
+            "an uncertainty budget of the apex: expected a probe in contact with a sample "
+            "([contact] in the probe file)"
+        )
+
+
+def limits_of(row: xr.Dataset, of: BudgetOf) -> tuple[float, float]:
+    """Return what 95 % of a temperature lie between (K), by a row of a table.
+
+    Those of an apex are as much further away on one side than its errors say as the tip's.
+    """
+    limits = row.tip_low_K.item(), row.tip_high_K.item()
+    if of == "tip":
+        return limits
+    value, share = row.apex_K.item(), (row.apex_stderr_K / row.tip_stderr_K).item()
+    low, high = (value + share * (limit - row.tip_K.item()) for limit in limits)
+    return low, high
+
+
 def budget_of_estimate(
     estimate: Estimate,
     priors: Mapping[str, PriorUse],
-    bias_V: float,
-    limits_K: tuple[float, float],
-    model: Mapping[str, float],
+    row: xr.Dataset,
+    of: BudgetOf,
 ) -> TemperatureBudget:
-    """Return the budget of a tip temperature.
+    """Return the budget of a temperature in a row of the table of an estimate.
 
     Parameters
     ----------
     estimate : Estimate
     priors : mapping of str to PriorUse
         Of the parameters and the scales.
-    bias_V : float
-    limits_K : (float, float)
-        See `TemperatureBudget`.
-    model : mapping of str to float
-        Standard errors (K) beside those of the parameters, by source.
+    row : xarray.Dataset
+        With the standard errors beside those of the parameters.
+    of : {"tip", "apex"}
     """
+    bias_V, errors_K = row.bias_V.item(), budget_of(row, BUDGETS[of == "apex"])
+    model = {name: errors_K[name].item() for name in ("model", "jump") if name in errors_K}
     residuals, objective = estimate.residuals, estimate.objective
     predicted = estimate.predicted(np.array([bias_V]))
-    observable = list(FITTED).index("tip")
+    observable = list(FITTED).index(of)
     # a ramp of levers like it may not have jumped yet, where it is known that this one has
     surrogate = predicted.surrogate.reading(Rows(predicted.surrogate.rows.bias_V, predicted.values))
     slopes = predicted.slopes[observable, 0, objective.columns]
@@ -163,7 +202,7 @@ def budget_of_estimate(
         rows += of_fit
     budget = Budget(tuple(rows), correlation)
     value, other = float(predicted.values[observable, 0]), float(np.linalg.norm([*model.values()]))
-    made = TemperatureBudget(budget, bias_V, value, limits_K)
+    made = TemperatureBudget(budget, bias_V, value, limits_of(row, of), of)
     if not budget.u > 0.0:
         return made
     free = dict(zip(residuals.observables, dof, strict=True))
@@ -178,7 +217,10 @@ def budget_of_estimate(
 
     interval = propagate(draw, budget.tolerance)
     # of what is hotter no lever was solved, and it may melt
-    beyond = max(interval.high, made.interval_K[1]) > surrogate.branch.hottest_K
+    ended = predicted.values[: len(OBSERVABLES)].copy()
+    ended[TIP] = surrogate.branch.hottest_K
+    hottest = surrogate.contact.shown(ended, estimate.probe.values(objective.names))[observable, 0]
+    beyond = max(interval.high, made.interval_K[1]) > hottest
     return replace(made, monte_carlo=_NO_INTERVAL if beyond else interval)
 
 
@@ -293,6 +335,7 @@ class BudgetFields(Section):
     gum: list[InputSection] | None = IF_ANY
     gum_correlation: Matrix | None = IF_ANY
     gum_bias_V: float | None = IF_ANY
+    gum_of: BudgetOf | None = IF_ANY
     effective_dof: Number | None = IF_ANY
     coverage_factor: float | None = IF_ANY
     expanded_uncertainty_K: float | None = IF_ANY
@@ -310,6 +353,7 @@ class BudgetFields(Section):
             "gum": [InputSection.of(row) for row in budget.inputs],
             "gum_correlation": budget.correlation,
             "gum_bias_V": stated.bias_V,
+            "gum_of": stated.of,
             "effective_dof": budget.dof,
             "coverage_factor": budget.coverage_factor(),
             "expanded_uncertainty_K": budget.expanded(),
@@ -332,12 +376,14 @@ class BudgetFields(Section):
         if self.gum is None:
             return None
         row, told, interval = table.sel(bias=self.gum_bias_V), self.gum_monte_carlo, None
+        of = self.gum_of or "tip"
         if told is not None:
             interval = CoverageInterval(told.trials, told.low_K, told.high_K)
         return TemperatureBudget(
             Budget(tuple(each.row() for each in self.gum), self.gum_correlation),
             row.bias_V.item(),
-            row.tip_K.item(),
-            (row.tip_low_K.item(), row.tip_high_K.item()),
+            row[f"{of}_K"].item(),
+            limits_of(row, of),
+            of,
             interval,
         )

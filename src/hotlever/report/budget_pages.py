@@ -20,7 +20,7 @@ _HEAD = ["quantity", "estimate", "u", "type", "distribution", "sensitivity", "in
 
 
 def budget_page(calibration: Calibration) -> Page:
-    """Return the uncertainty budget of a tip temperature, with nothing left out.
+    """Return the uncertainty budget of a temperature, with nothing left out.
 
     Raises
     ------
@@ -31,14 +31,14 @@ def budget_page(calibration: Calibration) -> Page:
     if stated is None:
         raise InputError(
             "an uncertainty budget: expected a calibration that describes its data, by a probe or "
-            "a fit"
+            "a fit (of a tip or apex at rest; the errors of a pulse by source are in its table)"
         )
     budget = stated.budget.largest_first()
     page = Page(f"Uncertainty budget of {calibration.measurement.path}", one_sheet=True)
     page.table(
         ["", ""],
         [
-            ["measurand", f"tip temperature at a bias of {stated.bias_V:.4g} V"],
+            ["measurand", f"{stated.measurand}, at rest"],
             ["probe", calibration.probe.title],
             ["estimate", f"{stated.estimate_K:.1f} K"],
             ["combined standard uncertainty", f"{significant(budget.u)} K"],
@@ -67,8 +67,8 @@ def add_largest(page: Page, stated: TemperatureBudget) -> None:
     _add_rows(
         page,
         budget,
-        f"The uncertainty budget after the GUM (JCGM 100) of {stated.estimate_K:.1f} K at a bias "
-        f"of {stated.bias_V:.4g} V: standard uncertainty {significant(budget.u)} K, {free}"
+        f"The uncertainty budget after the GUM (JCGM 100) of the {stated.measurand}, "
+        f"{stated.estimate_K:.1f} K: standard uncertainty {significant(budget.u)} K, {free}"
         f"k = {budget.coverage_factor():.2f}, expanded uncertainty "
         f"{significant(budget.expanded())} K (95 %). {_linear(stated)}".rstrip(),
         most=_CONTRIBUTIONS,

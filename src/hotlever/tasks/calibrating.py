@@ -53,6 +53,7 @@ def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
         "law": law,
         "priors": parse_priors(request.prior, like),
         "medium": request.medium,
+        "budget_of": request.budget_of,
         "pulse": None if request.pulse is None else parse_timing(request.pulse),
         "samples": request.samples if request.posterior else 0,
     }

@@ -205,6 +205,9 @@ class CalibrateRequest(PlotRequest, LeversRequest):
         "levers where they are compared, as 8V or 2mW; the highest bias that all of them were "
         "measured at if left out.",
     )
+    budget_of: str = option(
+        "tip", help="What the uncertainty budget is of: tip, or apex of a tip in contact."
+    )
     table: File = written(
         (".csv",),
         help="Write the table for an instrument, or for its pulses, to this CSV file; with several "
@@ -221,6 +224,7 @@ class CalibrateRequest(PlotRequest, LeversRequest):
 
     def check(self) -> None:
         """Refuse what does not go together, and a medium that does not exist."""
+        from hotlever.calibration.uncertainty_budget import check_budget_of
         from hotlever.estimation.options import UNKNOWN_MEDIUM
 
         super().check()
@@ -228,6 +232,7 @@ class CalibrateRequest(PlotRequest, LeversRequest):
             self.refuse(["samples"], "goes with --posterior")
         if self.table is None and not self.several:
             self.refuse(["table_by", "table_step"], "goes with --table")
+        check_budget_of(self.budget_of)
         sources = {"--fit": self.fit, "--probe": self.probe, "--power-law": self.power_law}
         stated = [name for name, path in sources.items() if path is not None]
         if len(stated) > 1:
