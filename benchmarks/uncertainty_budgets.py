@@ -29,6 +29,7 @@ from hotlever.estimation.experiment import TIP
 from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser
+from hotlever.estimation.options import SearchOptions
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import draw, measure
@@ -37,6 +38,8 @@ from hotlever.types import Array
 from little_known_levers import little_known_lever
 from problems import table
 
+#: Data keep the errors that they had in the first estimate.
+_WEIGHTS_STAY = SearchOptions(scatter_rounds=0)
 #: Draws of draws, for the standard error of what the referee says.
 _BOOTSTRAPS = 200
 
@@ -77,7 +80,8 @@ def re_estimated(estimate: Estimate, bias_V: float, draws: int, rng: Generator) 
     for errors in rng.normal(size=(draws, jacobian.shape[0])):
         off = _OfDrawnErrors(own.residuals, estimate.probe, own.names, own.varied, own.prior)
         off.errors = errors
-        anew = Optimiser(off, experiment, near=estimate.prediction).solve(estimate.probe)
+        search = Optimiser(off, experiment, _WEIGHTS_STAY, near=estimate.prediction)
+        anew = search.solve(estimate.probe)
         tip_K = tip_of.predict(anew.probe, anew.prediction).values[TIP, 0]
         changes.append((by_errors @ errors, tip_K - predicted.values[TIP, 0]))
     return np.array(changes)
