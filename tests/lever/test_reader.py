@@ -16,7 +16,14 @@ from hotlever.datasets import csv_text
 from hotlever.errors import InputError
 from hotlever.figures import figure_of
 from hotlever.lever.lever import COARSE
-from hotlever.lever.noise import NoiseOptions, johnson, of_resistors, of_temperature, per_hooge
+from hotlever.lever.noise import (
+    NoiseOptions,
+    johnson,
+    johnson_without_feedback,
+    of_resistors,
+    of_temperature,
+    per_hooge,
+)
 from hotlever.lever.reader import Reader, at_distance, best_bias, over_surface, rows_of
 from hotlever.lever.response import Response
 from hotlever.lever.space import TIP
@@ -135,6 +142,9 @@ def test_johnson_noise_of_a_resistor_of_many_temperatures():
     expected = 4e3 * Boltzmann * (fields.T * heat).sum() / state.current_mA**2
     ohm = 1e3 * state.lever_V / state.current_mA
     assert johnson(found) * (1.0 + ohm / 1e7) ** 2 == pytest.approx(expected, rel=1e-3)
+    assert johnson_without_feedback(lever.equations, state.x, state.current_mA) == pytest.approx(
+        expected, rel=1e-9
+    )
     assert 300.0 < (fields.T * heat).sum() / heat.sum() < 850.0
 
 

@@ -121,6 +121,16 @@ def johnson(response: Response) -> float:
     return _FOUR_K * _integral(equations, fields_.T * properties.sigma * dot(weight, weight))
 
 
+def johnson_without_feedback(equations: LeverEquations, x: Array, current_mA: float) -> float:
+    """Return the density (V²/Hz) of the Johnson noise of the lever as a resistor alone.
+
+    That is what it shows with no circuit about it, faster than its temperature follows.
+    """
+    fields_, properties, _ = equations.at(x)
+    heat = properties.sigma * dot(fields_.grad_V, fields_.grad_V)
+    return _FOUR_K * _integral(equations, fields_.T * heat) / current_mA**2
+
+
 def of_resistors(response: Response) -> float:
     """Return the density (V²/Hz) of the Johnson noise of the circuit's resistors."""
     terminals, circuit = response.equations.terminals, response.equations.circuit

@@ -15,8 +15,11 @@ from hotlever.contact.cone import cold_resistance
 from hotlever.contact.spreading import contact_resistance
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
+from hotlever.lever.noise import johnson_without_feedback
+from hotlever.lever.reader import Reader
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.materials.air import thermal_conductivity_of_air
+from hotlever.materials.silicon import conductivity_low_doped
 from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
 from hotlever.probe import Probe
 from hotlever.probe.tip import EXAMPLE
@@ -24,6 +27,8 @@ from hotlever.raman import anharmonic
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
 _PER_K_PER_W, _ROOM_K = 1e-3, 300.0
+#: To either side of a temperature, for how the resistance changes there (K).
+_STEP_K = 1.0
 #: mW/(µm² K) to W/(m² K).
 _PER_AREA = 1e9
 #: Unit of what lies between zero and one.
@@ -98,6 +103,42 @@ def resistance_ratio(probe: Probe, *, power_mW: float, from_mW: float) -> float:
 def _reaching(lever: Lever, power_mW: float) -> Branch:
     branch = lever.branch_past_knee()
     return branch if branch.highest_power_mW >= power_mW else lever.branch()
+
+
+def johnson_noise(probe: Probe, *, tip_K: float) -> float:
+    """Johnson noise of the lever's resistance, faster than its temperature follows."""
+    return _johnson_nV(Lever(probe, COARSE).branch(tip_K), tip_K)
+
+
+def temperature_resolution(probe: Probe, *, tip_K: float) -> float:
+    """Johnson noise over what the lever's voltage shows of the tip temperature at a current."""
+    branch = Lever(probe, COARSE).branch(tip_K + _STEP_K)
+    around = tip_K + np.array([-_STEP_K, _STEP_K])
+    kohm_per_K = np.diff(branch.lever_voltage(around) / branch.current(around)) / (2.0 * _STEP_K)
+    mV_per_K = 1e3 * branch.current(tip_K) * kohm_per_K[0]
+    return _johnson_nV(branch, tip_K) / abs(float(mV_per_K))
+
+
+def _johnson_nV(branch: Branch, tip_K: float) -> float:
+    """Return the density of the Johnson noise (nV/√Hz)."""
+    state, current = branch.states(np.atleast_1d(branch.u_at(tip_K))), branch.current(tip_K)
+    density = johnson_without_feedback(branch.equations, state, float(current))
+    return float(1e9 * np.sqrt(density))
+
+
+def voltage_by_distance(probe: Probe, *, tip_K: float) -> float:
+    """Change of the lever's voltage with the distance to a surface, at a bias."""
+    lever = Lever(probe, COARSE)
+    branch = lever.branch(tip_K)
+    bias = float(branch.bias(tip_K, probe.circuit))
+    signal = Reader(probe).signal(lever, branch, float(branch.u_at(tip_K)), bias)
+    return abs(signal.dV_dz_V_per_um)
+
+
+def resistivity_ratio(*, n_d: float, p: float, temperature_K: float, from_K: float) -> float:
+    """Resistivity of n-doped silicon at a temperature over that at another."""
+    cold, hot = conductivity_low_doped([from_K, temperature_K], n_d, p)[0]
+    return float(cold / hot)
 
 
 def air_coefficient(probe: Probe) -> float:
@@ -181,6 +222,10 @@ QUANTITIES = {
         (share_into_air, _SHARE),
         (time_constant, "µs"),
         (resistance_ratio, "1"),
+        (johnson_noise, "nV/√Hz"),
+        (temperature_resolution, "µK/√Hz"),
+        (voltage_by_distance, "mV/nm"),
+        (resistivity_ratio, "1"),
         (air_coefficient, "W/(m² K)"),
         (layer_conductivity, "W/(m K)"),
         (raman_softening, "cm⁻¹"),
