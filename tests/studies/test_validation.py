@@ -6,8 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from scipy.constants import Boltzmann
 
 from hotlever.errors import InputError
+from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
+from hotlever.probe import Probe
 from hotlever.studies.validation.case import Case, cases, sought
 from hotlever.studies.validation.prediction import (
     COLUMNS,
@@ -17,7 +21,7 @@ from hotlever.studies.validation.prediction import (
     computed,
     predict,
 )
-from hotlever.studies.validation.quantities import QUANTITIES
+from hotlever.studies.validation.quantities import QUANTITIES, johnson_noise
 
 HEAD = """quantity = "{quantity}"
 group = "a group"
@@ -62,10 +66,16 @@ def test_every_case_is_complete(published):
     assert all(len(row) == 3 and all(row) for row in sought())
 
 
-@pytest.mark.parametrize("name", ["paris-glass-contact", "illinois-share-on-quartz"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("paris-glass-contact", "illinois-share-on-quartz", "philips-resistance"),
+        "bulk-at-425-celsius",
+    ],
+)
 def test_cheap_cases_predict_what_was_written_down(published, name):
     now, before = predict(published[name]), stored(published[name])
-    assert now.missing == 0
+    assert (now.impossible, now.silent) == (0, 0)
     assert now.median == pytest.approx(before.median, rel=1e-3)
     assert now.spread == pytest.approx(before.spread, rel=1e-2)
 
@@ -85,6 +95,14 @@ def test_evenly_warm_lever_gives_what_a_strip_gives(published):
     length, width = 200.0, 30.0
     strip = 2 * math.pi * 0.0255 * length / math.log(4 * length / width) / (2 * length * width)
     assert 1.0 < computed(case) / (1e6 * strip) < 1.35
+
+
+def test_noise_of_a_cold_lever_is_that_of_its_resistance():
+    probe = Probe.reference()
+    branch = Lever(probe, COARSE).branch(294.0)
+    ohm = 1e3 * float(branch.lever_voltage(294.0) / branch.current(294.0))
+    cold = johnson_noise(probe, tip_K=294.0)
+    assert cold == pytest.approx(1e9 * math.sqrt(4.0 * Boltzmann * 293.0 * ohm), rel=2e-3)
 
 
 def test_shares_stay_between_zero_and_one():

@@ -46,4 +46,4 @@ from hotlever.figures.raman import one_spectrum, raman_check, thermometry
 from hotlever.figures.reader import reader_overview
 from hotlever.figures.style import save_figure
 from hotlever.figures.transient import harmonics, history_overview, small_signals
-from hotlever.figures.validation import predicted_and_published
+from hotlever.figures.validation import predicted_and_published, residuals_of_current

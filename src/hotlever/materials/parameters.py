@@ -386,7 +386,7 @@ def scale_of(name: str) -> float:
 
 
 def sentence(text: str) -> str:
-    """Make a note a sentence; names of parameters keep their small letters.
+    """Make a note a sentence; names of parameters, and k, keep their small letters.
 
     Examples
     --------
@@ -394,4 +394,5 @@ def sentence(text: str) -> str:
     ('The levers differ.', 'n_d is not determined.')
     """
     first = re.split(r"[^\w.]", text, maxsplit=1)[0]
-    return f"{text if is_of_material(first) else text[0].upper() + text[1:]}."
+    is_symbol = first == "k" or is_of_material(first)
+    return f"{text if is_symbol else text[0].upper() + text[1:]}."

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import resources
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,6 +14,7 @@ from hotlever import figures
 from hotlever.calibration import Calibration, calibrate
 from hotlever.calibration.summary import calibration_parts
 from hotlever.materials.parameters import sentence
+from hotlever.probe import Probe
 from hotlever.report.page import Page
 from hotlever.steps import each
 from hotlever.studies.validation.case import Case, cases, sought
@@ -23,9 +26,21 @@ from hotlever.studies.validation.prediction import (
     computed,
     predict,
 )
+from hotlever.text import value_with_error
 from hotlever.types import Array, Progress
 
 _CURVE = "uiuc-lever"
+#: What else the lever of the curve may be, and its changes.
+_OTHER_LEVERS: dict[str, dict[str, Any]] = {
+    "as assumed, a U-shape of 120 µm in air": {},
+    "in vacuum": {"medium": "vacuum"},
+    "1.5 µm above a cold surface": {"surface_gap_um": 1.5},
+    "twice as long": {"length_um": 240.0},
+}
+#: A band is narrow if its ends are within this factor of the median.
+_NARROW = 2.0
+#: Shares of their prior's spread up to which parameters are told from data.
+_LEARNED = 0.8
 #: Change of a prediction since it was written down that is told, in its own standard deviations.
 _MOVED = 0.2
 #: Reading error of the curve (µA).
@@ -49,7 +64,10 @@ def validation_page(
         See `hotlever.studies.validation.prediction.comparison`.
     """
     every = cases()
-    now = [predict(case, within) for case in each(every, progress)]
+    steps: list[Callable[[], Any]] = [partial(predict, case, within) for case in every]
+    steps += [partial(_calibrated, changes) for changes in _OTHER_LEVERS.values()]
+    results = [step() for step in each(steps, progress)]
+    now, calibrations = results[: len(every)], results[len(every) :]
     compared = comparison(every, now)
     page = Page("Published numbers, predicted and compared", _summary(compared))
     page.figure(
@@ -68,7 +86,7 @@ def validation_page(
     _moved(page, every, now)
     _outside(page, every, compared)
     _bases(page, every)
-    _real_curve(page)
+    _real_curve(page, calibrations)
     page.heading("Sought in vain")
     page.table(("source", "wanted", "tried"), sought(), prose=True)
     return page, compared
@@ -78,20 +96,30 @@ def _summary(compared: xr.Dataset) -> str:
     verdicts, count = compared.verdict.values.tolist(), compared.sizes["case"]
     groups = len(set(compared.group.values.tolist()))
     outside = verdicts.count(OUTSIDE)
+    narrow = (compared.high_95 <= _NARROW * compared.predicted) & (
+        _NARROW * compared.low_95 >= compared.predicted
+    )
     return (
         f"{count} published numbers of {groups} groups. Of each is known what its source states; "
         "what it does not state is assumed, with a spread, and a band follows by drawing "
         f"{DRAWS} times from these priors. {verdicts.count('inside 68 %')} of the published values "
         "are within 68 % of what prediction and published error leave, "
-        f"{count - outside} within 95 %, {outside} outside; where bands are right, 5 % would be. "
+        f"{count - outside} within 95 %, {outside} outside; where bands are right "
+        f"{0.68 * count:.0f} and {0.95 * count:.0f} would be within. {narrow.sum().item()} of the "
+        f"bands are narrow, within a factor of {_NARROW:g} of the median: these test the model, "
+        "the others that it is not far off. "
         "Those who wrote the inputs had read the abstracts and so were no strangers to the "
         "published values; the bands follow from the inputs alone."
     )
 
 
-def _number(value: float) -> str:
-    """Return a number of three digits: 1060, 2.54e+07."""
-    return f"{float(f'{value:.3g}'):g}"
+def _number(value: float, digits: int = 3) -> str:
+    """Return a number of some digits: 1060, 2.54e+07."""
+    return f"{float(f'{value:.{digits}g}'):g}"
+
+
+def _unbroken(text: str) -> str:
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _row(case: Case, row: xr.Dataset) -> list[str]:
@@ -99,22 +127,22 @@ def _row(case: Case, row: xr.Dataset) -> list[str]:
     return [
         case.name,
         case.asked.meaning,
-        case.asked.unit,
-        f"{_number(row.predicted.item())} ({low} to {high})",
-        f"{_number(row.published.item())} ± {row.published_error.item():.2g}",
-        row.verdict.item().replace(" %", "\N{NO-BREAK SPACE}%"),
+        _unbroken(case.asked.unit),
+        f"{_number(row.predicted.item())} {_unbroken(f'({low} to {high})')}",
+        _unbroken(f"{_number(row.published.item(), 4)} ± {_number(row.published_error.item(), 2)}"),
+        _unbroken(row.verdict.item()),
     ]
 
 
 def _moved(page: Page, every: Sequence[Case], now: Sequence[Prediction]) -> None:
     """Say which draws did not count, and where a prediction is another than was written down."""
-    lost = [f"{today.missing} for {case.name}" for case, today in zip(every, now, strict=True)]
-    lost = [text for text in lost if not text.startswith("0 ")]
-    if lost:
-        page.text(
-            f"Of the {DRAWS} draws some are left out, which are no lever that can be drawn, or one "
-            f"that does not show the quantity: {', '.join(lost)}."
-        )
+    for draws, are in (
+        ("impossible", "are no lever that can be drawn, or beyond what a parameter may be"),
+        ("silent", "do not show the quantity"),
+    ):
+        lost = [(getattr(today, draws), case.name) for case, today in zip(every, now, strict=True)]
+        text = ", ".join(f"{count} for {name}" for count, name in lost if count)
+        page.text(f"Of the {DRAWS} draws these are left out as they {are}: {text or 'none'}.")
     told = []
     for case, today in zip(every, now, strict=True):
         assert case.prediction is not None
@@ -161,52 +189,83 @@ def _bases(page: Page, every: Sequence[Case]) -> None:
     )
 
 
-def _real_curve(page: Page) -> None:
-    """Calibrate the one real I-V curve of the examples."""
-    page.heading("A real curve")
+def _calibrated(changes: dict[str, Any]) -> Calibration:
+    """Calibrate the one real I-V curve of the examples, with a lever that is other than assumed."""
     folder = resources.files("hotlever") / "examples"
     with (
         resources.as_file(folder / f"{_CURVE}.csv") as data,
-        resources.as_file(folder / f"{_CURVE}.toml") as probe,
+        resources.as_file(folder / f"{_CURVE}.toml") as path,
     ):
-        calibration = calibrate(data, probe=probe)
+        probe = Probe.from_file(path)
+        return calibrate(data, probe=probe.with_(**changes) if changes else probe)
+
+
+def _real_curve(page: Page, calibrations: Sequence[Calibration]) -> None:
+    """Show what the real curve says of its lever, and what to believe of that."""
+    page.heading("A real curve")
+    calibration = calibrations[0]
     off = _differences(calibration)
     last = calibration.table.isel(bias=-1)
-    worst, biggest = np.abs(off).max(), np.sqrt(np.mean(off**2))
+    tips = [other.table.tip_K[-1].item() for other in calibrations]
     page.text(
         "The I-V curve of a silicon lever of the University of Illinois, digitised from a "
         f"published picture, {off.size} points. Lever, surroundings and temperatures are not "
         "stated with it. Calibrated with what is usual of such levers, the model follows the "
-        f"current to {biggest:.1f} µA (rms), at worst {worst:.1f} µA; reading it off was good to "
-        f"{_READ_UA:g} µA. At the last point, {last.power_mW.item():.2f} mW, the tip is at "
-        f"{last.tip_K.item():.0f} K, with 95 % from {last.tip_low_K.item():.0f} to "
+        f"current to {_rms(off):.1f} µA (rms), at worst {np.abs(off).max():.1f} µA; reading it off "
+        f"was good to {_READ_UA:g} µA. At the last point, {last.power_mW.item():.2f} mW, the tip "
+        f"is at {last.tip_K.item():.0f} K, with 95 % from {last.tip_low_K.item():.0f} to "
         f"{last.tip_high_K.item():.0f} K."
     )
-    page.text(
-        "What to believe: the shape. The laws of silicon, with a doping that the data find, are "
-        f"{'as close to' if worst < 2 * _READ_UA else 'farther from'} this curve "
-        f"{'as' if worst < 2 * _READ_UA else 'than'} it could be read. What not to believe without "
-        "more: the temperature. Nothing in the picture is a thermometer, and the band holds for "
-        "levers like the assumed one, in air and far from a surface. The knee lies beyond the "
-        "measured range, and is an extrapolation."
-    )
-    page.table(
-        ("V_b (V)", "I_h measured (mA)", "measured less calibrated (µA)"),
-        [
-            [f"{bias:.2f}", f"{current:.4f}", f"{difference:+.1f}"]
-            for bias, current, difference in zip(
-                calibration.measurement.bias_V, calibration.measurement.current_mA, off, strict=True
-            )
-        ],
-    )
-    for text in calibration_parts(calibration).before:
-        page.text(sentence(text))
     page.figure(
         "real_curve",
         figures.calibration_curves(calibration),
         "Tip temperature of the real lever with its 95 % band, its I-V curve, and the standard "
         "error by source.",
     )
+    page.figure(
+        "real_curve_residuals",
+        figures.residuals_of_current(calibration.measurement.bias_V, off, _READ_UA),
+        "Measured less calibrated currents, and the error of reading them off (grey).",
+    )
+    for text in calibration_parts(calibration).before:
+        page.text(sentence(text))
+    page.table(
+        ("parameter", "assumed", "by the curve"),
+        [
+            [name, use.stated, value_with_error(use.posterior_value, use.posterior_spread)]
+            for name, use in calibration.priors.items()
+            if use.left < _LEARNED
+        ],
+        "What the curve tells of the lever: parameters whose spread it lessens by a fifth or more. "
+        "All others stay what was assumed.",
+    )
+    page.table(
+        ("lever", "rms of the current (µA)", "tip at the last point (K)", "95 % (K)"),
+        [
+            [
+                name,
+                f"{_rms(_differences(other)):.1f}",
+                f"{row.tip_K.item():.0f}",
+                f"{row.tip_low_K.item():.0f} to {row.tip_high_K.item():.0f}",
+            ]
+            for name, other in zip(_OTHER_LEVERS, calibrations, strict=True)
+            for row in [other.table.isel(bias=-1)]
+        ],
+        "The same curve, calibrated as that of other levers.",
+    )
+    page.text(
+        "What to believe: the laws of silicon, with a doping that the data find, follow this curve "
+        "as closely as it could be read. All of these levers do, so that it does not tell them "
+        "apart: neither length nor surroundings can be had from it. The temperature is nearly the "
+        f"same in all, {min(tips):.0f} to {max(tips):.0f} K, since it follows from how far the "
+        "resistance rose. What not to believe without more: that it is right to fewer kelvin than "
+        "the band is wide. Nothing in the picture is a thermometer, and the laws are common to all "
+        "rows. The knee lies beyond the measured range, and is an extrapolation."
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _differences(calibration: Calibration) -> Array:

@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.stats import norm, qmc
 
-from hotlever.errors import ComputationError, HotleverError
+from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.probe.priors import Prior, default_priors
 from hotlever.steps import each
 from hotlever.studies.validation.case import Case, Stored
@@ -46,8 +46,8 @@ class Prediction:
     centre, spread : float
         Its mean and standard deviation.
     is_share : bool
-    missing : int
-        Draws of `DRAWS` that are no lever, or one that does not show the quantity.
+    impossible, silent : int
+        Draws of `DRAWS` that are no lever, and that are one which does not show the quantity.
 
     Examples
     --------
@@ -61,13 +61,17 @@ class Prediction:
     centre: float
     spread: float
     is_share: bool = False
-    missing: int = 0
+    impossible: int = 0
+    silent: int = 0
 
     @classmethod
-    def of(cls, values: ArrayLike, is_share: bool, missing: int = 0) -> Prediction:
+    def of(
+        cls, values: ArrayLike, is_share: bool, impossible: int = 0, silent: int = 0
+    ) -> Prediction:
         """Return the prediction that draws of the quantity make."""
         transformed = _transformed(np.asarray(values), is_share)
-        return cls(float(transformed.mean()), float(transformed.std(ddof=1)), is_share, missing)
+        centre, spread = float(transformed.mean()), float(transformed.std(ddof=1))
+        return cls(centre, spread, is_share, impossible, silent)
 
     @classmethod
     def as_stored(cls, stored: Stored, is_share: bool) -> Prediction:
@@ -148,7 +152,7 @@ def predict(case: Case, progress: Progress | None = None) -> Prediction:
     probe, (_, uncertain) = case.probe(), case.numbers()
     priors: dict[str, Prior] = {**({} if probe is None else default_priors(probe)), **uncertain}
     draws = norm.ppf(qmc.LatinHypercube(len(priors), seed=_SEED).random(DRAWS))
-    values = []
+    values, impossible = [], 0
     for draw in each(list(draws), progress):
         drawn = {
             name: prior.at(float(deviation))
@@ -156,6 +160,8 @@ def predict(case: Case, progress: Progress | None = None) -> Prediction:
         }
         try:
             values.append(computed(case, drawn))
+        except InputError:
+            impossible += 1
         except HotleverError:
             continue
     missing = DRAWS - len(values)
@@ -164,7 +170,7 @@ def predict(case: Case, progress: Progress | None = None) -> Prediction:
         raise ComputationError(
             f"{case.name}: {missing} of {DRAWS} draws from the priors show no {case.quantity}"
         )
-    return Prediction.of(values, case.asked.is_share, missing)
+    return Prediction.of(values, case.asked.is_share, impossible, missing - impossible)
 
 
 def comparison(cases: list[Case], now: list[Prediction]) -> xr.Dataset:

@@ -141,14 +141,20 @@ def resistivity_ratio(*, n_d: float, p: float, temperature_K: float, from_K: flo
     return float(cold / hot)
 
 
-def air_coefficient(probe: Probe) -> float:
-    """Heat that an evenly warm lever gives to the air, by area of both faces and rise."""
+def air_coefficient(probe: Probe, *, decay_um: float = np.inf) -> float:
+    """Heat that a warm strip gives to the air, by area of both faces and mean rise.
+
+    It is evenly warm, or the less so, by the decay length, the farther behind its front.
+    """
     air = Lever(probe.in_medium("air"), COARSE).space.air
     base_K = probe.circuit.base_temperature_K
     kappa = PER_CM_TO_MILLI_PER_UM * float(thermal_conductivity_of_air(base_K)[0])
-    heat, _ = air.heat(np.full((len(air.operator.sites), 1), kappa))
+    behind = air.operator.sites[:, :1].max() - air.operator.sites[:, :1]
+    heat, _ = air.heat(kappa * np.exp(-behind / decay_um))
+    mean_rise = np.exp(-np.linspace(0.0, behind.max(), 1001) / decay_um).mean()
     area = sum(region.area for region in probe.layout().regions)
-    return _PER_AREA * float(heat[0]) * probe.surroundings.gas_conductivity / (2.0 * area)
+    gas = probe.surroundings.gas_conductivity
+    return _PER_AREA * float(heat[0]) * gas / (2.0 * area * float(mean_rise))
 
 
 def layer_conductivity(*, thickness_um: float, temperature_K: float, scale: float) -> float:
