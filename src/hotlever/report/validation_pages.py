@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from importlib import resources
 from typing import Any
 
@@ -15,8 +14,8 @@ from hotlever.calibration import Calibration, calibrate
 from hotlever.calibration.summary import calibration_parts
 from hotlever.materials.parameters import sentence
 from hotlever.probe import Probe
+from hotlever.processes import PROCESSORS, local_processes
 from hotlever.report.page import Page
-from hotlever.steps import each
 from hotlever.studies.validation.case import Case, cases, sought
 from hotlever.studies.validation.prediction import (
     DRAWS,
@@ -47,15 +46,13 @@ _MOVED = 0.2
 _READ_UA = 4.0
 
 
-def validation_page(
-    progress: Progress | None = None, within: Progress | None = None
-) -> tuple[Page, xr.Dataset]:
+def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]:
     """Predict all published numbers, and compare them.
 
     Parameters
     ----------
-    progress, within : callable, optional
-        Called with the cases done and their number, and with the draws of a case.
+    progress : callable, optional
+        Called with the cases and curves done and their number.
 
     Returns
     -------
@@ -64,9 +61,10 @@ def validation_page(
         See `hotlever.studies.validation.prediction.comparison`.
     """
     every = cases()
-    steps: list[Callable[[], Any]] = [partial(predict, case, within) for case in every]
-    steps += [partial(_calibrated, changes) for changes in _OTHER_LEVERS.values()]
-    results = [step() for step in each(steps, progress)]
+    tasks: list[tuple[Any, ...]] = [(predict, case) for case in every]
+    tasks += [(_calibrated, changes) for changes in _OTHER_LEVERS.values()]
+    with local_processes(PROCESSORS) as (run, _):
+        results = run(_done, tasks, progress)
     now, calibrations = results[: len(every)], results[len(every) :]
     compared = comparison(every, now)
     page = Page("Published numbers, predicted and compared", _summary(compared))
@@ -187,6 +185,10 @@ def _bases(page: Page, every: Sequence[Case]) -> None:
         ],
         prose=True,
     )
+
+
+def _done(function: Callable[[Any], Any], argument: Any) -> Any:
+    return function(argument)
 
 
 def _calibrated(changes: dict[str, Any]) -> Calibration:

@@ -68,8 +68,8 @@ def validate(reporter: Reporter, request: ValidateRequest) -> None:
     from hotlever.studies.validation.prediction import COLUMNS
 
     outputs = request.outputs()
-    with reporter.progress_bars("validate", "draws") as (update, within):
-        page, compared = validation_page(update, within)
+    with reporter.progress("validate") as update:
+        page, compared = validation_page(update)
     with outputs.together():
         written = page.write(request.output)
         table = compared.to_dataframe()[list(COLUMNS)]
