@@ -8,7 +8,7 @@ import numpy as np
 from nicegui import ui
 
 from hotlever.app.pages.frame import caption
-from hotlever.app.pages.plots import INK, axes, filled, plotted, short, side_by_side
+from hotlever.app.pages.plots import INK, axes, filled, outlined, plotted, short, side_by_side
 from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 
@@ -97,11 +97,8 @@ class ContactPlots:
             corners = [(-width, top), (width, top), (width, bottom), (-width, bottom)]
             shapes.append(filled(corners, _FILL.format(0.12 + 0.16 * (number % 2))))
         for (corners, _), colour in zip(drawn.pieces, colours, strict=True):
-            red, green, blue, _ = map(int, colour)
-            shapes.append(filled(corners, f"rgb({red},{green},{blue})"))
-        for line in drawn.outlines:
-            path = "M" + "L".join(f"{x:.4g},{y:.4g}" for x, y in line)
-            shapes.append({"type": "path", "path": path, "line": {"color": INK, "width": 1.5}})
+            shapes.append(filled(corners, colour))
+        shapes += [outlined(line, closed=False) for line in drawn.outlines]
         names = [
             _words(
                 -0.97 * width,

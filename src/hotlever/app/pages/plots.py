@@ -51,9 +51,27 @@ def side_by_side() -> ui.element:
     return ui.element("div").classes("w-full grid gap-2").style(columns)
 
 
-def filled(corners: Sequence[tuple[float, float]], colour: str) -> dict[str, Any]:
-    """Return a polygon of a plot, without an outline."""
-    return {"type": "path", "path": _closed(corners), "fillcolor": colour, "line": {"width": 0}}
+def filled(corners: Sequence[tuple[float, float]], colour: str | Sequence[int]) -> dict[str, Any]:
+    """Return a polygon of a plot, without an outline; its colour may be bytes of red, green, blue.
+
+    Examples
+    --------
+    >>> filled([(0, 0), (1, 0), (0, 1)], (255, 0, 0, 255))["fillcolor"]
+    'rgb(255,0,0)'
+    """
+    if not isinstance(colour, str):
+        colour = f"rgb({','.join(str(int(part)) for part in colour[:3])})"
+    return {"type": "path", "path": _path(corners), "fillcolor": colour, "line": {"width": 0}}
+
+
+def outlined(corners: Any, *, closed: bool = True) -> dict[str, Any]:
+    """Return the line through some corners of a plot."""
+    path = _path(corners, "Z" if closed else "")
+    return {"type": "path", "path": path, "line": {"color": INK, "width": 1.5}}
+
+
+def _path(corners: Any, end: str = "Z") -> str:
+    return "M" + "L".join(f"{x:.5g},{y:.5g}" for x, y in corners) + end
 
 
 class MeasuredPlots:
@@ -182,6 +200,10 @@ class LivePlots:
             profile = axes("along the current (µm)", "temperature (K)", 270, normal="xy")
             alt = "Temperature along the current from the supply through the tip to the ground"
             self._profile = plotted([line, other], profile, alt)
+        self._by_columns = {
+            self._iv: ("lever_V", "current_mA"),
+            self._tp: ("power_mW", "tip_K"),
+        }
         # before its first plot a browser takes whole figures only
         self._ready: set[ui.plotly] = set()
         for plot in (self._heat, self._iv, self._tp, self._profile):
@@ -195,19 +217,9 @@ class LivePlots:
         """Draw an answer of the live lever; what is as before is not sent again."""
         curves, now = answer["curves"], answer["now"]
         knee = curves["knee"] or dict.fromkeys(("lever_V", "current_mA", "power_mW", "tip_K"))
-        same = self._curves is not None and _same(self._curves, curves)
-        for plot, x, y in (
-            (self._iv, "lever_V", "current_mA"),
-            (self._tp, "power_mW", "tip_K"),
-        ):
-            here = {"x": [now[x]], "y": [now[y]]}
-            if same:
-                self._move(plot, 2, here)
-            else:
-                plot.figure["data"][0] |= {"x": short(curves[x]), "y": short(curves[y])}
-                plot.figure["data"][1] |= {"x": [knee[x]], "y": [knee[y]]}
-                plot.figure["data"][2] |= here
-                plot.update()
+        for plot, (x, y) in self._by_columns.items():
+            plot.figure["data"][1] |= {"x": [knee[x]], "y": [knee[y]]}
+        same = self._draw(0, 2, curves, now, self._curves)
         line = {"x": short(answer["along"]), "y": short(now["line"])}
         if same and np.array_equal(self._along, answer["along"]):
             self._move(self._profile, 0, line)
@@ -225,20 +237,27 @@ class LivePlots:
         """Draw an answer of the lever beside; nothing of it if there is none."""
         if answer is None and self._beside is None:
             return
-        curves = {} if answer is None else answer["curves"]
-        now = {} if answer is None else answer["now"]
-        same = answer is not None and self._beside is not None and _same(self._beside, curves)
-        for plot, x, y in ((self._iv, "lever_V", "current_mA"), (self._tp, "power_mW", "tip_K")):
-            there = {"x": [now.get(x)], "y": [now.get(y)]}
-            if same:
-                self._move(plot, 4, there)
-                continue
-            plot.figure["data"][3] |= {"x": short(curves.get(x, [])), "y": short(curves.get(y, []))}
-            plot.figure["data"][4] |= there
-            plot.update()
+        curves, now = (answer["curves"], answer["now"]) if answer else ({}, {})
+        self._draw(3, 4, curves, now, self._beside)
         line = {"x": short(answer["along"]), "y": short(now["line"])} if answer else {}
         self._move(self._profile, 1, line or {"x": [], "y": []})
-        self._beside = curves if answer else None
+        self._beside = curves or None
+
+    def _draw(
+        self, line: int, dot: int, curves: dict[str, Any], now: dict[str, Any], before: Any
+    ) -> bool:
+        """Draw curves and a state on them as traces; return whether only the state has moved."""
+        same = bool(before and curves) and _same(before, curves)
+        for plot, (x, y) in self._by_columns.items():
+            here = {"x": [now.get(x)], "y": [now.get(y)]}
+            if same:
+                self._move(plot, dot, here)
+            else:
+                drawn = {"x": short(curves.get(x, [])), "y": short(curves.get(y, []))}
+                plot.figure["data"][line] |= drawn
+                plot.figure["data"][dot] |= here
+                plot.update()
+        return same
 
     def _show_map(
         self, box: list[float], outline: Any, scale: tuple[float, float], picture: bytes
@@ -257,10 +276,7 @@ class LivePlots:
         figure["layout"]["xaxis"]["range"] = [left, right]
         figure["layout"]["yaxis"]["range"] = [bottom, top]
         # cold legs are as dark as a dark page, the hottest places nearly as light as a light one
-        figure["layout"]["shapes"] = [
-            {"type": "path", "path": _closed(ring), "line": {"color": INK, "width": 1.5}}
-            for ring in outline
-        ]
+        figure["layout"]["shapes"] = [outlined(ring) for ring in outline]
         figure["data"][0]["marker"] |= {"cmin": scale[0], "cmax": scale[1]}
         self._heat.update()
 
@@ -282,10 +298,6 @@ def _colours() -> list[list[Any]]:
 
     shares = np.linspace(0.0, 1.0, 32)
     return [[share, to_hex(colormaps[HEAT](share))] for share in shares.tolist()]
-
-
-def _closed(ring: Sequence[tuple[float, float]]) -> str:
-    return "M" + "L".join(f"{x:.5g},{y:.5g}" for x, y in ring) + "Z"
 
 
 def _range(values: list[float]) -> list[float]:

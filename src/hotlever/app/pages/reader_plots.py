@@ -8,7 +8,7 @@ import numpy as np
 from nicegui import ui
 
 from hotlever.app.pages.frame import caption
-from hotlever.app.pages.plots import INK, axes, filled, plotted, short, side_by_side
+from hotlever.app.pages.plots import INK, axes, filled, outlined, plotted, short, side_by_side
 from hotlever.colours import BLUE, VERMILION
 
 _ABOUT = (
@@ -74,10 +74,9 @@ class ReaderPlots:
         shapes = []
         edges = np.linspace(start, end, len(answer["colours"]) + 1)
         for left, colour in zip(edges.tolist(), answer["colours"], strict=False):
-            red, green, blue, _ = map(int, colour)
             # the next one is drawn over what is beyond, so that no gap shows between them
             box = [(left, 0.0), (end, 0.0), (end, thick), (left, thick)]
-            shapes.append(filled(box, f"rgb({red},{green},{blue})"))
+            shapes.append(filled(box, colour))
         outline = [(start, 0.0), (end, 0.0), (end, thick), (start, thick)]
         if answer["tip"] is not None:
             height, radius = answer["tip"]
@@ -91,8 +90,7 @@ class ReaderPlots:
         bottom = low - _ABOVE * (thick - low)
         corners = [*zip(sides.tolist(), surface.tolist(), strict=True)]
         shapes.append(filled([*corners, (sides[1], bottom), (sides[0], bottom)], _SURFACE))
-        path = "M" + "L".join(f"{x:.5g},{y:.5g}" for x, y in outline) + "Z"
-        shapes.append({"type": "path", "path": path, "line": {"color": INK, "width": 1.5}})
+        shapes.append(outlined(outline))
         figure = self._picture.figure
         figure["layout"]["shapes"] = shapes
         figure["layout"]["xaxis"]["range"] = sides.tolist()
