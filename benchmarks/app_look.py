@@ -38,6 +38,10 @@ _NAMED = (
 _MOST_TABS = 200
 #: Milliseconds without a change after which there is nothing more to come.
 _ALL_MS = 500
+#: Whether nothing is being computed or drawn for a page, which may stand still meanwhile.
+_AT_REST = """() => !document.querySelector('.q-spinner')
+    && ![...document.querySelectorAll('[aria-live=polite]')].some(
+        e => /^(starting|moving)|: \\d+ of \\d+$/.test(e.innerText))"""
 #: Milliseconds that a task may take.
 _WORK_MS = 120_000
 
@@ -186,6 +190,7 @@ def look(page: Page, app: App, view: str, folder: Path) -> Look:
 
 def _settle(page: Page) -> None:
     """Wait until there is nothing more to come, with all that can be unfolded open."""
+    page.wait_for_function(_AT_REST, timeout=_WORK_MS)
     stand_still(page, _ALL_MS)
     while page.evaluate(f"({_SCRIPT}).unfolded()"):
         stand_still(page, _ALL_MS)
