@@ -38,6 +38,8 @@ _KEEP_S = 1.0
 _MESSAGES = 100
 #: Seconds after which a page is shown with what it has by then.
 _SOON_S = 1.0
+#: Seconds that a busy machine may take to build a page; an error is shown then in its place.
+_LATE_S = 60.0
 LOCAL = ("127.0.0.1", "localhost", "::1")
 _PAGES = (
     *(StartPage, LeverPage, SimulatePage, ContactPage, ReaderPage, DesignPage),
@@ -119,7 +121,7 @@ def add_pages(session: Session) -> None:
     """Make all pages."""
     serve_pictures()
     for kind in _PAGES:
-        ui.page(f"/{kind.name}")(_page(session, kind.fill))
+        ui.page(f"/{kind.name}", response_timeout=_LATE_S)(_page(session, kind.fill))
 
 
 def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
