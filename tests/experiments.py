@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from hotlever.estimation import Fit, fit
 from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -41,3 +42,9 @@ def on_coarse_meshes() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Lever, "__init__", made_coarse)
         yield
+
+
+def coarse_fit(*given: Any, **options: Any) -> Fit:
+    """Fit on coarse meshes, in the worker processes of a batch too."""
+    with on_coarse_meshes():
+        return fit(*given, **options)

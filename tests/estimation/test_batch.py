@@ -7,14 +7,15 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
-from distributed import LocalCluster
 
+import experiments
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation import FitOptions
 from hotlever.estimation.batch import Batch, fit_many, lever_names
@@ -31,14 +32,24 @@ COMMAND += ("--fix", "a1")
 
 TRUTHS = [0.66, 0.67, 0.68]
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes", "fits_on_coarse_meshes")
+
 
 @pytest.fixture(scope="module")
-def texts(lever: Lever) -> list[str]:
+def fits_on_coarse_meshes() -> Iterator[None]:
+    """Let worker processes fit on coarse meshes as this one does."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hotlever.estimation.batch.fit", experiments.coarse_fit)
+        yield
+
+
+@pytest.fixture(scope="module")
+def texts(coarse: Lever) -> list[str]:
     """Data of levers that differ in c_kappa."""
     made = []
     for c_kappa in TRUTHS:
-        material = lever.probe.material.with_(c_kappa=c_kappa)
-        sweep = lever.with_material(material).sweep(BIAS)
+        material = coarse.probe.material.with_(c_kappa=c_kappa)
+        sweep = coarse.with_material(material).sweep(BIAS)
         rows = zip(BIAS, sweep.current_mA.values, sweep.tip_K.values, strict=True)
         lines = [",".join(map(str, row)) for row in rows]
         made.append("\n".join(["V_b (V),I_h (mA),T_tip (K)", *lines, ""]))
@@ -89,7 +100,7 @@ def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
 
     out = tmp_path / "report" / "fits"
     with pytest.raises(KeyboardInterrupt):
-        fit_many(levers, out, None, OPTIONS, processes=2, progress=stop)
+        fit_many(levers, out, None, OPTIONS, processes=1, progress=stop)
     written = {path: path.read_text() for path in out.iterdir()}
     assert len(written) == 2
     assert workers() == []
@@ -123,6 +134,8 @@ def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
 
 @pytest.mark.slow
 def test_changed_data_options_or_files_are_fitted_anew(levers, tmp_path):
+    from distributed import LocalCluster
+
     cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0")
     with cluster:
         address = cluster.scheduler_address
@@ -142,6 +155,7 @@ def test_changed_data_options_or_files_are_fitted_anew(levers, tmp_path):
 SCHEDULER = """
 import sys, time
 from distributed import LocalCluster
+sys.path.insert(0, sys.argv[1])
 options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "protocol": "tcp"}
 cluster = LocalCluster(dashboard_address='127.0.0.1:0', **options)
 print(cluster.scheduler_address, flush=True)
@@ -169,7 +183,7 @@ def test_a_lost_cluster_is_said_and_what_was_done_is_written(
     monkeypatch.setattr("hotlever.processes._WITHOUT_WORKERS_S", 0.5)
     monkeypatch.setattr("hotlever.processes._LOOK_S", 0.5)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen([sys.executable, "-c", SCHEDULER], **pipes) as process:
+    with subprocess.Popen([sys.executable, "-c", SCHEDULER, str(Path(experiments.__file__).parent)], **pipes) as process:
         try:
             address = process.stdout.readline().decode().strip()
 
