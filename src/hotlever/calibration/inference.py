@@ -15,7 +15,7 @@ import numpy as np
 from hotlever.calibration.calibration import Calibration, rms
 from hotlever.calibration.knee import Knee
 from hotlever.calibration.plausibility import misfit, what_data_lack
-from hotlever.calibration.power_law import law_of_model, power_turns
+from hotlever.calibration.power_law_fit import law_of_model, power_turns
 from hotlever.calibration.tip_temperature import (
     OF_THE_MEASUREMENT,
     highest_bias,

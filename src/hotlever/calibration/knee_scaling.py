@@ -23,7 +23,8 @@ from hotlever.calibration.knee import (
     scale_to,
     smooth_rows,
 )
-from hotlever.calibration.power_law import PowerLaw, law_of_model, power_turns
+from hotlever.calibration.power_law import PowerLaw
+from hotlever.calibration.power_law_fit import law_of_model, power_turns
 from hotlever.calibration.table import table_by_bias
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.noise import METERS
