@@ -47,6 +47,7 @@ from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.threads import one_blas_thread
 from problems import BIAS, processor_seconds, table
 
+REFERENCE = ThreeLeg.reference()
 #: Of the diffusion in the plane: largest edge in the heater (share of its width), and time steps.
 FINE, STEPS = MeshOptions(heater=0.02, lever=0.05), 400
 #: What has to be loaded for a probe by its dimensions, and for one that is drawn.
@@ -127,15 +128,15 @@ def same() -> None:
 
 
 def three_leg(
-    length_um=54.4,
-    centre_leg_width_um=6.44,
-    outer_leg_width_um=3.46,
-    gap_um=3.2,
-    bridge_width_um=3.82,
-    heater_length_um=4.0,
-    heater_width_um=1.645,
-    reader_length_um=4.0,
-    thickness_um=0.4,
+    length_um=REFERENCE.length_um,
+    centre_leg_width_um=REFERENCE.centre_leg_width_um,
+    outer_leg_width_um=REFERENCE.outer_leg_width_um,
+    gap_um=REFERENCE.gap_um,
+    bridge_width_um=REFERENCE.bridge_width_um,
+    heater_length_um=REFERENCE.heater_length_um,
+    heater_width_um=REFERENCE.heater_width_um,
+    reader_length_um=REFERENCE.reader_length_um,
+    thickness_um=REFERENCE.thickness_um,
 ) -> Drawing:
     """The reference probe, drawn by a function."""
     return Drawing.of_layout(ThreeLeg(**locals()).layout())

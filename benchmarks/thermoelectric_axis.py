@@ -25,6 +25,7 @@ from scipy.special import erfc
 
 from hotlever.lever import Lever
 from hotlever.probe import Probe
+from hotlever.probe.shapes import ThreeLeg
 from hotlever.studies.thermoelectric_shift import of_p_silicon, shift_by_heat
 from seebeck import BOLTZMANN_EV, CHARGE_C, bands, reduced_seebeck
 
@@ -32,8 +33,11 @@ BIAS_V = (2.0, 4.0, 6.0, 7.22, 8.268, 10.748)
 #: Between them the lever is followed to the next bias (V).
 STEP_V = 0.5
 #: The reference probe (µm), its circuit, and option III of the paper.
-HEATER, LEG, LEG_WIDTH, HEATER_WIDTH, THICK = 4.0, 46.58, 6.44, 1.645, 0.4
-BRIDGE, OUTER_WIDTH, GAP, LENGTH = 3.82, 3.46, 3.2, 54.4
+SHAPE = ThreeLeg.reference()
+HEATER, HEATER_WIDTH, THICK = SHAPE.heater_length_um, SHAPE.heater_width_um, SHAPE.thickness_um
+LEG_WIDTH, OUTER_WIDTH = SHAPE.centre_leg_width_um, SHAPE.outer_leg_width_um
+BRIDGE, GAP, LENGTH = SHAPE.bridge_width_um, SHAPE.gap_um, SHAPE.length_um
+LEG = LENGTH - BRIDGE - HEATER
 R_S, COLD = 5.6, 293.0  # kΩ, K
 C_KAPPA, DELTA, N_D, P, A0, A1, N_HD = 0.686, 0.647, 5.75e17, 2.65, 9.34e-4, 1.11e-6, 2.2e20
 EXPONENT = 0.0

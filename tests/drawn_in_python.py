@@ -5,21 +5,23 @@ from __future__ import annotations
 from typing import Annotated
 
 from hotlever.probe.drawing import Drawing, Layer, difference, fillet, mirror, rectangle, union
+from hotlever.probe.shapes import ThreeLeg
 
+REFERENCE = ThreeLeg.reference()
 #: How far windows of low-doped parts stick out (µm).
 _BEYOND = 1.0
 
 
 def three_leg(
-    length_um: Annotated[float, "base to front edge"] = 54.4,
-    centre_leg_width_um=6.44,
-    outer_leg_width_um=3.46,
-    gap_um=3.2,
-    bridge_width_um=3.82,
-    heater_length_um=4.0,
-    heater_width_um=1.645,
-    reader_length_um=4.0,
-    thickness_um=0.4,
+    length_um: Annotated[float, "base to front edge"] = REFERENCE.length_um,
+    centre_leg_width_um=REFERENCE.centre_leg_width_um,
+    outer_leg_width_um=REFERENCE.outer_leg_width_um,
+    gap_um=REFERENCE.gap_um,
+    bridge_width_um=REFERENCE.bridge_width_um,
+    heater_length_um=REFERENCE.heater_length_um,
+    heater_width_um=REFERENCE.heater_width_um,
+    reader_length_um=REFERENCE.reader_length_um,
+    thickness_um=REFERENCE.thickness_um,
 ) -> Drawing:
     """The reference probe."""
     front = length_um - bridge_width_um
