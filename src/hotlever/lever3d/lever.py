@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever, State
 from hotlever.lever.ramp import Reading
 from hotlever.lever3d.still_air import OpenAir, ngsolve
-from hotlever.probe import Probe
+from hotlever.probe import Layout, Probe, Wiring
 from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid, middle_and_reach
 from hotlever.types import Array, Index, Progress
 
@@ -31,6 +31,16 @@ from hotlever.types import Array, Index, Progress
 SPHERE_RADIUS, _ROOM = 60.0, 2.0
 #: Nodes nearer than this (µm) are the same.
 _SAME_UM = 1e-6
+
+
+@lru_cache(maxsize=2)
+def _in_vacuum(layout: Layout, mesh: SolidMeshOptions | None, wiring: Wiring) -> FullSpace:
+    """Return mesh and operators of a layout in vacuum; levers of one shape share them."""
+    return _space(mesh_solid(layout, mesh, wiring=wiring), wiring)
+
+
+def _space(solid: SolidMesh, wiring: Wiring) -> FullSpace:
+    return FullSpace(solid, FiniteElements(solid.elements, ElementTetP2(), 4), wiring)
 
 
 class SolidLever(Lever):
@@ -94,12 +104,11 @@ class SolidLever(Lever):
                 "expected a lever without films"
             )
         radius = sphere_radius_um or max(SPHERE_RADIUS, _ROOM * middle_and_reach(layout)[1])
-        sphere, wiring = radius if in_air else None, self.probe.wiring
-        solid = mesh_solid(layout, mesh, sphere_radius_um=sphere, wiring=wiring)
-        elements = FiniteElements(solid.elements, ElementTetP2(), 4)
-        space = FullSpace(solid, elements, wiring)
+        wiring = self.probe.wiring
         if not in_air:
-            return space
+            return _in_vacuum(layout, mesh, wiring)
+        solid = mesh_solid(layout, mesh, sphere_radius_um=radius, wiring=wiring)
+        space = _space(solid, wiring)
         air = OpenAir(solid.netgen, solid.centre, radius, order=air_order)
         space = space.in_air_at_nodes(air, surface_nodes(space.elements, air))
         return self._surrounded(space)
