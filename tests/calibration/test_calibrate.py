@@ -6,25 +6,20 @@ import csv
 import io
 import json
 import re
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hotlever.calibration.calibration import read_calibration
-from hotlever.calibration.inference import _before
 from hotlever.calibration.knee_scaling import curve_of_law, curve_of_model
 from hotlever.calibration.power_law import EQ12, read_power_law
 from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.summary import calibration_text
 from hotlever.calibration.table import TABLE_COLUMNS
 from hotlever.errors import InputError
-from hotlever.estimation import fit, read_fit
 from hotlever.lever import Lever
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.parts import PriorTexts
-from hotlever.probe.priors import Prior, default_priors, published_material
+from hotlever.probe.priors import default_priors
 from made_up import GONE, damaged
 from synthetic_curves import measured_curve, measurement_of
 
@@ -42,19 +37,6 @@ def calibrated(reference):
     """The reference lever, measured with noise and calibrated as if unknown."""
     curve = measured_curve(reference, np.random.default_rng(0))
     return calibrate(measurement_of(curve))
-
-
-@pytest.fixture(scope="module")
-def example():
-    return Path(__file__).parents[2] / "src" / "hotlever" / "examples" / "lever-a.csv"
-
-
-@pytest.fixture(scope="module")
-def shared_fit(tmp_path_factory, example):
-    """A fit file of an example measurement."""
-    path = tmp_path_factory.mktemp("fit") / "fit.json"
-    fit(example).write(path)
-    return path
 
 
 def test_the_table_gives_the_true_temperature(calibrated, reference):
@@ -145,49 +127,6 @@ def test_priors_say_what_was_known_and_what_the_data_made_of_it(calibrated):
     text = calibration_text(calibrated)
     assert "as known before, since the data do not tell: " in text
     assert "gap_um" in text
-
-
-@pytest.mark.slow
-def test_a_narrow_prior_holds_and_none_at_all_varies_the_material_only(reference):
-    data = measurement_of(measured_curve(reference, np.random.default_rng(8)))
-    priors = default_priors(Probe.reference()) | {"heater_length_um": Prior(4.1, 1e-6)}
-    held = calibrate(data, priors=priors)
-    assert held.probe.shape.heater_length_um == pytest.approx(4.1, rel=1e-4)
-    free = calibrate(data, priors={})
-    assert free.probe.shape == Probe.reference().shape
-    assert set(free.table.source.values) == {"measurement", "model"}
-
-
-@pytest.mark.parametrize("shape", ["three-leg", "u-shape"])
-def test_another_lever_is_within_a_few_stated_errors(shape):
-    """Dimensions off by 5 %, another material, doping known to 15 %; I-V only."""
-    nominal = Probe.reference() if shape == "three-leg" else Probe.u_shape()
-    rng = np.random.default_rng(21)
-    true = nominal.with_(
-        **{
-            name: prior.at(float(rng.standard_normal()))
-            for name, prior in default_priors(nominal).items()
-            if name not in ("series_resistance_ohm", "impurity_exponent")
-        }
-    )
-    lever = Lever(true)
-    data = measurement_of(measured_curve(lever.branch(), rng))
-    calibration = calibrate(data, probe=nominal)
-    error = np.abs(calibration.table.tip_K - lever.sweep(calibration.table.bias_V.values).tip_K)
-    assert float((error / calibration.table.tip_stderr_K).max()) < 3.0
-    assert float(error.max()) < 40.0
-
-
-def test_no_knee_is_needed(reference):
-    """Below it the band is as narrow as ever, and nothing is said of what is above."""
-    curve = measured_curve(reference, np.random.default_rng(2), to_V=7.0)
-    calibration = calibrate(measurement_of(curve))
-    table = calibration.table
-    error = np.abs(table.tip_K - reference.tip_temperature(table.power_mW))
-    assert np.all(error < 4 * table.tip_stderr_K + 0.2)
-    assert table.bias_V.max() == pytest.approx(7.0, abs=0.02)
-    assert abs(calibration.knee.power_mW - reference.knee.power_mW) < 0.1
-    assert not calibration.content()["knee"]["measured"]
 
 
 def test_a_power_law_is_used_by_the_paper_s_rule(calibrated, lever_3):
@@ -293,13 +232,6 @@ def test_a_calibration_file_is_read_back_whole(calibrated, tmp_path):
     assert repr(again) == repr(calibrated)
 
 
-def test_a_fit_as_object_or_file_and_data_as_object_or_file_are_one(shared_fit, example):
-    by_path = calibrate(example, fit=shared_fit)
-    fitted = read_fit(shared_fit)
-    by_object = calibrate(fitted.measurement, fit=fitted)
-    np.testing.assert_allclose(by_path.table.tip_K, by_object.table.tip_K)
-
-
 @pytest.mark.parametrize(
     ("keys", "value", "message"),
     [
@@ -332,109 +264,3 @@ def test_what_is_no_json_is_no_calibration(tmp_path):
         (tmp_path / "bad.json").write_text(text)
         with pytest.raises(InputError, match=r"bad\.json"):
             read_calibration(tmp_path / "bad.json")
-
-
-def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
-    status, out, err = run(
-        "calibrate", example, "--fit", shared_fit, "-o", "cal.json", "--table", "t.csv",
-        "--plot", "cal.png", "--prior", "dimensions=±1%", "--at", "8.05V",
-    )  # fmt: skip
-    assert status == 0, err
-    assert "based on a fit of this lever in vacuum" in out
-    content = json.loads((tmp_path / "cal.json").read_text())
-    assert content["k"] == pytest.approx(1.0, abs=1e-6)
-    # the data of the fit are those calibrated, and know the material
-    sources = {"measurement", "electronics", "base temperature", "geometry", "material", "model"}
-    assert set(content["uncertainty_budget_K"]) == sources
-    assert content["priors"]["heater_length_um"]["spread"] == pytest.approx(0.04)
-    (stderr,) = (row["tip_stderr_K"] for row in content["table"] if row["bias_V"] == 8.05)
-    parts = [row["contribution_K"] for row in content["gum"]]
-    assert (content["gum_bias_V"], np.linalg.norm(parts)) == (8.05, pytest.approx(stderr, rel=1e-6))
-    assert content["tip_temperature_uncertainty_K"] < 40
-    assert (tmp_path / "t.csv").read_text().startswith("bias_V,lever_V,current_mA,power_mW,tip_K")
-    assert (tmp_path / "cal.png").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--fit", "a", "--probe", "b"), "--fit and --probe: expected at most one of"),
-        (("--medium", "vacum"), "--medium vacum: expected vacuum or air"),
-        (("--table", "t.txt"), "unknown file type '.txt'"),
-        (("--prior", "n_d"), "--prior n_d: expected NAME=VALUE±SPREAD"),
-        (("--prior", "n_d=3e17"), "expected a value and its spread"),
-        (("--prior", "n_d=3e17×/0.5"), "--prior: n_d = '3e17×/0.5': a factor of 0.5, expected"),
-        (("--prior", "edge_bias_um=0.1x/2"), "edge_bias_um may be negative: expected a spread"),
-        (("--prior", "heater=±3%"), "unknown prior 'heater'"),
-        (("--fit", "none.json"), "none.json: no such file"),
-        (("--budget-of", "peak"), "an uncertainty budget of 'peak': expected tip or apex"),
-    ],
-)
-def test_calibrate_command_errors_are_one_line(run, example, arguments, message):
-    status, out, err = run("calibrate", example, *arguments)
-    assert (status, out) == (2, "")
-    assert message in err
-    assert err.count("\n") == 1
-
-
-def test_a_file_without_current_is_refused(run, tmp_path):
-    (tmp_path / "iv.csv").write_text("V_b (V),T_tip (K)\n1,300\n2,310\n")
-    status, _, err = run("calibrate", "iv.csv")
-    assert status == 2
-    assert "no values of I_h" in err
-
-
-@pytest.mark.slow
-def test_a_lever_in_air_is_estimated_in_air(lever, reference):
-    air = lever.in_medium("air").branch()
-    curve = measurement_of(measured_curve(air, np.random.default_rng(5), to_V=12.0))
-    calibration = calibrate(curve, medium="air")
-    assert calibration.k == pytest.approx(air.knee.power_mW / reference.knee.power_mW, rel=0.04)
-    error = np.abs(calibration.table.tip_K - air.tip_temperature(calibration.table.power_mW))
-    assert float((error / calibration.table.tip_stderr_K).max()) < 3.0
-    assert "air" in calibration.table.source.values
-    # the paper's rule for the same data
-    by_rule = calibrate(replace(curve, medium="air"), medium="vacuum")
-    assert by_rule.table.budget_K.sel(source="constant k").max() > 10.0
-    assert by_rule.k == pytest.approx(calibration.k, rel=0.05)
-
-
-def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, reference):
-    """What the fit knows of material and dimensions narrows the band in air."""
-    rng = np.random.default_rng(6)
-    vacuum = measurement_of(measured_curve(reference, rng))
-    air = in_air.branch()
-    other = replace(measurement_of(measured_curve(air, rng, to_V=12.0)), medium="air")
-    fitted = fit(vacuum, Probe.reference(), fixed={"p": None})
-    both = calibrate(other, fit=fitted)
-    # what the fit has left is correlated, so that there are no degrees of freedom
-    budget = both.gum.budget
-    earlier = [row.quantity.endswith(" of the fit") for row in budget.inputs]
-    of_fit = both.table.budget_K.sel(source="fit")[-1].item()
-    assert budget.part(np.flatnonzero(earlier)).u == pytest.approx(of_fit, rel=1e-6)
-    assert budget.u == pytest.approx(both.table.tip_stderr_K[-1].item(), rel=1e-6)
-    assert np.isnan(budget.dof)
-    np.testing.assert_allclose(np.diag(budget.correlation), 1.0, rtol=1e-12)
-    assert np.count_nonzero(budget.correlation) == len(earlier) - sum(earlier) + sum(earlier) ** 2
-    content = both.content()
-    assert len(content["gum_correlation"]) == len(content["gum"])
-    assert content["effective_dof"] is None
-    assert both.file().model_validate(content, context="").result().content() == content
-    assert both.medium == "air"
-    assert {"fit", "measurement", "air"} <= set(both.table.source.values.tolist())
-    error = np.abs(both.table.tip_K - air.tip_temperature(both.table.power_mW))
-    assert float((error / both.table.tip_stderr_K).max()) < 3.0
-    assert both.probe.material.p == Probe.reference().material.p
-
-
-def test_what_was_known_before_a_fit_is_not_what_it_found(shared_fit):
-    """The published levers, the probe file, what the fit was asked and what is asked now."""
-    fitted = read_fit(shared_fit)
-    usual = _before(fitted, None)
-    assert usual["n_d"] == published_material()["n_d"]
-    stated = {"n_d": "3e17 ± 10%", "p": "2.7 ± 1%"}
-    probe = fitted.probe.model_copy(update={"prior": PriorTexts.from_values(stated, "here")})
-    of_file = _before(replace(fitted, probe=probe), None)
-    assert (of_file["n_d"], of_file["p"]) == (Prior(3e17, 0.1), Prior(2.7, 0.01))
-    assert _before(replace(fitted, probe=probe), {"p": "2.8 ± 1%"})["p"] == Prior(2.8, 0.01)
-    assert _before(fitted, {}) == {}

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from test_fit import TRUTH, twin
+from fit_twins import TRUTH, twin
 
 from experiments import reduced_experiment
 from hotlever.estimation import FitOptions, fit

@@ -1,0 +1,103 @@
+"""Measurement errors as weights of a fit, and what its standard errors are worth."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from fit_twins import BIAS, TRUTH, twin
+
+from hotlever.errors import InputError
+from hotlever.estimation import fit
+from hotlever.estimation.diagnosis import Diagnosis
+
+
+def with_errors(measurement, current=None, reader=None, tip=None):
+    size = measurement.bias_V.size
+
+    def column(value):
+        return None if value is None else np.full(size, value)
+
+    return dataclasses.replace(
+        measurement,
+        current_error_mA=column(current),
+        reader_error_V=column(reader),
+        tip_error_K=np.full(size, np.nan) if tip is None else column(tip),
+    )
+
+
+def test_measurement_errors_weigh_the_data(coarse, coarse_fast, monkeypatch):
+    # a reader that does not count contradicts the lever; why, is not what is asked here
+    monkeypatch.setattr(Diagnosis, "named", lambda _: "")
+    measurement = twin(coarse, noise=0.003)
+    trusted = with_errors(measurement, current=1e-3, reader=0.3, tip=600.0)
+    # what a current alone hardly tells is held
+    given = {"fixed": {"n_d": TRUTH["n_d"], "a1": None}, "model": coarse_fast}
+    result = fit(trusted, coarse.probe, weights="errors", **given)
+    alone = fit(measurement, coarse.probe, observables=["current"], **given)
+    assert result.residual_rms["current_mA"] == pytest.approx(
+        alone.residual_rms["current_mA"], rel=1e-3
+    )
+    assert any("times the measurement errors" in note for note in result.notes)
+
+
+def test_without_measurement_errors_the_scatter_takes_their_place(coarse, coarse_fast):
+    measurement = twin(coarse, noise=0.003)
+    weighed = fit(measurement, coarse.probe, weights="errors", model=coarse_fast)
+    scatter = {
+        name: weighed.residual_rms[column]
+        for name, column in (("current", "current_mA"), ("reader", "reader_V"), ("tip", "tip_K"))
+    }
+    again = fit(
+        with_errors(measurement, **scatter), coarse.probe, weights="errors", model=coarse_fast
+    )
+    for name, parameter in weighed.parameters.items():
+        assert abs(again.parameters[name].value - parameter.value) < 0.1 * parameter.stderr
+
+
+def test_some_missing_measurement_errors_are_an_error(coarse, coarse_fast):
+    measurement = with_errors(twin(coarse, noise=0.003), tip=5.0)
+    measurement.tip_error_K[3] = np.nan
+    with pytest.raises(InputError, match=r"tip has no error above 0 at 3\.5 V"):
+        fit(measurement, coarse.probe, weights="errors", model=coarse_fast)
+
+
+def test_unknown_weights_are_an_error(coarse):
+    with pytest.raises(InputError, match="did you mean 'errors'"):
+        fit(twin(coarse), coarse.probe, weights="error")
+
+
+def test_standard_errors_follow_the_noise_of_each_observable(coarse, coarse_fast):
+    # a reader a hundred times as noisy widens the resistivity, not the heater's parameters
+    quiet = twin(coarse, noise=1e-4)
+    rng = np.random.default_rng(3)
+    noise = 1e-2 * np.nanmax(quiet.reader_V) * rng.normal(size=quiet.bias_V.size)
+    noisy = dataclasses.replace(quiet, reader_V=quiet.reader_V + noise)
+    before = fit(quiet, coarse.probe, model=coarse_fast).parameters
+    after = fit(noisy, coarse.probe, model=coarse_fast).parameters
+    assert after["a0"].stderr > 20.0 * before["a0"].stderr
+    assert after["p"].stderr / after["p"].value < after["a0"].stderr / after["a0"].value
+
+
+def test_the_band_is_the_spread_of_repeated_experiments(coarse, coarse_fast):
+    """Fits of data with new noise each scatter in tip temperature as the band says."""
+    tips, errors = [], []
+    for seed in range(8):
+        band = fit(twin(coarse, noise=2e-3, seed=seed), model=coarse_fast).band
+        tips.append(band.tip_K.values)
+        errors.append(band.tip_stderr_K.values)
+    hot = BIAS > 6
+    ratio = np.std(tips, axis=0)[hot].mean() / np.mean(errors, axis=0)[hot].mean()
+    # eight fits know a spread to 27 %
+    assert 0.6 < ratio < 1.6
+
+
+def test_noise_gives_errors_of_its_size(coarse, coarse_fast):
+    result = fit(twin(coarse, noise=2e-3), model=coarse_fast)
+    for name, fitted in result.parameters.items():
+        assert fitted.stderr is not None
+        assert abs(fitted.value - TRUTH[name]) < 4 * fitted.stderr
+    assert np.allclose(np.diag(result.correlation), 1.0)
+    assert np.allclose(result.correlation, result.correlation.T)
+    assert 0 < result.inversion_temperature_stderr_K < 60
