@@ -13,6 +13,8 @@ from drawn import pointed_lever, written
 from hotlever.errors import InputError
 from hotlever.probe import Probe
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 
 def area(probe: Probe) -> float:
     return sum(region.area for region in probe.layout().regions)

@@ -183,7 +183,9 @@ def test_a_lost_cluster_is_said_and_what_was_done_is_written(
     monkeypatch.setattr("hotlever.processes._WITHOUT_WORKERS_S", 0.5)
     monkeypatch.setattr("hotlever.processes._LOOK_S", 0.5)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen([sys.executable, "-c", SCHEDULER, str(Path(experiments.__file__).parent)], **pipes) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", SCHEDULER, str(Path(experiments.__file__).parent)], **pipes
+    ) as process:
         try:
             address = process.stdout.readline().decode().strip()
 

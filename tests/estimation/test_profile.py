@@ -12,11 +12,14 @@ from hotlever.estimation import Measurement, fit
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.lever import Lever
 
+# a profile makes its own lever
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 BIAS = np.linspace(2, 11, 10)
 
 
-def fitted(lever: Lever, bias, fixed, observables=None):
-    sweep = lever.sweep(bias)
+def fitted(coarse: Lever, bias, fixed, observables=None):
+    sweep = coarse.sweep(bias)
     rng = np.random.default_rng(7)
     data = [
         column.values + 2e-3 * column.values.max() * rng.normal(size=bias.size)
@@ -26,13 +29,13 @@ def fitted(lever: Lever, bias, fixed, observables=None):
         Measurement(bias, *data, np.full(bias.size, np.nan)),
         fixed=fixed,
         observables=observables,
-        model=lambda probe, bias: full_experiment(lever.with_probe(probe), bias),
+        model=lambda probe, bias: full_experiment(coarse.with_probe(probe), bias),
     )
 
 
 @pytest.fixture(scope="module")
-def determined(lever):
-    return fitted(lever, BIAS, {"n_d": None, "a0": None, "a1": None})
+def determined(coarse):
+    return fitted(coarse, BIAS, {"n_d": None, "a0": None, "a1": None})
 
 
 def test_a_well_determined_parameter_has_its_parabola(determined):
@@ -48,10 +51,10 @@ def test_a_well_determined_parameter_has_its_parabola(determined):
     assert profile.refitted.sel(parameter="p").shape == profile.value.shape
 
 
-def test_a_parameter_the_data_leave_open_is_said_to_be_open(lever):
+def test_a_parameter_the_data_leave_open_is_said_to_be_open(coarse):
     """Cold currents do not know how the resistivity rises with temperature."""
     result = fitted(
-        lever,
+        coarse,
         np.linspace(0.5, 2.5, 6),
         {"delta": None, "n_d": None, "a0": None, "p": None},
         ["current"],

@@ -17,7 +17,7 @@ SHARP = {
     "centre_leg_width_um": 11.0,
     "delta": 0.1,
 }
-BIAS = [4.0, 7.0]
+BIAS = [4.0]
 
 
 @pytest.fixture(scope="module")

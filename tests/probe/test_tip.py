@@ -109,7 +109,7 @@ def test_the_thickening_stands_for_the_cone():
     """benchmarks/tip.py prints it for more sizes and biases."""
     from hotlever.lever3d import SolidLever
 
-    bias, mesh = [6.0], SolidMeshOptions(refinement=0.7)
+    bias, mesh = [6.0], SolidMeshOptions(refinement=0.5)
     probe = tipped(Tip(height_um=1.0, half_angle_deg=30))
     cone = SolidLever(probe, mesh).sweep(bias) - SolidLever(Probe.reference(), mesh).sweep(bias)
     sheet = Lever(probe).sweep(bias) - Lever(Probe.reference()).sweep(bias)

@@ -14,13 +14,16 @@ from hotlever.report.reproduce import inference
 from hotlever.report.reproduce.findings import Findings
 from hotlever.studies.simulation_based_calibration import WAYS
 
+# a profile makes its own lever
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 
 @pytest.fixture(scope="module")
-def result(lever):
-    data = Measurement.of_sweep(lever.sweep([2.0, 5.0, 7.0, 8.0, 9.0, 11.0]))
+def result(coarse):
+    data = Measurement.of_sweep(coarse.sweep([2.0, 5.0, 7.0, 8.0, 9.0, 11.0]))
     data.tip_K[:] += np.random.default_rng(0).normal(0.0, 3.0, data.tip_K.size)
     held = dict.fromkeys(("delta", "n_d", "a0", "a1"))
-    return fit(data, fixed=held, model=lambda probe, bias: full_experiment(lever, bias))
+    return fit(data, fixed=held, model=lambda probe, bias: full_experiment(coarse, bias))
 
 
 def test_a_fit_s_page_tells_what_was_found_and_how_sure_it_is(result):

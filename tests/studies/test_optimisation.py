@@ -17,6 +17,8 @@ from hotlever.studies.working_point import (
     WorkingPoint,
 )
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 NAMES = ("heater_length_um", "series_resistance_ohm")
 #: Of the knee of a curve through states, differences are known less well.
 OF_KNEE = {"knee_K": 2e-2, "knee_distance_K": 2e-2, "knee_mA": 1e-2, "knee_mW": 1e-2}

@@ -14,6 +14,8 @@ from hotlever.materials.radiation import (
 from hotlever.probe import Probe
 from hotlever.studies.radiation import radiated_heat, sheet_emissivities
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 
 def test_a_black_lever_radiates_in_proportion_to_its_emissivity():
     black, grey = (radiated_heat(Probe.reference(), [900.0, 1150.0], one) for one in (1.0, 0.2))

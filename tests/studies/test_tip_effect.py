@@ -10,6 +10,7 @@ from hotlever.studies.tip_effect import tip_effects
 ONE = ((0.7, 20.0),)
 
 
+@pytest.mark.usefixtures("coarse_meshes")
 def test_in_vacuum_a_tip_only_conducts_and_a_tipless_fit_takes_it_in():
     effects = tip_effects(Probe.reference(), ONE)
     assert effects.moved_K.item() == pytest.approx(0.9, abs=0.2)

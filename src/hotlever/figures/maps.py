@@ -239,8 +239,7 @@ class _Writer(PillowWriter):
         colours = Image.new("P", (1, 1))
         colours.putpalette((255 * _COLOURS).round().astype(np.uint8).tobytes())
         self._frames = [
-            frame.quantize(palette=colours, dither=Image.Dither.NONE)
-            for frame in self._frames
+            frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in self._frames
         ]
         super().finish()
 
