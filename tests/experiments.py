@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from hotlever.calibration import Calibration, calibrate
 from hotlever.estimation import Fit, fit
 from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.lever import Lever
@@ -49,9 +48,3 @@ def coarse_fit(*given: Any, **options: Any) -> Fit:
     """Fit on coarse meshes, in the worker processes of a batch too."""
     with on_coarse_meshes():
         return fit(*given, **options)
-
-
-def coarse_calibration(*given: Any, **options: Any) -> Calibration:
-    """Calibrate on coarse meshes, in the worker processes of a batch too."""
-    with on_coarse_meshes():
-        return calibrate(*given, **options)

@@ -19,6 +19,8 @@ from hotlever.studies.parameter_consistency import (
 )
 from hotlever.studies.simulation_based_calibration import DEPARTURES
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 
 @pytest.fixture
 def noiseless(monkeypatch):

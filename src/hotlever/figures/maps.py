@@ -217,7 +217,7 @@ class _Writer(PillowWriter):
 
     _frames: list[Image.Image]
 
-    def setup(self, fig: Figure, outfile: str, dpi: float | None = None) -> None:
+    def setup(self, fig: Figure, outfile: str | Path, dpi: float | None = None) -> None:
         """Draw what stays."""
         super().setup(fig, outfile, dpi)
         before = fig.canvas
