@@ -225,7 +225,7 @@ class _Writer(PillowWriter):
         self._canvas.draw()
         fig.set_canvas(before)  # which draws nothing by itself
         self._rest = self._canvas.copy_from_bbox(fig.bbox)
-        self._moving = sorted(fig.findobj(lambda one: one.get_animated()), key=Artist.get_zorder)
+        self._moving = sorted(fig.findobj(Artist.get_animated), key=Artist.get_zorder)
 
     def grab_frame(self, **_: Any) -> None:
         """Draw a frame."""
