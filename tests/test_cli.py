@@ -237,7 +237,7 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         (("sweep", "--set", "kind=x"), "'kind' (expected one of: circuit.supply.kind, circuit."),
         (("sweep", "--set", "c_kappa"), "expected NAME=VALUE"),
         (("sweep", "--set", "c_kappa=high"), "--set c_kappa: found 'high', expected a number"),
-        (("sweep", "--set", "c_kappa=-1"), "input should be greater than or equal to 0.05"),
+        (("sweep", "--set", "c_kappa=-1"), "expected at least 0.05"),
         (("sweep", "--medium", "water"), "--medium water: expected vacuum or air"),
         (("sweep", "-o", "a.xls"), "expected .csv or .nc"),
         (("sweep", "-o", "none/a.csv"), "the folder none does not exist"),
@@ -269,7 +269,7 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         ),
         (
             ["sweep", "--physics", "radiation", "--set", "emissivity=2"],
-            "emissivity = 2.0: input should be less than or equal to 1",
+            "emissivity = 2.0: expected at most 1",
         ),
         (["sweep", "--physics", "radiation", "--bias=-8:8:3"], "expected 0 <= START <= STOP"),
         (["contact", "--sample", "polimer"], "did you mean 'polymer'"),

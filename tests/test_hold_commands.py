@@ -76,7 +76,7 @@ def test_a_loop_that_is_lost_is_told(run):
     [
         (("sweep", "--hold-resistance", "9kohm"), "expected one that the lever has: from 1323 ohm"),
         (("sweep", "--hold-resistance", "3000"), "expected a number with a unit like ohm"),
-        (("sweep", "--hold-resistance", "-3kohm"), "expected more than 0 ohm"),
+        (("sweep", "--hold-resistance", "-3kohm"), "expected more than 0"),
         (("sweep", "--hold-power", "1mW:2mW"), "START:STOP:COUNT, such as 1mW:4mW:7"),
         (
             ("sweep", "--hold-power", "1mW", "--bias", "1:2:2"),
@@ -95,6 +95,15 @@ def test_a_loop_that_is_lost_is_told(run):
         (
             ("pulse", "--hold-resistance", "1.35kohm", "--controller", "-1,-9", "--step", "2kohm"),
             "expected gains above 0: at 1350 ohm (tip at 309 K) the resistance rises",
+        ),
+        pytest.param(
+            ("pulse", *CONTROL[:2], "--controller", "1e9,1e9", *CONTROL[4:]),
+            "rings faster than the lever's answer is known, 100 MHz; expected stable ones such as",
+            marks=pytest.mark.slow,
+        ),
+        (
+            ("pulse", *CONTROL[:2], "--controller", "0,1e9", *CONTROL[4:]),
+            "the loop at 3000 ohm is not stable: what is off grows by e in 0.02",
         ),
         (("pulse", *CONTROL, "--limit", "3V"), "found a limit of 3 V, expected at least"),
         (("pulse", *CONTROL, "--filter", "0us"), "found a filter of 0 µs, expected 0.001"),

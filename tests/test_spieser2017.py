@@ -54,7 +54,7 @@ def test_a_wrong_name_is_answered_with_the_nearest():
 
 def test_material_refuses_what_cannot_be():
     good = published("option III").material.model_dump()
-    with pytest.raises(InputError, match=r"c_kappa = -1: input should be greater than or equal to"):
+    with pytest.raises(InputError, match=r"c_kappa = -1: expected at least"):
         Material.from_values({**good, "c_kappa": -1}, "here")
     with pytest.raises(InputError, match=r"n_d = 1.5e\+19 must be below n_hd"):
         Material.from_values({**good, "n_d": 1.5e19, "n_hd": 1e19}, "here")

@@ -86,7 +86,7 @@ def test_quoted_cells_hold_separators(tmp_path):
     [
         ('a,b\n1,2\n1,"2\n3,4\n', r"line 3: found '1,\"2', expected quotes in pairs"),
         ('a,b\n"1"x,2\n', r"line 2: found '\"1\"x,2', expected quotes in pairs"),
-        ("a,b\n1\n", "line 2: 1 cells, expected 2 as in line 1"),
+        ("a,b\n1\n", "line 2: 1 cell, expected 2 as in line 1"),
         ("a;b\n1,5;2\n1.5;3\n", "line 3: a: found '1.5', expected a number with a decimal comma"),
         ("a\n" * 200_001, "200001 lines, expected at most 200000"),
         ("a," * 80_000, "line 1: 160000 characters, expected at most 131072"),

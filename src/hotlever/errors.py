@@ -98,6 +98,17 @@ def shown(text: str, limit: int = 40) -> str:
     return text if len(text) <= limit else text[: limit - 1] + "…"
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a number of things, whose plural ends in s.
+
+    Examples
+    --------
+    >>> counted(1, "value"), counted(2, "value")
+    ('1 value', '2 values')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") -> InputError:
     """Return the error for a name that does not exist, with the nearest one that does.
 

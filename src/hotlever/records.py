@@ -14,6 +14,7 @@ from pydantic import (
     ConfigDict,
     GetPydanticSchema,
     PlainSerializer,
+    TypeAdapter,
     ValidationError,
     WrapValidator,
 )
@@ -22,6 +23,21 @@ from hotlever.errors import InputError, quoted, shown, unknown_name
 
 #: Characters of a key that an error names.
 _LONGEST_KEY = 120
+#: What stands in an error for words of pydantic.
+_WORDS = {
+    "Input should be": "expected",
+    "a valid dictionary or instance of": "keys of",
+    "a valid tuple": "a list",
+    "a valid string": "a text in quotes",
+    "a valid boolean": "true or false",
+    "a valid": "a",
+}
+_LIMITS = {
+    "greater_than_equal": "at least",
+    "less_than_equal": "at most",
+    "greater_than": "more than",
+    "less_than": "less than",
+}
 
 # A number of a result file; NaN where the file has none.
 Number = Annotated[
@@ -80,6 +96,17 @@ class Record(BaseModel):
             raise explained(error, cls, where) from None
 
     @classmethod
+    def check_value(cls, key: str, value: float, where: str) -> None:
+        """Refuse a number that no such record has under a key, whatever its others are."""
+        field = cls.model_fields.get(key)
+        if field is not None:
+            kind: Any = Annotated[field.annotation, *field.metadata]
+            try:
+                TypeAdapter(kind).validate_python(value)
+            except ValidationError as error:
+                raise explained(error, cls, where) from None
+
+    @classmethod
     def description(cls) -> dict[str, str]:
         """Return what each value is, by key, for the comments of a probe file."""
         fields = cls.model_fields.items()
@@ -105,6 +132,11 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
     if first["type"] == "missing":
         return InputError(f"{where}: {key} is missing")
     message = first["msg"].removeprefix("Value error, ")
+    for of_pydantic, words in _WORDS.items():
+        message = message.replace(of_pydantic, words)
+    if first["type"] in _LIMITS:
+        (limit,) = first["ctx"].values()
+        message = f"expected {_LIMITS[first['type']]} {limit:g}"
     if not key:
         return InputError(f"{where}: {message}")
     return InputError(

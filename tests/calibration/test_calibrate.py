@@ -235,7 +235,7 @@ def test_a_calibration_file_is_read_back_whole(calibrated, tmp_path):
 @pytest.mark.parametrize(
     ("keys", "value", "message"),
     [
-        (("probe",), GONE, "not a calibration file: probe is missing"),
+        (("probe",), GONE, "not a calibration file (hotlever calibrate -o): probe is missing"),
         (("data",), 3, "data = 3"),
         (("data", "columns"), {"I_h": [1.0]}, "columns: V_b is missing"),
         (("data", "columns", "I_h"), [1.0, 2.0], "I_h: expected numbers in 40 places"),
@@ -257,6 +257,12 @@ def test_damaged_calibration_files_get_one_line(calibrated, tmp_path, keys, valu
     with pytest.raises(InputError, match=re.escape(message)) as no:
         read_calibration(path)
     assert "\n" not in str(no.value)
+
+
+def test_a_budget_out_of_the_data_is_refused_before_the_work(example, monkeypatch):
+    monkeypatch.setattr("hotlever.calibration.procedure.estimate_lever", None)
+    with pytest.raises(InputError, match="at 99 V: expected a bias in the measured range, from"):
+        calibrate(example, at_V=99.0)
 
 
 def test_what_is_no_json_is_no_calibration(tmp_path):

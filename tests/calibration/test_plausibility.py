@@ -138,7 +138,7 @@ def test_temperatures_in_degrees_celsius_are_refused(curve):
 @pytest.mark.parametrize(
     ("rows", "step", "remark"),
     [
-        (slice(20, 24), 0.0, "4 rows say little of a lever"),
+        (slice(20, 24), 0.0, "4 rows with a current: few for a lever"),
         (slice(None), 0.05, "a resolution of 0.05 mA only"),
         (slice(None, 12), 0.0, "measured only up to a tip of 3"),
     ],
@@ -153,4 +153,4 @@ def test_what_the_data_lack_is_remarked(curve, reference, rows, step, remark):
 
 def test_a_calibration_notes_what_its_data_lack(curve):
     notes = calibrate(shown(curve, slice(20, 24))).notes
-    assert [text for text in notes if "4 rows say little of a lever" in text]
+    assert [text for text in notes if "4 rows with a current: few" in text]

@@ -126,7 +126,7 @@ def test_dimensions_are_those_of_the_function_and_vary_by_name():
     assert Design(REFERENCE).usual[0] == "length_um"
     with pytest.raises(InputError, match="did you mean 'heater_length_um'"):
         REFERENCE.with_(heater_lenght_um=5.0)
-    with pytest.raises(InputError, match="gap_um = -1: input should be greater than 0"):
+    with pytest.raises(InputError, match="gap_um = -1: expected more than 0"):
         REFERENCE.with_(gap_um=-1)
 
 

@@ -148,7 +148,7 @@ def test_a_tip_that_is_set_counts(run):
     ("setting", "message"),
     [
         ("chip=yes", "--set chip: found 'yes', expected true or false"),
-        ("medium=water", "medium = 'water': input should be 'vacuum' or 'air'"),
+        ("medium=water", "medium = 'water': expected 'vacuum' or 'air'"),
         ("shape=v", "unknown shape 'v'"),
         ("shape=u-shape", "[probe]: leg_width_um is missing"),
         ("n_d=none", "--set n_d: found 'none', expected a number"),

@@ -12,6 +12,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Measurement, fit, uncertainty
 from hotlever.estimation.chains import Gaussian, effective_sample_size, sample, split_rhat
 from hotlever.estimation.experiment_at_rest import experiment_of
+from hotlever.estimation.objective import inverse_or_nan
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.sampling import SampledLever, predictive_band, sample_posterior
 from hotlever.lever.lever import COARSE, Lever
@@ -253,3 +254,14 @@ def test_what_was_known_to_a_factor_is_compared_in_logarithms():
     told = "n_d is as known before: these data do not tell"
     assert told not in uncertainty._about(fit, "n_d", 1.5e18 * np.exp(0.30 * normal))
     assert told in uncertainty._about(fit, "n_d", 1.5e18 * np.exp(0.39 * normal))
+
+
+def test_data_that_determine_fewer_parameters_have_no_covariance():
+    """The matrix of six parameters that only two of them count in has an inverse by rounding."""
+    random = np.random.default_rng(5)
+    full, two = (
+        random.normal(size=(33, 6)),
+        random.normal(size=(33, 2)) @ random.normal(size=(2, 6)),
+    )
+    np.testing.assert_allclose(inverse_or_nan(full.T @ full) @ full.T @ full, np.eye(6), atol=1e-9)
+    assert np.isnan(inverse_or_nan(two.T @ two)).all()

@@ -261,6 +261,13 @@ def test_bad_input_is_one_line(arguments, message, run):
     assert message in err.splitlines()[-1]
 
 
+@pytest.mark.slow
+def test_a_bias_at_which_the_lever_melts_is_no_empty_row(run, coarse_meshes):
+    status, out, err = run("reader", "--distance", "1um", "--bias", "40V")
+    assert (status, out) == (1, "")
+    assert "hotlever: at 1 µm: silicon melts at a bias of" in err
+
+
 def test_the_command_writes_a_row_for_each_distance(run, coarse_meshes, tmp_path):
     options = ["--distance", "0.5um:1um:2", "--bias", "6:6:1", "--plot", "reader.png"]
     status, out, err = run("reader", *options)

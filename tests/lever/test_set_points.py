@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from hotlever.errors import InputError
+from hotlever.figures import held_states as held_states_figure
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.set_points import hold
@@ -129,3 +130,9 @@ def test_set_points_are_above_zero(coarse, values):
 def test_a_quantity_that_cannot_be_held(coarse):
     with pytest.raises(InputError, match="did you mean 'power'"):
         hold(coarse, "powr", [1.0])
+
+
+def test_a_figure_shows_all_of_the_branch(coarse):
+    held_states = hold(coarse, "power", [0.5])
+    quantity, _ = held_states_figure(held_states.data, held_states.curve).axes
+    assert quantity.get_ylim()[1] > held_states.curve.power_mW.max().item()

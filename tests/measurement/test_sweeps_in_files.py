@@ -257,7 +257,7 @@ def test_what_was_understood_says_column_unit_and_line(tmp_path):
     assert data.understood[1:] == (
         ("V_b", "1 to 2 V", "bias, 'Bias' in V"),
         ("I_h", "0.1434 to 0.2849 mA", "heater current, 'Strom' in uA"),
-        ("T_tip", "293.15 to 293.15 K, 1 values", "tip temperature, 'T_tip (°C)'"),
+        ("T_tip", "293.15 to 293.15 K, 1 value", "tip temperature, 'T_tip (°C)'"),
         ("R_s", "5600 ohm", "line 1"),
         ("T_base", "not said", "the probe's counts"),
         ("medium", "air", "line 2"),

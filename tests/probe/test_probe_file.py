@@ -78,9 +78,9 @@ def test_left_out_sections_take_the_reference_values(tmp_path):
         (
             "gap_um = 3.2",
             "gap_um = -1",
-            r"\[probe\]: gap_um = -1: input should be greater than or equal to 0.05",
+            r"\[probe\]: gap_um = -1: expected at least 0.05",
         ),
-        ("gap_um = 3.2", 'gap_um = "a"', r"gap_um = 'a': input should be a valid number"),
+        ("gap_um = 3.2", 'gap_um = "a"', r"gap_um = 'a': expected a number"),
         ('"three-leg"', '"three-legs"', r"unknown shape 'three-legs': did you mean 'three-leg'"),
         ("[circuit]", "[circus]", r"unknown section 'circus': did you mean 'circuit'"),
         (
@@ -90,15 +90,15 @@ def test_left_out_sections_take_the_reference_values(tmp_path):
         ),
         ("reader_length_um = 4.0", "reader_length_um = 40", r"the reader .* must lie between"),
         ("heater_width_um = 1.645", "heater_width_um = 20", r"must be less than the 12.84 µm"),
-        ("= 293", "= 20", r"base_temperature_K = 20: input should be greater than or equal to 250"),
+        ("= 293", "= 20", r"base_temperature_K = 20: expected at least 250"),
         (
             "= 5600",
             "= -5",
-            r"series_resistance_ohm = -5: input should be greater than or equal to 0",
+            r"series_resistance_ohm = -5: expected at least 0",
         ),
         ("= 3.2", "= = 3.2", r"probe.toml: not valid TOML: .*line 7"),
-        ("n_d = 5.75e17", "n_d = nan", r"n_d = nan: input should be a finite number"),
-        ("gap_um = 3.2", "gap_um = true", r"gap_um = True: input should be a valid number"),
+        ("n_d = 5.75e17", "n_d = nan", r"n_d = nan: expected a finite number"),
+        ("gap_um = 3.2", "gap_um = true", r"gap_um = True: expected a number"),
     ],
 )
 def test_errors_name_the_place_and_what_is_expected(tmp_path, old, new, message):

@@ -47,7 +47,7 @@ def test_the_example_in_the_comments_is_a_valid_section(tmp_path):
         ({"heigth_um": 0.7}, r"\[tip\]: unknown key 'heigth_um': did you mean 'height_um'"),
         (
             {"height_um": -1},
-            r"\[tip\]: height_um = -1: input should be greater than or equal to 0.01",
+            r"\[tip\]: height_um = -1: expected at least 0.01",
         ),
         ({"half_angle_deg": 20}, r"\[tip\]: height_um is missing"),
         (

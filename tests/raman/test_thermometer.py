@@ -360,7 +360,7 @@ def test_tables_of_temperatures_as_people_write_them(tmp_path, text, kelvin):
         ("a.txt,295\nb.txt,hot\n", "line 2: temperature: found 'hot'"),
         ("a.txt,-5\n", "line 1: '-5' is no sample temperature"),
         ("a.txt,\n", "expected a file name and a temperature"),
-        ("a.txt,295\nb.txt\n", "line 2: 1 cells, expected 2 as in line 1"),
+        ("a.txt,295\nb.txt\n", "line 2: 1 cell, expected 2 as in line 1"),
         ("file,temperature (F)\na.txt,77\n", "line 1: temperature .F.: unit 'F' is not understood"),
         ("a.txt,300\na.txt,400\n", "line 2: 'a.txt' has another temperature above"),
         ('a.txt,"300\n', "line 1: .* expected quotes in pairs"),

@@ -120,6 +120,8 @@ def test_a_search_that_is_cut_off_has_the_best_that_it_saw(monkeypatch):
         (["--minimise", "power_mW", "--within", "n_d=1e17:"], "expected both"),
         (["--minimise", "power_mW", "--within", "n_d=2e17:1e17"], "expected a rising range"),
         (["--minimise", "power_mW", "--maximise", "tip_K"], "found both, expected one"),
+        (["--minimise", "power_mW", "--within", "gap_um=-1:5"], "gap_um = -1: expected at least"),
+        (["--minimise", "power_mW", "--within", "n_d=0:1e18"], "n_d = 0: expected at least 5e+15"),
         (["--within", "n_d=1e17:1e18"], "goes with --minimise"),
         (["--vary", "heater_length_um=3:5:2", "--at", "8V"], "--at: goes with --minimise"),
         (["--minimise", "bias_V", "--power", "3"], "--power: does not go with --minimise"),

@@ -19,6 +19,7 @@ from pydantic import BaseModel, Field, ValidationError
 from hotlever.app.state import Choices, Result, Told
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import output_folder, read_json, without_nan, write_text
+from hotlever.records import explained
 
 #: The file of the history, in the hidden folder of a project, and the version of its schema.
 CHOICES, SCHEMA = "choices.json", 2
@@ -182,9 +183,7 @@ class History:
                 self.chosen[_LOOKS] = True
             return
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(str(part) for part in first["loc"])
-            reason = f"{self._path}: {where}: {first['msg'][:1].lower()}{first['msg'][1:]}"
+            reason = str(explained(error, _File, str(self._path)))
         except InputError as error:
             reason = str(error)
         aside = self._path.with_suffix(".unread.json")

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import curve_fit
 
 from hotlever.calibration.smoothing import SmoothCurve
-from hotlever.errors import InputError
+from hotlever.errors import InputError, counted
 from hotlever.lever import Branch, OperatingPoint
 from hotlever.probe import Circuit
 from hotlever.types import Array
@@ -77,7 +77,8 @@ class IVCurve:
         curve = curve.rows(~lost)
         if curve.bias_V.size < _FEWEST:
             raise InputError(
-                f"{curve.bias_V.size} points with bias and current, expected at least {_FEWEST}"
+                f"{counted(curve.bias_V.size, 'point')} with bias and current, expected at least "
+                f"{_FEWEST}"
             )
         return curve.rows(np.argsort(curve.power_mW, kind="stable"))
 
@@ -190,9 +191,9 @@ def find_knee(curve: IVCurve, like: Branch | None = None) -> Knee:
     beside = min((measured < peak_mW).sum(), (measured > peak_mW).sum())
     if measured.size < _FEWEST or beside < _FEWEST_BESIDE:
         raise InputError(
-            f"{measured.size} points with {peak_mW / _NEARBY:.2f} to {peak_mW * _NEARBY:.2f} mW, "
-            f"near the knee, expected at least {_FEWEST} with {_FEWEST_BESIDE} on either side; "
-            "measure more finely there"
+            f"{counted(measured.size, 'point')} with {peak_mW / _NEARBY:.2f} to "
+            f"{peak_mW * _NEARBY:.2f} mW, near the knee, expected at least {_FEWEST} with "
+            f"{_FEWEST_BESIDE} on either side; measure more finely there"
         )
     low, high = max(peak_mW / _SEARCH, measured[0]), min(peak_mW * _SEARCH, measured[-1])
     power = np.linspace(low, high, _GRID)

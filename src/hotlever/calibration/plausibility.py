@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import chdtrc
 
-from hotlever.errors import InputError
+from hotlever.errors import InputError, counted
 from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.estimation.lack_of_fit import lack_of_fit_text, run_of_outliers
 from hotlever.estimation.residuals import Residuals
@@ -120,8 +120,8 @@ def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -
     remarks, count = [], np.isfinite(measured.current(circuit)).sum()
     if count < _FEW:
         remarks.append(
-            f"{count} rows say little of a lever: the answer leans on what was known "
-            f"beforehand; {_FEW} or more would tell"
+            f"{counted(count, 'row')} with a current: few for a lever, so that the answer leans on "
+            f"what was known beforehand; {_FEW} or more would tell"
         )
     levels = np.unique(measured.current_mA[np.isfinite(measured.current_mA)])
     step = float(np.diff(levels).min()) if levels.size > 1 else 0.0
@@ -129,7 +129,7 @@ def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -
     if share > _COARSE and np.allclose(levels / step, np.round(levels / step), atol=_EVEN):
         remarks.append(
             f"I_h has a resolution of {step:.2g} mA only, {share:.1%} of its largest value, in "
-            f"{levels.size} steps"
+            f"{counted(levels.size, 'step')}"
         )
     hottest = float(np.nanmax(tip_K))
     if hottest < _COLD_K:

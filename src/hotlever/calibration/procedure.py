@@ -16,6 +16,7 @@ from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
 from hotlever.calibration.table import BUDGETS, table_with_budget
 from hotlever.calibration.table import budget_of as table_budget
+from hotlever.calibration.tip_temperature import check_in_range, limits_of_range
 from hotlever.calibration.uncertainty_budget import BudgetOf, check_budget_of, limits_of
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
@@ -138,6 +139,7 @@ def calibrate(
         probe, of_circuit = with_measured_circuit(origin, measured, medium)
         causes = Diagnosis(measured, probe, priors)
         check_plausible(measured, probe, causes, known_beforehand(probe, priors))
+        check_in_range(at_V, *limits_of_range(measured, probe))
         try:
             estimate, stated = estimate_lever(measured, probe, fit, priors, progress)
             result = calibrated_by_estimate(

@@ -27,7 +27,8 @@ from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
 from hotlever.materials.parameters import is_of_material, own_name
 from hotlever.measurands import FITTED, OF_A_CONTACT
-from hotlever.probe import Circuit
+from hotlever.measurement import Measurement
+from hotlever.probe import Circuit, Probe
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
@@ -173,12 +174,25 @@ def _at_the_contact(
 
 def measured_range(estimate: Estimate) -> Array:
     """Return even biases (V) over the measured range, as far as the lever has states."""
-    measured = estimate.measurement
+    lowest, highest = limits_of_range(estimate.measurement, estimate.probe)
+    return np.linspace(lowest, min(highest, highest_bias(estimate)), _ROWS)
+
+
+def limits_of_range(measured: Measurement, probe: Probe) -> tuple[float, float]:
+    """Return the lowest and the highest bias (V) at which a heated lever was measured."""
     # without a bias nothing is known of a lever that is cold then
-    heated = measured.bias_V > estimate.probe.lowest_bias_V
-    current = measured.current(estimate.probe.circuit)
-    present = measured.bias_V[np.isfinite(current) & heated]
-    return np.linspace(present.min(), min(present.max(), highest_bias(estimate)), _ROWS)
+    heated = measured.bias_V > probe.lowest_bias_V
+    present = measured.bias_V[np.isfinite(measured.current(probe.circuit)) & heated]
+    return float(present.min()), float(present.max())
+
+
+def check_in_range(at_V: float | None, lowest_V: float, highest_V: float) -> None:
+    """Refuse a bias of the uncertainty budget out of a range."""
+    if at_V is not None and not lowest_V <= at_V <= highest_V:
+        raise InputError(
+            f"an uncertainty budget at {at_V:.4g} V: expected a bias in the measured range, from "
+            f"{lowest_V:.4g} to {highest_V:.4g} V"
+        )
 
 
 def _rows(estimate: Estimate, at_V: float | None) -> Array:
@@ -187,14 +201,8 @@ def _rows(estimate: Estimate, at_V: float | None) -> Array:
     fine = np.linspace(even[0], even[-1], _FINE)
     tip = branch.tip_K(branch.read(estimate.probe.circuit, fine).u)
     rows = with_steep_rows(even, fine, tip)
-    if at_V is None:
-        return rows
-    if not even[0] <= at_V <= even[-1]:
-        raise InputError(
-            f"an uncertainty budget at {at_V:.4g} V: expected a bias in the measured range, from "
-            f"{even[0]:.4g} to {even[-1]:.4g} V"
-        )
-    return np.union1d(rows, at_V)
+    check_in_range(at_V, *even[[0, -1]])
+    return rows if at_V is None else np.union1d(rows, at_V)
 
 
 def highest_bias(estimate: Estimate) -> float:

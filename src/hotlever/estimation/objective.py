@@ -77,6 +77,8 @@ class Penalty:
 #: Scaled residual given to trial parameters for which the lever has no state, so that a search
 #: turns back.
 _UNSOLVED = 10.0
+#: A symmetric matrix of unit diagonal with a smaller eigenvalue is singular but for rounding.
+_SINGULAR = 1e-12
 
 
 class Objective:
@@ -266,8 +268,10 @@ class Objective:
 
 
 def inverse_or_nan(matrix: Array) -> Array:
-    """Return the inverse of a matrix; NaN if it is singular."""
-    try:
-        return np.asarray(np.linalg.inv(matrix), dtype=float)
-    except np.linalg.LinAlgError:
+    """Return the inverse of a symmetric matrix; NaN if it is singular but for rounding errors."""
+    scale = np.sqrt(np.diag(matrix))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        unit = matrix / np.outer(scale, scale)
+    if not np.isfinite(unit).all() or np.linalg.eigvalsh(unit)[0] < _SINGULAR:
         return np.full_like(matrix, np.nan)
+    return np.asarray(np.linalg.inv(matrix), dtype=float)

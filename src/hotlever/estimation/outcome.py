@@ -206,7 +206,9 @@ class ResultFile(Section, Generic[Result]):
         try:
             return cls.model_validate(read_json(path), context=path)
         except ValidationError as error:
-            raise explained(error, cls, f"{path}: not a {kind} file") from None
+            command = {"calibration": "calibrate"}.get(kind, kind)
+            where = f"{path}: not a {kind} file (hotlever {command} -o)"
+            raise explained(error, cls, where) from None
 
     @model_validator(mode="after")
     def _bias_heats_the_lever(self, info: ValidationInfo) -> Self:

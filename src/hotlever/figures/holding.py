@@ -39,11 +39,14 @@ def held_states(data: xr.Dataset, curve: xr.Dataset | None = None) -> Figure:
             label = f"state {number:g} of a set point"
             for axes, values in ((quantity, some[column] / scale), (bias, some.bias_V)):
                 axes.plot(some.tip_K, values, "o", color=colour, label=label)
-        lowest, highest = 0.0, 1.25 * float(data[column].max()) / scale
+        highest = 1.25 * float(data[column].max()) / scale
+        if curve is not None:
+            # a resistance has poles where other supplies turn the current: no room for these
+            highest = max(highest, min(whole.max().item(), 1.5 * whole.quantile(0.9).item()))
         quantity.set(
             xlabel=axis_label("tip_K"),
             ylabel="power P$_l$ (mW)" if of_power else "resistance V$_l$/I$_h$ (kΩ)",
-            ylim=(lowest, highest),
+            ylim=(0.0, 1.05 * highest),
         )
         bias.set(xlabel=axis_label("tip_K"), ylabel=axis_label("bias_V"))
         quantity.legend()

@@ -168,8 +168,6 @@ def over_surface(
     InputError
         If the reader cannot show anything, see `Reader`; if a bias is not finite, or heats nothing;
         or if the tip or the lever reaches the surface.
-    ComputationError
-        If no state is found at any bias.
     """
     if pressure_mbar is not None:
         return _over_pressures(lever, distance_um, bias, noise, pressure_mbar, progress)
@@ -300,12 +298,17 @@ def rows_of(data: xr.Dataset) -> xr.Dataset:
 
 
 def best_bias(
-    lever: Lever, distance_um: ArrayLike, highest_V: float, noise: NoiseOptions | None = None
+    lever: Lever,
+    distance_um: ArrayLike,
+    highest_V: float,
+    noise: NoiseOptions | None = None,
+    progress: Progress | None = None,
 ) -> float:
     """Return the bias (V), up to a highest one, at which distances are resolved best.
 
     It is the best for the one that is resolved worst; the voltage changes with all in the same
-    sense.
+    sense. Progress is called with the biases tried and their number: of even ones, then of more
+    near the best of these.
 
     Raises
     ------
@@ -327,13 +330,13 @@ def best_bias(
         same = (slopes > 0).all() or (slopes < 0).all()
         return max(signal.resolution_nm_per_rtHz for signal in signals) if same else np.inf
 
-    resolutions = np.array([resolution(value) for value in tried.tolist()])
+    resolutions = np.array([resolution(value) for value in each(tried.tolist(), progress)])
     if not np.isfinite(resolutions).any():
         raise ComputationError(f"no bias up to {highest_V:g} V resolves all distances")
     best = int(resolutions.argmin())
     low, high = tried[max(best - 1, 0)], tried[min(best + 1, _TRIED - 1)]
     around = np.linspace(low, high, 2 * _REFINED + 1)
-    finer = [resolution(value) for value in around.tolist()]
+    finer = [resolution(value) for value in each(around.tolist(), progress)]
     return float(around[int(np.argmin(finer))])
 
 

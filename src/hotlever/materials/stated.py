@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, GetPydanticSchema, PlainSerializer, WrapValidator
 
-from hotlever.errors import quoted, shown, unknown_name
+from hotlever.errors import counted, quoted, shown, unknown_name
 from hotlever.materials.formulas import Expression, names_in, parsed
 from hotlever.materials.heat import STANDARD_TEMPERATURE
 from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO, LEVELLING, Evaluated
@@ -255,8 +255,8 @@ class Table(StatedLaw):
         T, column = (np.asarray(list(each), dtype=float) for each in (temperature_K, values))
         if T.size != column.size or not 2 <= T.size <= _MOST_ROWS:
             raise ValueError(
-                f"{T.size} temperatures and {column.size} values, expected as many, 2 to "
-                f"{_MOST_ROWS}"
+                f"{counted(T.size, 'temperature')} and {counted(column.size, 'value')}, "
+                f"expected as many, 2 to {_MOST_ROWS}"
             )
         if not (np.isfinite(T).all() and np.isfinite(column).all()):
             raise ValueError("a value is no number, expected numbers alone")

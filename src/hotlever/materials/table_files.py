@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, quoted
+from hotlever.errors import InputError, counted, quoted
 from hotlever.materials.parameters import STATED
 from hotlever.materials.stated import Table
 from hotlever.tables import read_table
@@ -43,7 +43,8 @@ def read_law(path: str | Path, name: str, called: str | None = None) -> Table:
     table = read_table(path, f"a header row like 'T (K),{name} ({unit})' and rows of numbers")
     if len(table.names) != 2:
         raise InputError(
-            f"{table.where(-1)}: {len(table.names)} columns, expected two, temperature and {name}"
+            f"{table.where(-1)}: {counted(len(table.names), 'column')}, expected two, temperature "
+            f"and {name}"
         )
     units = [name_and_unit(heading)[1] for heading in table.names]
     if units[0] is None or (units[1] is None and unit != "1"):

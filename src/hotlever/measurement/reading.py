@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, counted, shown
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
@@ -125,7 +125,7 @@ def _complete_in_time(
     else:
         leave_out_jumps(contents, waveform)
     check(contents, signed=True)
-    return waveform, f"in time, {len(contents.table.rows)} rows; {waveform.text}"
+    return waveform, f"in time, {counted(len(contents.table.rows), 'row')}; {waveform.text}"
 
 
 def _complete_at_rest(
@@ -160,7 +160,7 @@ def _understood(contents: Contents, order: str) -> tuple[tuple[str, ...], ...]:
         count = int(np.isfinite(values).sum())
         if count > 0:
             limits = f"{np.nanmin(values):.5g} to {np.nanmax(values):.5g} {column.unit}"
-            some = f", {count} values" if count < values.size else ""
+            some = f", {counted(count, 'value')}" if count < values.size else ""
             rows.append((symbol, limits + some, f"{column.meaning}, {contents.origin[symbol]}"))
     return (*rows, *contents.settings.understood())
 

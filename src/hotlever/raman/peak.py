@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from hotlever.errors import InputError, unknown_name
+from hotlever.errors import InputError, counted, unknown_name
 from hotlever.raman import lineshape
 from hotlever.types import Array, Mask
 
@@ -122,10 +122,11 @@ def in_window(x: Array, where: str, window: tuple[float, float] = WINDOW) -> Mas
     """Samples of an axis (cm⁻¹) that are fitted; InputError if they are too few."""
     low, high = window
     inside = (x >= low) & (x <= high)
-    if np.count_nonzero(inside) < MIN_SAMPLES:
+    count = int(np.count_nonzero(inside))
+    if count < MIN_SAMPLES:
         raise InputError(
-            f"{where}{np.count_nonzero(inside)} samples between {low:g} and {high:g} "
-            f"cm⁻¹, expected at least {MIN_SAMPLES} around silicon's line"
+            f"{where}{counted(count, 'sample')} between {low:g} and "
+            f"{high:g} cm⁻¹, expected at least {MIN_SAMPLES} around silicon's line"
         )
     return np.asarray(inside)
 

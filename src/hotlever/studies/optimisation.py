@@ -178,6 +178,10 @@ def _check(probe: Probe, quantity: str, bounds: Mapping[str, Bounds]) -> None:
             raise InputError(f"{name}: found one bound, expected both of a number that may change")
         if low is not None and high is not None and not low < high:
             raise InputError(f"{name}: found {low:g} to {high:g}, expected a rising range")
+        for end in (low, high) if name in numbers else ():
+            if end is not None:
+                _, key, record = probe.field(name)
+                record.check_value(key, end, f"{name} = {end:g}")
     if not any(name not in QUANTITIES for name in bounds):
         raise InputError("found no number that may change, expected bounds of one at least")
 

@@ -11,7 +11,7 @@ from itertools import groupby
 
 import numpy as np
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, counted, shown
 from hotlever.files import read_bytes
 from hotlever.tables.cells import Dialect, Line, filled_lines
 from hotlever.tables.headings import (
@@ -186,8 +186,8 @@ class _Reader:
             halves = self._separator == "," and len(cells) == 2 * width
             hint = "; with decimal commas, tabs or semicolons must separate the cells" * halves
             raise InputError(
-                f"{self._path}: line {number}: {len(cells)} cells, expected {width} as in line "
-                f"{self._header}{hint}"
+                f"{self._path}: line {number}: {counted(len(cells), 'cell')}, expected {width} as "
+                f"in line {self._header}{hint}"
             )
         self.rows.append((number, line))
         return True

@@ -33,7 +33,13 @@ _USUAL_K = Surroundings.model_fields["jump_temperature_K"].default
 
 
 def approach(reporter: Reporter, request: ReaderRequest) -> None:
-    """Read a lever at distances to a surface, over biases and pressures."""
+    """Read a lever at distances to a surface, over biases and pressures.
+
+    Raises
+    ------
+    ComputationError
+        If it has no state at any of them.
+    """
     from hotlever.lever.reader import Reader, best_bias, over_surface, rows_of
 
     outputs = request.outputs()
@@ -43,9 +49,10 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
     biases = None if request.bias is None else parse_bias(request.bias, probe.lowest_bias_V)
     reader = Reader(probe, noise)
     lever = make_lever(reporter, probe)
-    with reporter.progress("distances") as update:
+    with reporter.progress_bars("best bias", "distances") as (trying, update):
         if biases is None:
-            biases = np.array([best_bias(lever, distances[[0, -1]], _HIGHEST_V, noise)])
+            best_V = best_bias(lever, distances[[0, -1]], _HIGHEST_V, noise, trying)
+            biases = np.array([best_V])
             reporter.note(
                 f"of all biases up to {_HIGHEST_V:g} V {biases.item():.4g} V resolves these "
                 "distances best (--bias chooses others)"
@@ -53,6 +60,8 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
         if needs_jump(probe):
             lever = jumping_at_tip(reporter, lever, float(biases[biases.size // 2]))
         data = over_surface(lever, distances, biases, noise, pressures, progress=update)
+    if not data.tip_K.notnull().any():
+        raise ComputationError(data.attrs["notes"].split("\n")[0])
     if not reader.is_held and probe.circuit.swept != "reader":
         reporter.note(
             "no supply heats the terminal reader ([circuit.reader]): the heater itself is read, "

@@ -12,7 +12,7 @@ from hotlever.errors import InputError, shown
 from hotlever.lever import Lever, State
 from hotlever.lever.set_points import hold
 from hotlever.lever.transient import Controller
-from hotlever.lever.transient.closed_loop import ClosedLoop
+from hotlever.lever.transient.closed_loop import FASTEST, ClosedLoop
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import PulseRequest
 from hotlever.tasks.texts import parse_number
@@ -37,9 +37,9 @@ class Control:
     ----------
     controller : Controller
     start, end : State
-        At rest before and, if the loop is stable, after.
+        At rest before and after.
     loop : ClosedLoop
-        At the end.
+        At the end, where it is stable.
     """
 
     controller: Controller
@@ -49,14 +49,14 @@ class Control:
 
     @property
     def settling(self) -> tuple[float, float]:
-        """Time constant (µs) and damping of the closed loop at the end; negative if it grows."""
+        """Time constant (µs) and damping of the closed loop at the end."""
         law = self.controller
         return self.loop.settling(law.proportional, law.integral, law.filter_us)
 
     @property
     def usual_end(self) -> float:
         """Time (µs) that is simulated if nobody says."""
-        return min(_CONSTANTS * abs(self.settling[0]), _LONGEST)
+        return min(_CONSTANTS * self.settling[0], _LONGEST)
 
     @property
     def tolerance_K(self) -> float:
@@ -86,12 +86,11 @@ class Control:
         way, tip = self.end.tip_K - self.start.tip_K, history.tip_K.values
         over = float(np.max(np.sign(way) * (tip - self.end.tip_K)))
         told = f"{over:.2g} K ({over / abs(way):.0%} of the step)" if over > 0.0 else "none"
-        kind = "time constant" if time > 0.0 else "grows by e in"
         return [
             ["tip, at rest before and after", f"{self.start.tip_K:.1f} K, {self.end.tip_K:.1f} K"],
             *([["tip, overshoot", told]] if resolved else []),
             ["tip, at the end", f"{tip[-1]:.1f} K at {history.time[-1].item():.4g} µs"],
-            ["closed loop", f"{kind} {abs(time):.3g} µs, damping ratio {ratio:.2g}"],
+            ["closed loop", f"time constant {time:.3g} µs, damping ratio {ratio:.2g}"],
         ]
 
 
@@ -99,12 +98,12 @@ def control(reporter: Reporter, lever: Lever, request: PulseRequest) -> Control:
     """Return the controller that is asked for, at the state where it begins.
 
     Its gains choose the states: above zero those where the resistance rises with the tip
-    temperature, below zero those where it falls. What is not stable is told.
+    temperature, below zero those where it falls.
 
     Raises
     ------
     InputError
-        If a resistance has no state that gains of this sign hold.
+        If a resistance has no state that gains of this sign hold, or the loop is not stable.
     """
     proportional, integral = _gains(request)
     resistances = [_resistance(request.hold_resistance, "--hold-resistance")]
@@ -124,14 +123,27 @@ def control(reporter: Reporter, lever: Lever, request: PulseRequest) -> Control:
             f"{resistances[1]:.5g} ohm takes a bias of {end.bias_V:.4g} V, which is above the "
             f"limit of {limit:.4g} V"
         )
-    made = Control(law, start, end, ClosedLoop.at(end))
-    time, _ = made.settling
-    if time < 0.0:
-        reporter.note(
-            f"with these gains the loop is not stable at {resistances[1]:.5g} ohm: what is off "
-            f"grows by e in {-time:.3g} µs (--gain-map draws stable ones)"
-        )
-    return made
+    loop = ClosedLoop.at(end)
+    _check_stable(loop, law)
+    return Control(law, start, end, loop)
+
+
+def _check_stable(loop: ClosedLoop, law: Controller) -> None:
+    """Refuse gains with which what is off grows, or rings faster than anything is known of."""
+    P, per_ms = law.proportional, law.integral
+    poles, _ = loop.closed(P, per_ms, law.filter_us)
+    if (growth := float(poles.real.max())) >= 0.0:
+        why = f"is not stable: what is off grows by e in {1.0 / max(growth, 1e-300):.3g} µs"
+    elif np.abs(poles.imag).max() > FASTEST:
+        why = "rings faster than the lever's answer is known, 100 MHz"
+    else:
+        return
+    better = loop.stable_gains(float(np.sign(per_ms)), law.filter_us)
+    expected = "others" if better is None else "stable ones such as {:.2g},{:.2g}".format(*better)
+    raise InputError(
+        f"--controller: with gains of {P:g},{per_ms:g} the loop at {law.set_ohm:.5g} ohm {why}; "
+        f"expected {expected} (--gain-map draws them all)"
+    )
 
 
 def check_control(request: PulseRequest) -> bool:

@@ -152,9 +152,9 @@ class FitRequest(DriveRequest, LeversRequest):
     def check(self) -> None:
         """Refuse what does not go together."""
         super().check()
+        check_number("--samples", self.samples, 1, 1_000_000)
         if not self.posterior:
             self.refuse(["samples"], "goes with --posterior")
-        check_number("--samples", self.samples, 1, 1_000_000)
         if self.posterior or self.profiles:
             self.need_single("--posterior", "--profiles")
         self.need_single(*self.drive)

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 #: Frequencies (Hz) at which the resistance is answered, and how near (relative) the sum is to it.
 _FREQUENCIES, _ACCURATE = np.geomspace(1.0, 1e8, 161), 1e-6
+#: The fastest of these, as a rate (1/µs): of faster oscillations nothing is known.
+FASTEST = 2e-6 * np.pi * float(_FREQUENCIES[-1])
 #: Poles with a smaller share in the answer to a step are not told.
 _SEEN = 0.01
 #: Gains of a map: P over that which would halve a lasting error, I over that with which it would do
@@ -38,6 +40,8 @@ _P, _I, _GAINS = (0.03, 1e3), (0.1, 3e4), 81
 #: The share of a step within which an answer has settled; times that are looked at, and the last of
 #: these over that of the slowest pole.
 _SETTLED, _TIMES, _LONG = 0.02, 240, 30.0
+#: An overshoot, as a share of a step, that is little.
+_LITTLE = 0.1
 
 
 @dataclass(frozen=True)
@@ -172,6 +176,15 @@ class ClosedLoop:
             tip_K=self.state.tip_K,
             lever=self.state.lever.probe.title,
         )
+
+    def stable_gains(self, sign: float, filter_us: float = 1.0) -> tuple[float, float] | None:
+        """Return the gains of a sign with which a step settles first, with little overshoot."""
+        data = self.gain_map(sign, filter_us)
+        settled = data.settling_us.where(data.overshoot < _LITTLE)
+        if not settled.notnull().any():
+            return None
+        best = settled[settled.argmin(...)]
+        return best.proportional.item(), best.integral.item()
 
     def settling(
         self, proportional: float, integral: float, filter_us: float = 1.0

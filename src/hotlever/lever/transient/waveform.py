@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, counted, shown
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.probe import Circuit
@@ -227,7 +227,7 @@ def pulse(volts: float, length: float, period: float | None = None, count: int =
             f"found a period of {period:g} µs, expected more than the {length:g} µs of the pulse"
         )
     else:
-        text += f" each {period:g} µs, {count} times"
+        text += f" each {period:g} µs, {counted(count, 'time')}"
     starts = period * np.arange(count)
     times = np.stack([starts, starts + length, starts + length, starts + period], axis=1)
     volt = np.tile([volts, volts, 0.0, 0.0], count)
