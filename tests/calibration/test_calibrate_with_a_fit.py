@@ -31,13 +31,6 @@ def shared_fit(tmp_path_factory, example):
     return path
 
 
-def test_a_fit_as_object_or_file_and_data_as_object_or_file_are_one(shared_fit, example):
-    by_path = calibrate(example, fit=shared_fit)
-    fitted = read_fit(shared_fit)
-    by_object = calibrate(fitted.measurement, fit=fitted)
-    np.testing.assert_allclose(by_path.table.tip_K, by_object.table.tip_K)
-
-
 def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
     status, out, err = run(
         "calibrate", example, "--fit", shared_fit, "-o", "cal.json", "--table", "t.csv",
@@ -57,6 +50,12 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
     assert content["tip_temperature_uncertainty_K"] < 40
     assert (tmp_path / "t.csv").read_text().startswith("bias_V,lever_V,current_mA,power_mW,tip_K")
     assert (tmp_path / "cal.png").stat().st_size > 10_000
+    # of objects in place of files it is the same
+    fitted = read_fit(shared_fit)
+    more = {"priors": {"dimensions": "±1%"}, "at_V": 8.05}
+    by_object = calibrate(fitted.measurement, fit=fitted, **more)
+    written = [row["tip_K"] for row in content["table"]]
+    np.testing.assert_allclose(by_object.table.tip_K, written, rtol=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from bare import state_at
@@ -18,17 +20,23 @@ from hotlever.probe.solid import SolidMeshOptions, mesh_solid
 OUTLINE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
 
 
-def highest(voltage, refinement):
-    """Highest temperature at the nodes of a mesh with sizes divided by `refinement`."""
+@cache
+def space(refinement):
+    """Elements whose sizes are divided by `refinement`."""
     layout = Layout((Region("all", "heater", OUTLINE),), (SUPPLY, GROUND), (0.5, 0.5), 0.3)
     # there is no air, so nothing asks for small edges along the rim
     sizes = SolidMeshOptions(
         heater=0.4, lever=0.2, corner=0.1, rim=100.0, grading=0.4, refinement=refinement
     )
     mesh = mesh_solid(layout, sizes)
-    space = FullSpace(mesh, FiniteElements(mesh.elements, ElementTetP2(), 4))
-    equations = LeverEquations(space, published("option III").material.kinds, Circuit())
-    return 293.0 + space.rises(state_at(equations, voltage)).max()
+    return FullSpace(mesh, FiniteElements(mesh.elements, ElementTetP2(), 4))
+
+
+def highest(voltage, refinement):
+    """Highest temperature at the nodes of a mesh."""
+    solid = space(refinement)
+    equations = LeverEquations(solid, published("option III").material.kinds, Circuit())
+    return 293.0 + solid.rises(state_at(equations, voltage)).max()
 
 
 @pytest.mark.parametrize("voltage", [0.5, 1.0])
