@@ -39,7 +39,7 @@ pytestmark = [
 ]
 SCREENSHOTS = Path(__file__).with_name("screenshots")
 #: Milliseconds that work may take on a busy machine.
-_WORK = 180_000
+_WORK = 600_000
 #: Milliseconds after which a cancelled posterior, which would take minutes, is waited for no more.
 #: It takes half a second where the machine does nothing else.
 _CANCEL = 15_000
