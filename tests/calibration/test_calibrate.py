@@ -259,10 +259,10 @@ def test_damaged_calibration_files_get_one_line(calibrated, tmp_path, keys, valu
     assert "\n" not in str(no.value)
 
 
-def test_a_budget_out_of_the_data_is_refused_before_the_work(example, monkeypatch):
+def test_a_budget_out_of_the_data_is_refused_before_the_work(calibrated, monkeypatch):
     monkeypatch.setattr("hotlever.calibration.procedure.estimate_lever", None)
     with pytest.raises(InputError, match="at 99 V: expected a bias in the measured range, from"):
-        calibrate(example, at_V=99.0)
+        calibrate(calibrated.measurement, at_V=99.0)
 
 
 def test_what_is_no_json_is_no_calibration(tmp_path):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize, minimize_scalar
 
 from hotlever.calibration.power_law import PowerLaw
-from hotlever.errors import InputError
+from hotlever.errors import InputError, counted
 from hotlever.lever import Branch
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array
@@ -99,8 +99,8 @@ def fit_power_law(
     power, tip, error = rows[:, np.argsort(rows[0], kind="stable")]
     if power.size < (fewest := _FEWEST_COLD + _FEWEST_HOT):
         raise InputError(
-            f"{power.size} temperatures with a power above zero, expected at least {fewest} for a "
-            "power law"
+            f"{counted(power.size, 'temperature')} with a power above zero, expected at least "
+            f"{fewest} for a power law"
         )
     data = _Rises(power, tip - base_temperature_K, 1.0 / error)
     law, stderr = _continuous(data) if continuous else _two_branches(data, threshold_mW)
