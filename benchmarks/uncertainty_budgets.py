@@ -18,6 +18,7 @@ Run: python benchmarks/uncertainty_budgets.py [LEVERS] [--first K] [--draws N] [
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -44,16 +45,15 @@ _WEIGHTS_STAY = SearchOptions(scatter_rounds=0)
 _BOOTSTRAPS = 200
 
 
-def lever_of(number: int, known: bool) -> tuple[Measurement, Probe, float]:
-    """Return the data of a lever, the probe that its owner has, and the true hottest tip (K)."""
+def lever_of(number: int, known: bool) -> tuple[Measurement, Probe, Callable[[Array], Array]]:
+    """Return the data of a lever, the probe that its owner has, and the true tip (K) by bias."""
     if not known:
-        lever = little_known_lever(number)
-        bias = lever.measurement.bias_V
-        return lever.measurement, lever.nominal, float(lever.tip_K(bias[bias.argmax()]))
+        little = little_known_lever(number)
+        return little.measurement, little.nominal, little.tip_K
     rng = np.random.default_rng(number)
     true, nominal = draw(rng, number, ("vacuum", "air")[number // 2 % 2])
-    data, tip_K, _ = measure(true, rng, "iv")
-    return data, nominal, float(tip_K[-1])
+    data, _, lever = measure(true, rng, "iv")
+    return data, nominal, lambda bias: lever.sweep(bias).tip_K.values
 
 
 class _OfDrawnErrors(Objective):
@@ -106,7 +106,7 @@ def beyond(changes: Array, other_K: float, tolerance: float, rng: Generator) -> 
 def judged(number: int, draws: int, known: bool, always: bool) -> tuple[str, ...]:
     """Return a row of the table; the referee is asked `always`, or where linear is said."""
     rng = np.random.default_rng(number)
-    measurement, nominal, true_K = lever_of(number, known)
+    measurement, nominal, tip_K = lever_of(number, known)
     estimate, stated = estimate_lever(measurement, nominal)
     calibration = calibrated_by_estimate(measurement, estimate, stated, "probe")
     gum = calibration.gum
@@ -118,7 +118,7 @@ def judged(number: int, draws: int, known: bool, always: bool) -> tuple[str, ...
     if gum.linear or always:
         changes = re_estimated(estimate, gum.bias_V, draws, rng)
         away = beyond(changes, float(np.linalg.norm(other)), budget.tolerance, rng)
-    error = abs(gum.estimate_K - true_K)
+    error = abs(gum.estimate_K - tip_K(np.array([gum.bias_V])).item())
     interval = gum.monte_carlo
     case = "linear" if gum.linear else "not linear"
     return (

@@ -22,6 +22,7 @@ from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.noise import METERS
 from hotlever.estimation.optimal_design import Information, NoiseLaw
 from hotlever.estimation.options import SearchOptions
+from hotlever.estimation.posterior import standard_errors
 from hotlever.estimation.prior_density import Coordinates, PriorDensity
 from hotlever.estimation.surrogate import CurveSurrogate
 from hotlever.lever.branch import Reach
@@ -201,7 +202,7 @@ class LinearisedLever:
         covariance = covariance[:count, :count]
         tip, slopes = self.tip(bias)
         slopes = slopes[:, :count]
-        linear = tip + length * np.sqrt(np.einsum("bp,pq,bq->b", slopes, covariance, slopes))
+        linear = tip + length * standard_errors(slopes, covariance)
         hottest = [
             self._hottest(float(each), slope, covariance, length)
             for each, slope in zip(bias, slopes, strict=True)

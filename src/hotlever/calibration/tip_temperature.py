@@ -21,7 +21,7 @@ from hotlever.errors import InputError
 from hotlever.estimation.experiment import TIP
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate
-from hotlever.estimation.posterior import Posterior
+from hotlever.estimation.posterior import Posterior, standard_errors
 from hotlever.estimation.profile import profile_of_tip
 from hotlever.lever import Branch
 from hotlever.lever.curve import spline_through
@@ -228,12 +228,11 @@ def errors_by_source(posterior: Posterior, slopes: Array) -> dict[str, Array]:
 
     Independent of each other, they add up to what the posterior says.
     """
-    variances: dict[str, Array] = {}
+    errors: dict[str, Array] = {}
     for name, share in posterior.shares.items():
         source = name if name in ("measurement", "fit") else _source(name)
-        variance = np.einsum("...p,pq,...q->...", slopes, share, slopes)
-        variances[source] = variances.get(source, 0.0) + variance
-    return {source: np.sqrt(variance) for source, variance in variances.items()}
+        errors[source] = np.hypot(errors.get(source, 0.0), standard_errors(slopes, share))
+    return errors
 
 
 def _source(name: str) -> str:

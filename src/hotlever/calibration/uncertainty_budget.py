@@ -9,11 +9,12 @@ Monte Carlo method (JCGM 101:2008).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from dataclasses import asdict, dataclass, replace
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 import xarray as xr
+from pydantic import PlainSerializer
 
 from hotlever.calibration.table import BUDGETS, budget_of
 from hotlever.errors import ComputationError, InputError
@@ -293,31 +294,10 @@ def _root(covariance: Array) -> Array:
     return np.asarray((axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T)
 
 
-class InputSection(Section):
-    """A row of a budget as calibration files hold it.
-
-    Without degrees of freedom its uncertainty is taken as exact.
-    """
-
-    quantity: str
-    estimate: Number
-    unit: str
-    u: Number
-    type: Literal["A", "B"]
-    distribution: str
-    sensitivity: Number
-    contribution_K: Number = np.nan
-    dof: Number = np.nan
-
-    @classmethod
-    def of(cls, row: InputQuantity) -> InputSection:
-        """Return the section of a row."""
-        return cls.holding(row, contribution_K=row.contribution)
-
-    def row(self) -> InputQuantity:
-        """Return the row."""
-        values = self.attributes_of(InputQuantity)
-        return InputQuantity(**values | ({"dof": np.inf} if np.isnan(self.dof) else {}))
+# A row as calibration files hold it.
+_Row = Annotated[
+    InputQuantity, PlainSerializer(lambda row: asdict(row) | {"contribution_K": row.contribution})
+]
 
 
 class IntervalSection(Section):
@@ -332,7 +312,7 @@ class IntervalSection(Section):
 class BudgetFields(Section):
     """An uncertainty budget as calibration files hold it, with what follows from it for 95 %."""
 
-    gum: list[InputSection] | None = IF_ANY
+    gum: list[_Row] | None = IF_ANY
     gum_correlation: Matrix | None = IF_ANY
     gum_bias_V: float | None = IF_ANY
     gum_of: BudgetOf | None = IF_ANY
@@ -350,7 +330,7 @@ class BudgetFields(Section):
             ends = {"low_K": interval.low, "high_K": interval.high}
             section = IntervalSection.holding(interval, **ends, tolerance_K=budget.tolerance)
         return {
-            "gum": [InputSection.of(row) for row in budget.inputs],
+            "gum": list(budget.inputs),
             "gum_correlation": budget.correlation,
             "gum_bias_V": stated.bias_V,
             "gum_of": stated.of,
@@ -380,7 +360,7 @@ class BudgetFields(Section):
         if told is not None:
             interval = CoverageInterval(told.trials, told.low_K, told.high_K)
         return TemperatureBudget(
-            Budget(tuple(each.row() for each in self.gum), self.gum_correlation),
+            Budget(tuple(self.gum), self.gum_correlation),
             row.bias_V.item(),
             row[f"{of}_K"].item(),
             limits_of(row, of),

@@ -16,6 +16,7 @@ from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.inverse_problem import Estimate, error_of_choice, estimate, in_medium
 from hotlever.estimation.lack_of_fit import lack_of_fit_text, outlier_notes
 from hotlever.estimation.options import FitOptions
+from hotlever.estimation.posterior import standard_errors
 from hotlever.estimation.result import Fit, band_dataset
 from hotlever.estimation.summary import undetermined
 from hotlever.measurement import Measurement, given_measurement
@@ -134,7 +135,7 @@ def _band(estimate: Estimate) -> xr.Dataset:
     slopes = estimate.prediction.tip_slopes[:, estimate.objective.columns]
     along = {name: columns[name] for name in ("time_us", "bias_V") if name in columns}
     power = estimate.probe.circuit.power(columns["bias_V"], columns["current_mA"])
-    stderr = np.sqrt(np.einsum("bi,ij,bj->b", slopes, covariance, slopes))
+    stderr = standard_errors(slopes, covariance)
     return band_dataset(**along, power_mW=power, tip_K=columns["tip_K"], tip_stderr_K=stderr)
 
 

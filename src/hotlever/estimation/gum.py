@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import WrapValidator
 from scipy.special import stdtrit
 
+from hotlever.records import Number
 from hotlever.types import Array, Index
 
 #: Trials of a block, and the most of all blocks (JCGM 101, 7.9.4 and 7.2.1).
@@ -17,6 +19,9 @@ _BLOCK, _MOST_TRIALS = 10_000, 1_000_000
 #: Ends of an interval are settled within this share of the tolerance that a budget is judged by
 #: (JCGM 101, 8.2).
 _SETTLED = 0.2
+
+# Infinite where a file has none.
+_Dof = Annotated[float, WrapValidator(lambda dof, check: math.inf if dof is None else check(dof))]
 
 
 @dataclass(frozen=True)
@@ -36,18 +41,18 @@ class InputQuantity:
     sensitivity : float
         Derivative of the measurand by the quantity.
     dof : float
-        Degrees of freedom; infinite if the uncertainty is taken as exact, NaN if it is not known
-        how many it has.
+        Degrees of freedom; infinite (in files: none) if the uncertainty is taken as exact, NaN if
+        it is not known how many it has.
     """
 
     quantity: str
-    estimate: float
+    estimate: Number
     unit: str
-    u: float
+    u: Number
     type: Literal["A", "B"]
     distribution: str
-    sensitivity: float
-    dof: float = math.inf
+    sensitivity: Number
+    dof: _Dof = math.inf
 
     @property
     def contribution(self) -> float:

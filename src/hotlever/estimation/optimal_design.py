@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
+from hotlever.estimation.posterior import standard_errors
 from hotlever.types import Array
 
 
@@ -47,7 +48,7 @@ class Information:
 
     def stderr(self, gradients: Array) -> Array:
         """Return standard errors of quantities with gradients (..., q)."""
-        return np.sqrt(np.einsum("...p,pq,...q->...", gradients, self.covariance, gradients))
+        return standard_errors(gradients, self.covariance)
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def best_first(
     left = dict(most or {})
     while len(chosen) < count:
         covariance = information.covariance
-        before = float(np.sqrt(gradient @ covariance @ gradient))
+        before = float(standard_errors(gradient, covariance))
         gains = {
             number: (before - np.sqrt(each.variance_after(covariance, gradient))) / each.cost
             for number, each in enumerate(candidates)

@@ -32,6 +32,11 @@ _LEAST_FREE = 0.05
 _WEIGHT_ROUNDS = 50
 
 
+def standard_errors(slopes: Array, covariance: Array) -> Array:
+    """Return standard errors of quantities with derivatives (..., p), by a covariance (p, p)."""
+    return np.sqrt(np.einsum("...p,pq,...q->...", slopes, covariance, slopes))
+
+
 class Posterior:
     """What is known of the varied parameters, (p,), after the data.
 
@@ -122,8 +127,8 @@ class Posterior:
         scales = objective.residuals.in_common(values, self.slopes, self.covariance)
         by = objective.of_priors(point)
         away = objective.from_priors(point) + by @ step
-        left = np.sqrt(np.einsum("ij,jk,ik->i", by, laplace, by))
-        rows = zip(prior.sources, away.tolist(), left.tolist(), strict=True)
+        left = standard_errors(by, laplace).tolist()
+        rows = zip(prior.sources, away.tolist(), left, strict=True)
         return {name: Moved(size, rest) for name, size, rest in rows if name != "fit"} | scales
 
     @property
@@ -158,9 +163,8 @@ class Posterior:
 
     def of(self, quantity: Quantity) -> tuple[float, float]:
         """Return a quantity and its standard error, linearised."""
-        gradient = quantity.gradient(self.slopes)
         value = quantity.value(self.at.values, self.objective.values(self.at.probe))
-        return value, float(np.sqrt(gradient @ self.covariance @ gradient))
+        return value, float(standard_errors(quantity.gradient(self.slopes), self.covariance))
 
     @property
     def deviance(self) -> float:

@@ -37,6 +37,7 @@ from hotlever.estimation.outcome import (
     array,
 )
 from hotlever.estimation.over_a_sample import with_distances
+from hotlever.estimation.posterior import standard_errors
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever.dataset import probe_attributes
@@ -219,7 +220,7 @@ class Fit(Outcome):
                     for way in (1 - 1e-4, 1 + 1e-4)
                 )
                 slope[self.names.index(name)] = float(high - low) / (2e-4 * value)
-        return float(np.sqrt(slope @ self.covariance @ slope))
+        return float(standard_errors(slope, self.covariance))
 
     def model(self, bias: ArrayLike | None = None) -> xr.Dataset:
         """Solve the fitted lever, at the measured biases by default; see `Lever.sweep`.

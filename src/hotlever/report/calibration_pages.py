@@ -13,7 +13,6 @@ from hotlever.calibration.summary import calibration_parts
 from hotlever.calibration.table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, even_rows
 from hotlever.datasets import QUANTITIES
 from hotlever.estimation.batch import Batch
-from hotlever.materials.parameters import sentence
 from hotlever.report.budget_pages import add_largest
 from hotlever.report.fit_pages import add_remarks
 from hotlever.report.page import Block, Page
@@ -32,9 +31,7 @@ def calibration_page(
     described = calibration.describes_data
     page = Page(f"Calibration of {calibration.measurement.path}", added=added)
     parts = calibration_parts(calibration)
-    page.text(sentence("; ".join(parts.before)))
-    for text in parts.after:
-        page.text(sentence(text))
+    page.sentences("; ".join(parts.before), *parts.after)
     for caption, (head, *rows) in parts.tables:
         page.table(head, rows, caption or "The standard error of the tip temperature, by source.")
     page.figure(
@@ -60,8 +57,7 @@ def calibration_page(
     )
     if calibration.gum is not None:
         add_largest(page, calibration.gum)
-    for note in calibration.notes:
-        page.text(sentence(note))
+    page.sentences(*calibration.notes)
     return page
 
 
@@ -78,8 +74,7 @@ def calibrations_page(batch: Batch[Calibration], levers: xr.Dataset) -> Page:
         f"Calibrations of {levers.sizes['lever']} levers",
         "Tip temperatures of levers from their I-V curves, and where they differ.",
     )
-    for text in calibration_statements(levers):
-        page.text(sentence(text))
+    page.sentences(*calibration_statements(levers))
     page.figure(
         "calibrated_levers",
         figures.calibrated_levers(batch.results, levers),

@@ -14,7 +14,7 @@ from hotlever.estimation.result import Fit
 from hotlever.estimation.summary import NEAREST, conclusions, parameter_rows
 from hotlever.estimation.uncertainty import Uncertainty
 from hotlever.lever import Lever
-from hotlever.materials.parameters import INVERSION, sentence
+from hotlever.materials.parameters import INVERSION
 from hotlever.report.page import Block, Page
 
 #: Points of a curve without visible corners.
@@ -82,8 +82,7 @@ def add_fit(page: Page, fit: Fit) -> None:
 
 def _add_words(page: Page, fit: Fit) -> None:
     if not fit.describes_data:
-        page.text(sentence(fit.doubt))
-        page.text(sentence(NEAREST))
+        page.sentences(fit.doubt, NEAREST)
     page.table(
         ("parameter", "value", "unit", ""),
         parameter_rows(fit),
@@ -91,8 +90,7 @@ def _add_words(page: Page, fit: Fit) -> None:
         if fit.describes_data
         else "Material parameters of the nearest lever.",
     )
-    for text in fit.notes:
-        page.text(sentence(text))
+    page.sentences(*fit.notes)
     page.text(f"{'; '.join(conclusions(fit))}.")
 
 
@@ -125,8 +123,7 @@ def _add_fit_in_time(page: Page, fit: Fit) -> None:
 
 def _add_uncertainty(page: Page, uncertainty: Uncertainty) -> None:
     page.heading("How sure")
-    for text in uncertainty.statements():
-        page.text(sentence(text))
+    page.sentences(*uncertainty.statements())
     for caption, columns, rows in uncertainty.tables():
         page.table(columns, rows, caption)
     fit = uncertainty.fit
@@ -165,8 +162,7 @@ def levers_page(batch: Batch[Fit]) -> Page:
         "Material parameters of levers from their measured "
         f"{' or '.join(', '.join(names) for names in sorted(observables))}.",
     )
-    for text in statements(levers):
-        page.text(sentence(text))
+    page.sentences(*statements(levers))
     page.figure(
         "lever_parameters",
         figures.lever_parameters(levers),

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from hotlever import __version__
 from hotlever.figures import save_figure
 from hotlever.files import output_folder, write_text
+from hotlever.materials.parameters import sentence
 
 # A part of a page: its ``kind``, and what that has.
 Block = dict[str, Any]
@@ -89,6 +90,11 @@ class Page:
     def text(self, text: str) -> None:
         """Add a paragraph."""
         self._add("text", text=text)
+
+    def sentences(self, *texts: str) -> None:
+        """Add paragraphs of words, each made a sentence."""
+        for text in texts:
+            self.text(sentence(text))
 
     def table(
         self,

@@ -81,8 +81,7 @@ def _step(page: Page, lever: Lever, biases: list[float]) -> None:
         rows.append([f"{bias:g}", *(f"{value:.0f}" for value in tip)])
     heads = ["bias (V)", *(f"{time:g} µs" for time in times)]
     page.table(heads, rows, "Tip temperature (K) so long after the bias was switched on.")
-    for text in filter(None, history.attrs["notes"].split("\n")):
-        page.text(sentence(text))
+    page.sentences(*filter(None, history.attrs["notes"].split("\n")))
 
 
 def _train(page: Page, lever: Lever, biases: list[float]) -> None:

@@ -12,7 +12,6 @@ import xarray as xr
 from hotlever import figures
 from hotlever.calibration import Calibration, calibrate
 from hotlever.calibration.summary import calibration_parts
-from hotlever.materials.parameters import sentence
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.report.page import Page
@@ -229,8 +228,7 @@ def _real_curve(page: Page, calibrations: Sequence[Calibration]) -> None:
         figures.residuals_of_current(calibration.measurement.bias_V, off, _READ_UA),
         "Measured less calibrated currents, and the error of reading them off (grey).",
     )
-    for text in calibration_parts(calibration).before:
-        page.text(sentence(text))
+    page.sentences(*calibration_parts(calibration).before)
     page.table(
         ("parameter", "assumed", "by the curve"),
         [
