@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,7 +75,7 @@ def residuals_of(current):
     shown = SHOWN[np.isfinite(current)]
     predicted = np.stack([shown, shown, shown])
     for _ in range(3):
-        residuals.take_scatter(predicted, usual=1e-3)
+        residuals.take_scatter(predicted, discrepancy=1e-6)
     return residuals, predicted
 
 
@@ -122,7 +124,7 @@ def test_what_the_scale_of_a_meter_explains_is_no_noise():
     covariance = np.array([[1e-8]])
     for _ in range(3):
         leverage = residuals.leverage(residuals.jacobian(slopes), covariance)
-        residuals.take_scatter(predicted, leverage, usual=1e-3)
+        residuals.take_scatter(predicted, leverage, discrepancy=1e-6)
     assert residuals.errors.scale[0, 20:] / (1e-4 * SHOWN[20:]) == pytest.approx(1.0, abs=0.25)
     # the share of noise that is taken up, by the covariance of all that data are made of
     weights = residuals.errors.weights[0]
@@ -134,9 +136,29 @@ def test_what_the_scale_of_a_meter_explains_is_no_noise():
     np.testing.assert_allclose(leverage[0], 1.0 - np.diag(np.linalg.inv(whole)), rtol=1e-6)
 
 
-def test_few_data_of_a_good_meter_scatter_by_what_is_usual_and_many_by_their_own():
-    """Three that lie on a prediction by chance have no noise of zero."""
-    few, _ = residuals_of(np.where(np.arange(SHOWN.size) > 36, SHOWN, np.nan))
-    many, _ = residuals_of(SHOWN + noise(7, 1e-5 * SHOWN))
-    assert 2e-4 < few.errors.scale[0, -1] / SHOWN[-1] < 1e-3
-    assert many.errors.scale[0, -1] / SHOWN[-1] == pytest.approx(1e-5, rel=0.4)
+@pytest.mark.parametrize("stated", [None, 1e-4])
+def test_no_data_are_better_than_the_model(stated):
+    """Nor are means of many rows, or what lies on a prediction by chance."""
+    current, count = SHOWN + noise(7, 1e-5 * SHOWN), SHOWN.size
+    nothing = np.full(count, np.nan)
+    measurement = Measurement(np.arange(1.0, 41.0), current, nothing, nothing, nothing)
+    if stated is not None:
+        measurement = replace(measurement, current_error_mA=np.full(count, stated * SHOWN[-1]))
+    measurement = replace(measurement, rows=np.full(count, 100))
+    residuals = Residuals(measurement, ("current",), "errors")
+    residuals.take_scatter(np.stack([SHOWN, SHOWN, SHOWN]), discrepancy=5e-4)
+    share = np.sqrt(np.mean(residuals.errors.scale**2)) / SHOWN[-1]
+    assert share == pytest.approx(np.hypot(5e-4, stated or 0.0), rel=0.01)
+
+
+def test_the_discrepancy_of_a_model_falls_out_of_differences():
+    """Of rows in contact and away from it, that is; rows in contact alone have all of it."""
+    nothing = np.full(SHOWN.size, np.nan)
+    measurement = Measurement(np.arange(1.0, 41.0), SHOWN, nothing, nothing, nothing)
+    shares = []
+    for away in (0.0, 1.0):
+        distance = np.where(np.arange(SHOWN.size) % 2, away, 0.0)
+        residuals = Residuals(replace(measurement, distance_um=distance), ("current",), "errors")
+        residuals.take_scatter(np.stack([SHOWN, SHOWN, SHOWN]), discrepancy=5e-4)
+        shares.append(np.sqrt(np.mean(residuals.errors.scale**2)) / SHOWN[-1])
+    assert shares == pytest.approx([5e-4, 2.5e-5], rel=0.01)

@@ -21,7 +21,6 @@ from hotlever.estimation.experiment import TIP
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.noise import METERS
 from hotlever.estimation.optimal_design import Information, NoiseLaw
-from hotlever.estimation.options import SearchOptions
 from hotlever.estimation.posterior import standard_errors
 from hotlever.estimation.prior_density import Coordinates, PriorDensity
 from hotlever.estimation.surrogate import CurveSurrogate
@@ -40,7 +39,7 @@ from hotlever.units import MOST_BIAS
 _SCALED = {observable: scale for scale, observable in SCALES.items()}
 #: Noise of a thermometer and of meters that nobody has stated.
 _USUAL_NOISE = {"tip": NoiseLaw(RAMAN_ERROR_K, RAMAN_ERROR_SHARE)}
-_USUAL_OF_METERS = NoiseLaw(0.0, SearchOptions().usual_scatter)
+_USUAL_OF_METERS = NoiseLaw(0.0, 1e-3)
 
 
 @dataclass(frozen=True)

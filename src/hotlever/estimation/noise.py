@@ -38,12 +38,13 @@ _WARM_K = 100.0
 #: Huber's weights lessen from here on; the others are full up to, and nothing beyond, so many
 #: standard deviations: data without outliers keep nearly all of theirs, and their scatter.
 _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
-#: What is smooth is no noise: data scatter by so many times as much as about their neighbours at
-#: most, or a search would be content with a wrong lever and noisy data. So many data tell.
-_OF_NOISE, _TELLING = 4.0, 7
+#: What is smooth is no noise: data scatter by so many times as much as about their neighbours, or
+#: as a model is off, at most, or a search would be content with a wrong lever and noisy data. So
+#: many data tell.
+_OF_NOISE, _OF_DISCREPANCY, _TELLING = 4.0, 2.0, 7
 
 
-def relative_noise(difference: Array, shown: Array, leverage: Array, usual: float) -> Array:
+def relative_noise(difference: Array, shown: Array, leverage: Array, least: float) -> Array:
     """Return the noise of data relative to its root mean square, (n,); one where there is none.
 
     Parameters
@@ -54,8 +55,8 @@ def relative_noise(difference: Array, shown: Array, leverage: Array, usual: floa
         The prediction.
     leverage : ndarray, shape (n,)
         The share of each datum's noise that the fit has taken up.
-    usual : float
-        Scatter that counts as one datum more, in the unit of the data.
+    least : float
+        Counts as one datum more, in the unit of the data.
 
     Notes
     -----
@@ -67,10 +68,10 @@ def relative_noise(difference: Array, shown: Array, leverage: Array, usual: floa
     squares = difference[here] ** 2 / np.maximum(1.0 - leverage[here], _LEAST_FREE)
     size = shown[here] ** 2
     shape = 1.0 - _SHARES[:, None] + _SHARES[:, None] * size / np.mean(size)
-    by_shape = np.append(squares / shape, np.full((_SHARES.size, 1), usual**2), axis=1)
+    by_shape = np.append(squares / shape, np.full((_SHARES.size, 1), least**2), axis=1)
     scale = np.median(by_shape, axis=1, keepdims=True) + np.mean(by_shape, axis=1, keepdims=True)
     for _ in range(_ROUNDS):
-        counting = _weight_of_t(by_shape / scale)
+        counting = (_TAILS + 1.0) / (_TAILS + by_shape / scale)
         scale = np.mean(counting * by_shape, axis=1, keepdims=True)
     tails = 0.5 * (_TAILS + 1.0) * np.log1p(by_shape / (_TAILS * scale))
     likelihood = -tails.sum(axis=1) - 0.5 * np.log(shape * scale).sum(axis=1)
@@ -79,11 +80,6 @@ def relative_noise(difference: Array, shown: Array, leverage: Array, usual: floa
     relative = np.ones(difference.shape)
     relative[here] = np.sqrt(1.0 / (precision * np.mean(1.0 / precision)))
     return relative
-
-
-def _weight_of_t(squares: Array) -> Array:
-    """Return how much data count of a t distribution, by their squares over its scale's."""
-    return (_TAILS + 1.0) / (_TAILS + squares)
 
 
 class DataErrors:
@@ -131,6 +127,7 @@ class DataErrors:
         if measured is not None:
             self.without = np.all(np.isnan(measured), axis=1)
             self.scale = np.where(np.isfinite(measured), measured, 0.01 * largest / root)
+        self._stated = self.scale
         self.down = np.ones(present.shape)
         # the noise of each datum over that of its observable
         self._relative = np.ones(present.shape)
@@ -179,44 +176,46 @@ class DataErrors:
         self.down = np.sqrt(_HUBER / np.maximum(size, _HUBER)) if gently else forgetful
 
     def take_scatter(
-        self, difference: Array, shown: Array, leverage: Array | float = 0.0, usual: float = 0.0
+        self,
+        difference: Array,
+        shown: Array,
+        leverage: Array | float = 0.0,
+        discrepancy: float = 0.0,
     ) -> None:
         """Give observables without measurement errors their scatter about what is shown.
 
         Outliers count as little as they weigh. The `leverage`, (observables, n), is the share of
-        each datum's noise that a fit has taken up. The `usual` scatter, a share of the largest
-        value, counts as one datum more, of a t distribution: a few data say little of their own,
-        many data of a good meter outvote it. With it the noise may go with the size of what is
-        shown (see `relative_noise`), and is not what is smooth; without it is the same everywhere.
+        each datum's noise that a fit has taken up. The `discrepancy` is by how much a model is off
+        that describes the data, a share of the largest value: it is an error of every datum beside
+        its scatter, or beside what was measured of it. With it the noise may go with the size of
+        what is shown (see `relative_noise`), and is not what is smooth; without it is the same
+        everywhere.
         """
         weight = np.where(self.present, self.down**2, 0.0)
         difference = difference * self._root
         leverage = np.broadcast_to(leverage, difference.shape)
-        least = usual * self.largest
-        if usual:
+        least = discrepancy * self.largest
+        if discrepancy:
             for row in np.flatnonzero(self.without):
                 self._relative[row] = relative_noise(
                     difference[row], shown[row], leverage[row], float(least[row, 0])
                 )
         squares = np.nansum(weight * (difference / self._relative) ** 2, axis=1, keepdims=True)
-        count = weight.sum(axis=1, keepdims=True) + bool(usual)
-        free = np.maximum(count - leverage.sum(axis=1, keepdims=True), 1.0)
-        smallest, counting = 1e-6 * self.largest, np.ones_like(squares)
-        for _ in range(1 + _ROUNDS if usual else 1):
-            scatter = np.maximum(np.sqrt((squares + counting * least**2) / free), smallest)
-            counting = _weight_of_t((least / scatter) ** 2)
-        if usual:
-            scatter = np.minimum(scatter, np.maximum(_OF_NOISE * self._noise(difference), least))
-        own = scatter * self._relative / self._root
-        self.scale = np.where(self.without[:, None], own, self.scale)
+        free = np.maximum(np.sum(weight - leverage, axis=1, keepdims=True), 1.0)
+        scatter = np.maximum(np.sqrt(squares / free), 1e-6 * self.largest)
+        if discrepancy:
+            most = np.maximum(_OF_NOISE * self._noise(difference), _OF_DISCREPANCY * least)
+            scatter = np.minimum(scatter, most)
+        # the mean of many rows of a file has less noise, but no better model
+        own = self._relative * np.hypot(scatter / self._root, least)
+        self.scale = np.where(self.without[:, None], own, np.hypot(self._stated, least))
 
     def degrees_of_freedom(self, leverage: Array) -> Array:
         """Return those of the errors of each observable, (observables,); infinite of stated ones.
 
-        A scatter has as many as data count, less what a fit has taken up; where a usual one counts
-        as a datum more, one more (see `take_scatter`).
+        A scatter has as many as data count, less what a fit has taken up.
         """
-        count = np.sum(np.where(self.present, self.down**2, 0.0), axis=1) + self.measured
+        count = np.sum(np.where(self.present, self.down**2, 0.0), axis=1)
         free = np.maximum(count - leverage.sum(axis=1), 1.0)
         return np.where(self.without | (not self.measured), free, np.inf)
 

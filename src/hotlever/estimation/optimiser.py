@@ -346,6 +346,6 @@ class Optimiser:
         for _ in range(options.scatter_rounds):
             values, slopes = near.predict(point)
             leverage = self.objective.leverage(slopes, point)
-            self.residuals.take_scatter(values, leverage, options.usual_scatter)
+            self.residuals.take_scatter(values, leverage, options.discrepancy)
             point, least = near.minimum(point, region)
         return point, least

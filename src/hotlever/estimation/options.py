@@ -210,8 +210,10 @@ class SearchOptions:
         standard error and of its value ends the fit: the confirmed model is exact to first order.
     confirmations : int
         Most of them.
-    usual_scatter : float
-        Noise that is usual, as a share of the largest value: it counts as one datum more.
+    discrepancy : float
+        By how much a model is off that describes the data, a share of an observable's largest
+        value, where something was known of the lever beforehand (model discrepancy: Kennedy and
+        O'Hagan, J. R. Stat. Soc. B 63, 425 (2001)).
     """
 
     most_branches: int = 25
@@ -236,4 +238,4 @@ class SearchOptions:
     settled: float = 0.5
     settled_relative: float = 0.03
     confirmations: int = 5
-    usual_scatter: float = 1e-3
+    discrepancy: float = 5e-4

@@ -26,6 +26,10 @@ ZEROED = ("current", "reader", "bridge")
 #: A zero is worth a note beyond this many standard errors.
 _NOTICED = 7.0
 
+#: A model is off by nearly the same near a sample and away from it: of its discrepancy so much is
+#: left in the difference, which is what rows at several distances tell.
+_OF_DIFFERENCES = 0.05
+
 
 class Residuals:
     """The weighted differences of a measurement from predictions.
@@ -233,14 +237,16 @@ class Residuals:
         return self.errors.deviations(self.own_difference(values))
 
     def take_scatter(
-        self, values: Array, leverage: Array | float = 0.0, usual: float = 0.0
+        self, values: Array, leverage: Array | float = 0.0, discrepancy: float = 0.0
     ) -> None:
         """Give observables without measurement errors their scatter about a prediction.
 
         See `hotlever.estimation.noise.DataErrors.take_scatter`.
         """
         difference = self.own_difference(values)
-        self.errors.take_scatter(difference, values[self.rows], leverage, usual)
+        if self.distance_um is not None and np.unique(self.distance_um).size > 1:
+            discrepancy *= _OF_DIFFERENCES
+        self.errors.take_scatter(difference, values[self.rows], leverage, discrepancy)
 
     def drifting_zeros(self, values: Array, slopes: Array) -> list[str]:
         """Say how the zeros drift, or that they seem to."""
