@@ -2,9 +2,10 @@
 
 How levers are simulated and judged: `hotlever.studies.simulation_based_calibration`. Each is solved
 with a richer model than the one that calibrates it, and measured in 40 points, the current with
-0.2 % of noise.
+0.2 % of noise, unless --noise states another share.
 
-Run: python benchmarks/twins.py [LEVERS] [vacuum|air] [iv|reader|raman] [--without DEPARTURE ...]
+Run: python benchmarks/twins.py [LEVERS] [vacuum|air] [iv|reader|raman] [--noise SHARE]
+                          [--without DEPARTURE ...]
      python benchmarks/twins.py [LEVERS] all      every medium and kind of data
 
 With --wild, levers of which the owner knows little, and says so (`little_known_levers`):
@@ -39,6 +40,7 @@ from hotlever.studies.simulation_based_calibration import (
     HIGHEST_V,
     KINDS,
     LEVELS,
+    NOISE,
     concatenated,
     coverage_by_decile,
     judge,
@@ -55,10 +57,12 @@ from little_known_levers import (
 from problems import table
 
 
-def judged(number: int, medium: str, what: str, departures: list[str]) -> xr.Dataset | str:
+def judged(
+    number: int, medium: str, what: str, departures: list[str], noise: float
+) -> xr.Dataset | str:
     """Judge the calibration of a lever; the reason in words if there is none of that number."""
     try:
-        return judge(number, medium, what, departures)
+        return judge(number, medium, what, departures, noise)
     except HotleverError as error:
         return str(error)
 
@@ -101,12 +105,12 @@ def two_at_a_time(judged: Callable[[int], Any], numbers: list[int]) -> Iterator[
             yield future.result()
 
 
-def main(count: int, medium: str, what: str, departures: list[str]) -> None:
-    judge_one = partial(judged, medium=medium, what=what, departures=departures)
+def main(count: int, medium: str, what: str, departures: list[str], noise: float) -> None:
+    judge_one = partial(judged, medium=medium, what=what, departures=departures, noise=noise)
     results = list(two_at_a_time(judge_one, [*range(count)]))
     without = [name for name in DEPARTURES if name not in departures]
     ending = f", without {', '.join(without)}" if without else ""
-    report(results, f"{medium}, {what}{ending}")
+    report(results, f"{medium}, {what}, noise of {noise:g}{ending}")
 
 
 # --- levers of which little is known -------------------------------------------------------------
@@ -216,6 +220,7 @@ if __name__ == "__main__":
     listed = "\n".join(f"{name}: {meaning}" for name, meaning in DEPARTURES.items())
     listed = listed.replace("%", "%%")  # argparse formats its help
     parser.add_argument("--without", nargs="+", choices=DEPARTURES, default=[], help=listed)
+    parser.add_argument("--noise", type=float, default=NOISE, help="of meters, a share")
     parser.add_argument("--wild", action="store_true", help="levers of which little is known")
     parser.add_argument("--count", type=int, default=200, help="of levers of which little is known")
     parser.add_argument("--first", type=int, default=0, help="number of the first of them")
@@ -233,4 +238,4 @@ if __name__ == "__main__":
     chosen = [name for name in DEPARTURES if name not in given.without]
     everything = [(medium, what) for medium in HIGHEST_V for what in KINDS]
     for medium, what in everything if given.medium == "all" else [(given.medium, given.what)]:
-        main(given.levers, medium, what, chosen)
+        main(given.levers, medium, what, chosen, given.noise)

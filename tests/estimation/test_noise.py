@@ -151,6 +151,18 @@ def test_no_data_are_better_than_the_model(stated):
     assert share == pytest.approx(np.hypot(5e-4, stated or 0.0), rel=0.01)
 
 
+def test_degrees_of_freedom_are_those_of_what_is_estimated():
+    """Half of a variance that is a scatter makes four times as many (Welch, Satterthwaite)."""
+    current = SHOWN + noise(7, 2e-3 * SHOWN[-1])
+    measurement = Measurement(np.arange(1.0, 41.0), current, *3 * [np.full(SHOWN.size, np.nan)])
+    residuals, taken = Residuals(measurement, ("current",), "errors"), np.zeros((1, SHOWN.size))
+    scatter = np.sqrt(np.mean((current - SHOWN) ** 2)) / current.max()
+    for discrepancy, factor in ((1e-6, 1.0), (scatter, 4.0)):
+        residuals.take_scatter(np.stack([SHOWN, SHOWN, SHOWN]), discrepancy=discrepancy)
+        dof = residuals.errors.degrees_of_freedom(taken)
+        assert dof == pytest.approx(factor * SHOWN.size, rel=0.05)
+
+
 def test_the_discrepancy_of_a_model_falls_out_of_differences():
     """Of rows in contact and away from it, that is; rows in contact alone have all of it."""
     nothing = np.full(SHOWN.size, np.nan)

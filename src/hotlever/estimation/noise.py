@@ -127,7 +127,8 @@ class DataErrors:
         if measured is not None:
             self.without = np.all(np.isnan(measured), axis=1)
             self.scale = np.where(np.isfinite(measured), measured, 0.01 * largest / root)
-        self._stated = self.scale
+        # what was stated, and what a model is off by beside it
+        self._stated, self._discrepancy = self.scale, np.zeros_like(largest)
         self.down = np.ones(present.shape)
         # the noise of each datum over that of its observable
         self._relative = np.ones(present.shape)
@@ -194,7 +195,7 @@ class DataErrors:
         weight = np.where(self.present, self.down**2, 0.0)
         difference = difference * self._root
         leverage = np.broadcast_to(leverage, difference.shape)
-        least = discrepancy * self.largest
+        self._discrepancy = least = discrepancy * self.largest
         if discrepancy:
             for row in np.flatnonzero(self.without):
                 self._relative[row] = relative_noise(
@@ -213,10 +214,15 @@ class DataErrors:
     def degrees_of_freedom(self, leverage: Array) -> Array:
         """Return those of the errors of each observable, (observables,); infinite of stated ones.
 
-        A scatter has as many as data count, less what a fit has taken up.
+        A scatter has as many as data count, less what a fit has taken up. Those of its sum with a
+        discrepancy, which is no estimate, follow from Welch and Satterthwaite's equation.
         """
         count = np.sum(np.where(self.present, self.down**2, 0.0), axis=1)
         free = np.maximum(count - leverage.sum(axis=1), 1.0)
+        estimated = 1.0 - (self._relative * self._discrepancy / self.scale) ** 2
+        share = np.mean(estimated, axis=1, where=self.present)
+        with np.errstate(divide="ignore"):
+            free = free / share**2
         return np.where(self.without | (not self.measured), free, np.inf)
 
     def noise_squares(self, difference: Array) -> float:

@@ -128,10 +128,12 @@ def measure(
     what: str,
     departures: Collection[str] = ALL,
     highest: float | None = None,
+    noise: float = NOISE,
 ) -> tuple[Measurement, Array, Lever]:
     """Measure a lever up to a bias (V), or as far as it goes; return its true temperatures (K) too.
 
-    Of ``KINDS``, the current is measured alone, with the reader, or with five Raman temperatures.
+    Of ``KINDS``, the current is measured alone, with the reader, or with five Raman temperatures;
+    meters have a noise that is a share of what they show.
 
     Raises
     ------
@@ -150,7 +152,7 @@ def measure(
 
     def noisy(values: Array) -> Array:
         drift = drifting * rng.standard_normal() * np.linspace(0.0, 1.0, POINTS)
-        return np.asarray(values * (1.0 + NOISE * rng.standard_normal(POINTS) + drift))
+        return np.asarray(values * (1.0 + noise * rng.standard_normal(POINTS) + drift))
 
     nothing = np.full(POINTS, np.nan)
     reader = noisy(sweep.reader_V.values) if what == "reader" else nothing
@@ -167,7 +169,7 @@ def measure(
     if "outliers" in departures and rng.random() < _SOME:
         outliers = rng.choice(POINTS, rng.integers(1, 3), replace=False)
         off = rng.choice((-1.0, 1.0), outliers.size) * rng.uniform(*_FAR, outliers.size)
-        current[outliers] *= 1.0 + NOISE * off
+        current[outliers] *= 1.0 + noise * off
     return Measurement(sweep.bias.values, current, reader, tips, errors), tip, lever
 
 
@@ -196,7 +198,11 @@ def _in_vacuum(nominal: Probe) -> Branch:
 
 
 def judge(
-    number: int, medium: str = "vacuum", what: str = "iv", departures: Collection[str] = ALL
+    number: int,
+    medium: str = "vacuum",
+    what: str = "iv",
+    departures: Collection[str] = ALL,
+    noise: float = NOISE,
 ) -> xr.Dataset:
     """Simulate the lever of a number, calibrate it, and compare with its true temperature.
 
@@ -217,7 +223,7 @@ def judge(
     """
     rng = np.random.default_rng(number)
     true, nominal = draw(rng, number, medium, departures)
-    data, _, lever = measure(true, rng, what, departures)
+    data, _, lever = measure(true, rng, what, departures, noise=noise)
     off, refused, doubted = np.full((len(WAYS), _ROWS), np.nan), "", ""
     tip, stated = off[0], off[0]
     began = time.process_time()
