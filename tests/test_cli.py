@@ -269,7 +269,7 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         ),
         (
             ["sweep", "--physics", "radiation", "--set", "emissivity=2"],
-            "emissivity = 2.0: expected at most 1",
+            "emissivity = 2: expected at most 1",
         ),
         (["sweep", "--physics", "radiation", "--bias=-8:8:3"], "expected 0 <= START <= STOP"),
         (["contact", "--sample", "polimer"], "did you mean 'polymer'"),

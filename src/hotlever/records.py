@@ -139,6 +139,6 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
         message = f"expected {_LIMITS[first['type']]} {limit:g}"
     if not key:
         return InputError(f"{where}: {message}")
-    return InputError(
-        f"{where}: {key} = {quoted(first['input'])}: {message[0].lower()}{message[1:]}"
-    )
+    given = first["input"]
+    value = f"{given:.12g}" if isinstance(given, float) else quoted(given)
+    return InputError(f"{where}: {key} = {value}: {message[0].lower()}{message[1:]}")

@@ -146,7 +146,7 @@ def test_the_measured_circuit_wins_and_a_note_says_so(coarse):
         ({"observables": ["tipp"]}, "did you mean 'tip'"),
         ({"observables": []}, "no observables"),
         ({"fixed": {"ckappa": 1.0}}, "did you mean 'c_kappa'"),
-        ({"fixed": {"p": -1.0}}, "p = -1.0: expected at least 0.5"),
+        ({"fixed": {"p": -1.0}}, "p = -1: expected at least 0.5"),
         ({"fixed": dict.fromkeys(PARAMETERS)}, "nothing is left to fit"),
     ],
 )

@@ -162,7 +162,7 @@ def test_usual_priors_are_of_what_a_lever_is_made_of():
         ({"fixed": {"film.tc": None}}, "did you mean 'film.tcr'"),
         ({"fixed": {"p": None}}, "unknown parameter 'p'"),
         ({"fixed": dict.fromkeys(TRUTH)}, "all parameters are fixed"),
-        ({"fixed": {"film.tcr": 1.0}}, "tcr = 1.0: expected at most"),
+        ({"fixed": {"film.tcr": 1.0}}, "tcr = 1: expected at most"),
         ({"fixed": {"film.tcr": None}, "free": ["film.tcr"]}, "film.tcr is fixed and is free"),
     ],
 )

@@ -161,3 +161,14 @@ def test_a_fold_that_moves_past_a_row_is_no_obstacle():
     """Values are not smooth there, and no step gains what the derivatives promise."""
     unknown = little_known_lever(38)
     assert calibrate(unknown.measurement, probe=unknown.nominal).describes_data
+
+
+def test_a_lever_that_cannot_be_drawn_is_none_to_try(reference_curve):
+    """Its heater is longer than the bridge, though as long as heaters may be."""
+    residuals, names = Residuals(reference_curve, ("current",)), ["heater_length_um"]
+    probe = Probe.u_shape()
+    objective = Objective(residuals, probe, names, names)
+    shorter, longer = (probe.replace({names[0]: length}) for length in (3.0, 25.0))
+    assert objective.at(probe, objective.point(shorter)) == shorter
+    with pytest.raises(InputError, match="probe: heater_length_um"):
+        objective.at(probe, objective.point(longer))

@@ -88,7 +88,7 @@ WORDS = {
     "lever voltage without R_s": r"V_l without R_s, .*expected a line like '# R_s \(kOhm\): 5.6'",
     "lever voltage with a hole": "line 4: I_h is '', expected a number, since V_b follows from V_l",
     "voltages disagree": "V_b - V_l is 5.* kOhm times I_h, expected R_s = 5.6e.04 ohm",
-    "no such resistor": "V_b - V_l over I_h: series_resistance_ohm = 40000000.0: expected at most",
+    "no such resistor": "V_b - V_l over I_h: series_resistance_ohm = 40000000: expected at most",
     "no such lever": "the resistance that V_l over I_h asks for: series_resistance_ohm = ",
     "two settings in one": "line 1: R_s: found '5 R_s .kOhm.: 5.6', expected a number",
     "signs disagree": "line 2: V_b is '-2' and I_h is '0.2849', expected the same sign",

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from hotlever.errors import InputError
 from hotlever.estimation.experiment import TIP, Prediction
 from hotlever.estimation.prior_density import FLAT, Coordinates, PriorDensity
 from hotlever.estimation.residuals import Residuals
@@ -152,7 +153,12 @@ class Objective:
             If no such lever can be drawn.
         """
         values = self.coordinates.values(point).tolist()
-        return probe.replace(dict(zip(self.varied, values, strict=True)))
+        moved = probe.replace(dict(zip(self.varied, values, strict=True)))
+        try:
+            moved.shape.check()
+        except ValueError as error:
+            raise InputError(f"probe: {error}") from None
+        return moved
 
     def among(self, parameters: Array, point: Array) -> Array:
         """Return the parameters `names` of a lever, (k,), with the values of a point."""

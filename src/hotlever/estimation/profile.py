@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from hotlever.datasets import labelled
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation.experiment import TIP, Experiment, Prediction
 from hotlever.estimation.experiment_at_rest import experiment_of
 from hotlever.estimation.objective import Objective, ParameterValue, Penalty, TipTemperature
@@ -135,7 +135,7 @@ def _solved_near(
         if count < _MOST_SOLVED:
             try:
                 solved = experiment.predict(objective.at(near.at.probe, there), near.at)
-            except ComputationError:  # it melts below the highest bias
+            except HotleverError:  # it melts below the highest bias, or cannot be drawn
                 return None
             near = Subproblem(objective, solved)
     return None

@@ -7,6 +7,7 @@ surrogate.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -244,7 +245,11 @@ def sample_posterior(
     objective = density.objective
     data = _dataset(fit, chains, objective.coordinates.values)
     points = chains.points.reshape(-1, density.optimum.size)
-    error = max(lever.error_K(objective.at(middle, points[row])) for row in _outermost(points))
+    errors = list[float]()
+    for row in _outermost(points):
+        with suppress(InputError):  # no such lever can be drawn
+            errors.append(lever.error_K(objective.at(middle, points[row])))
+    error = max(errors, default=np.nan)
     data.attrs |= {"seed": seed, "noise": noise, "surrogate_error_K": error}
     return data
 

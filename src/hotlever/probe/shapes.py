@@ -86,6 +86,15 @@ class Shape(Record):
     def layout(self) -> Layout:
         """Return the regions, terminals and tip of this shape."""
 
+    def check(self) -> None:
+        """Raise a ValueError if it cannot be drawn and meshed."""
+        self.layout()
+
+    @model_validator(mode="after")
+    def _is_checked(self) -> Self:
+        self.check()
+        return self
+
 
 class Parametric(Shape):
     """A shape made of dimensions, as drawn, and what etching makes of them."""
@@ -117,8 +126,8 @@ class Parametric(Shape):
     def _parts_fit(self) -> None:
         """Raise a ValueError if the parts do not fit together."""
 
-    @model_validator(mode="after")
-    def _can_be_meshed(self) -> Self:
+    def check(self) -> None:
+        """Raise a ValueError if it cannot be drawn and meshed."""
         etched = self.etched
         for name in self._by_edge_bias() if self.edge_bias_um else ():
             left = getattr(etched, name)
@@ -141,7 +150,6 @@ class Parametric(Shape):
             f"the heater is {long:g} µm by {narrow:g} µm, expected at most {_SLENDER:g} times as "
             "long as wide",
         )
-        return self
 
 
 def _need(condition: bool, text: str) -> None:

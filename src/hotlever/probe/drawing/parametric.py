@@ -7,9 +7,9 @@ import sys
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from importlib import import_module
-from typing import Annotated, Any, ClassVar, Literal, Self, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
-from pydantic import Field, create_model, model_validator
+from pydantic import Field, create_model
 
 from hotlever.errors import InputError, quoted
 from hotlever.probe.drawing.kit import Drawing
@@ -86,11 +86,6 @@ class ParametricDrawing(Shape):
     def name(cls) -> str:
         """Return the function's name, with that of its module."""
         return str(cls.model_fields["function"].default)
-
-    @model_validator(mode="after")
-    def _can_be_meshed(self) -> Self:
-        self.layout()
-        return self
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         function = type(self).draw

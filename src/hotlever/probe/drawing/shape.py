@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field, TypeAdapter, ValidationError
 
 from hotlever.errors import InputError, quoted
 from hotlever.probe.drawing.contacts import covered
@@ -108,11 +108,6 @@ class DrawnShape(DrawingFile, Shape):
     tip_um: Point = Field(description="place of the tip, as drawn")
     layers: tuple[DrawnLayer, ...]
     terminals: tuple[DrawnTerminal, ...]
-
-    @model_validator(mode="after")
-    def _can_be_meshed(self) -> Self:
-        self.layout()
-        return self
 
     @property
     def title(self) -> str:
