@@ -120,6 +120,18 @@ def test_spectra_at_one_bias_do_not_beat_the_scale_of_their_thermometer():
     assert then[-1] == pytest.approx(common, rel=0.1)
 
 
+def test_no_meter_is_better_than_the_model(first):
+    """What a better meter would show is not believed by the calibration that follows either."""
+    then = [
+        plan_next(
+            first[1], at_K=500.0, allowed={"bias": None}, count=1, noise={"current": noise}
+        ).proposals.stderr_then_K.item()
+        for noise in (2e-3, 1e-5, 1e-6)
+    ]
+    assert then[1] < 0.999 * then[0]
+    assert then[2] == pytest.approx(then[1], rel=1e-3)
+
+
 def test_costs_decide(first, plan):
     dear = plan_next(first[1], at_K=500.0, count=1, costs={"bias": 1.0, "spectra": 1e4})
     assert plan.proposals.what.values[0] == "spectra"

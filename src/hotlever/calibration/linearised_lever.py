@@ -21,6 +21,7 @@ from hotlever.estimation.experiment import TIP
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.noise import METERS
 from hotlever.estimation.optimal_design import Information, NoiseLaw
+from hotlever.estimation.options import SearchOptions
 from hotlever.estimation.posterior import standard_errors
 from hotlever.estimation.prior_density import Coordinates, PriorDensity
 from hotlever.estimation.surrogate import CurveSurrogate
@@ -37,9 +38,11 @@ from hotlever.units import MOST_BIAS
 
 #: Observables whose scale is an unknown, in order.
 _SCALED = {observable: scale for scale, observable in SCALES.items()}
-#: Noise of a thermometer and of meters that nobody has stated.
+#: Noise of a thermometer and of meters that nobody has stated, and what models are off by beside
+#: it.
 _USUAL_NOISE = {"tip": NoiseLaw(RAMAN_ERROR_K, RAMAN_ERROR_SHARE)}
 _USUAL_OF_METERS = NoiseLaw(0.0, 1e-3)
+_DISCREPANCY = SearchOptions().discrepancy
 
 
 @dataclass(frozen=True)
@@ -269,7 +272,8 @@ class LinearisedLever:
     def noise(self, observable: str, values: Array, share: float | None = None) -> Array:
         """Return the standard errors of rows that show values (observables, n) of an observable.
 
-        They are a share that is stated, or follow those of the data at hand, or else what is usual.
+        They are a share that is stated, or follow those of the data at hand, or else what is usual,
+        and no smaller than what models are off by.
         """
         law, size = _USUAL_NOISE.get(observable, _USUAL_OF_METERS), self._size(observable, values)
         if share is not None:
@@ -277,8 +281,8 @@ class LinearisedLever:
         elif self.measurement is not None and observable in self.weights:
             counts = self.weights[observable] > 0
             errors = 1.0 / self.weights[observable][counts]
-            law = NoiseLaw.of(errors, self._size(observable, self._measured)[counts])
-        return law.at(size)
+            return NoiseLaw.of(errors, self._size(observable, self._measured)[counts]).at(size)
+        return np.hypot(law.at(size), _DISCREPANCY * size)
 
     @property
     def _measured(self) -> Array:
