@@ -10,8 +10,8 @@ import pytest
 pytest.importorskip("playwright", reason="the extra test-app is not installed")
 
 from playwright.sync_api import Page, expect
+from test_edited_probe_files import drawing_of
 from test_journey import button, drop, picture
-from test_lasting import drawing_of
 
 from app_in_browser import EXAMPLES, browsing, chromium_path, go, running
 

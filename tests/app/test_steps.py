@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from elements import all_of, of, press
 from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import LENGTH, shown, until, visit
-from test_lasting import all_of, of, press
 
 from hotlever.app import history as history_module
 from hotlever.app.history import CHOICES, History
