@@ -358,12 +358,12 @@ def scaled_unit(name: str) -> str:
 
     Examples
     --------
-    >>> scaled_unit("n_d")
-    '1e17 cm⁻³'
+    >>> scaled_unit("n_d"), scaled_unit("impurity_exponent")
+    ('1e17 cm⁻³', '')
     """
-    printed = parameter_named(name)
-    power = "" if printed.scale == 1 else f"{printed.scale:.0e}".replace("e+", "e") + " "
-    return (power + ("" if printed.unit == "1" else printed.unit)).strip()
+    unit, scale = parameter_named(name).unit, scale_of(name)
+    power = "" if scale == 1 else f"{scale:.0e} ".replace("e+", "e")
+    return "" if unit == "1" else f"{power}{unit}"
 
 
 def heading(name: str) -> str:
@@ -381,8 +381,9 @@ def heading(name: str) -> str:
 
 
 def scale_of(name: str) -> float:
-    """Return the unit, of its own, that a parameter or the inversion temperature is printed in."""
-    return parameter_named(name).scale
+    """Return the unit, of its own, that a parameter is printed in; one of pure numbers."""
+    named = parameter_named(name)
+    return 1.0 if named.unit == "1" else named.scale
 
 
 def sentence(text: str) -> str:
