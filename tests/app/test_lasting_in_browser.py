@@ -93,7 +93,7 @@ def edits_stay(page: Page, folder: Path, drawings: Path) -> None:
     expect(page.get_by_text("What the drawing holds")).to_be_visible(timeout=_WORK)
     assert (folder / "own.toml").read_text() != edited
     page.get_by_label("What the app wrote", exact=True).click()
-    expect(page.get_by_text("What the app wrote", exact=True)).to_be_visible()
+    expect(page.get_by_role("dialog", name="What the app wrote")).to_be_visible()
     picture(page, "undo")
     with page.expect_navigation():
         page.get_by_role("button", name="Undo: hotlever probe import").first.click()
