@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 from nicegui import ui
 from nicegui.testing import User
 from nicegui.testing.user_interaction import UserInteraction
-from test_app_pages import until
 
 
 def all_of(user: User, kind: Any, label: str = "") -> list[Any]:
@@ -22,6 +22,15 @@ def of(user: User, kind: Any, label: str = "") -> Any:
     return all_of(user, kind, label)[-1]
 
 
+async def until(true: Callable[[], bool]) -> None:
+    """Wait, ten seconds at most, until something is true."""
+    for _ in range(200):
+        if true():
+            return
+        await asyncio.sleep(0.05)
+    raise AssertionError("it did not become true")
+
+
 async def tell_columns(user: User) -> None:
     """Pick what the columns a and b of the file are that Fit shows: bias in V, current in mA."""
     for column, symbol, unit in (("a", "V_b", "V"), ("b", "I_h", "mA")):
@@ -32,9 +41,9 @@ async def tell_columns(user: User) -> None:
         await asyncio.sleep(0.3)
 
 
-def named(user: User, name: str) -> Any:
-    """Return the last element that has a name for who cannot see it; None without."""
-    there = [e for e in user.client.elements.values() if e.props.get("aria-label") == name]
+def named(user: User, name: str, kind: Any = ui.element) -> Any:
+    """Return the last element of a kind with a name for who cannot see it; None without."""
+    there = [one for one in all_of(user, kind) if one.props.get("aria-label") == name]
     return there[-1] if there else None
 
 

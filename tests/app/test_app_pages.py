@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from elements import named, until
 from nicegui import ui
 from nicegui.testing import User, user_simulation
 from PIL import Image
@@ -94,15 +95,6 @@ def drawn(user: User) -> str:
     """Return the last figure of a page."""
     images = [one for one in user.client.elements.values() if one.tag == "img"]
     return base64.b64decode(images[-1].props["src"].partition(",")[2]).decode()
-
-
-async def until(true: Callable[[], bool]) -> None:
-    """Wait, ten seconds at most, until something is true."""
-    for _ in range(200):
-        if true():
-            return
-        await asyncio.sleep(0.05)
-    raise AssertionError("it did not become true")
 
 
 def test_every_page_opens_in_an_empty_folder(tmp_path: Path) -> None:
@@ -192,11 +184,7 @@ def test_numbers_of_another_bias_are_not_shown(tmp_path: Path) -> None:
         await user.open("/simulate")
         await until(lambda: "full lever" in shown(user, "aria-live=polite"))
         assert "K" in shown(user, "data-number=tip_K")
-        (number,) = (
-            one
-            for one in user.client.elements.values()
-            if isinstance(one, ui.number) and one.props.get("aria-label") == "Bias V_b"
-        )
+        number = named(user, "Bias V_b", ui.number)
         number.set_value(14.0)
         await until(lambda: "silicon melts" in shown(user, "role=alert"))
         for key in ("tip_K", "current_mA", "lever_V", "power_mW", "reader_V", "knee"):

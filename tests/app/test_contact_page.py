@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from elements import named
 from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import shown, until, visit
@@ -15,15 +16,6 @@ from hotlever.app.pages.following import slider
 from hotlever.app.session import Session
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
-
-
-def number(user: User, name: str) -> ui.number:
-    """Return the number of a slider."""
-    return next(
-        one
-        for one in user.client.elements.values()
-        if isinstance(one, ui.number) and one.props.get("aria-label") == name
-    )
 
 
 def test_contact_shows_the_numbers_of_the_command(
@@ -37,7 +29,7 @@ def test_contact_shows_the_numbers_of_the_command(
         session.chosen["contact"] = {"radius_nm": 10.0, "most": 9.0}
         await user.open("/contact")
         await until(lambda: "full lever" in shown(user, "aria-live=polite"))
-        number(user, "resistance of the interface").set_value(1e7)
+        named(user, "resistance of the interface", ui.number).set_value(1e7)
         (layer,) = (
             one
             for one in user.client.elements.values()
@@ -69,11 +61,7 @@ def test_a_slider_by_decades_keeps_what_is_typed(tmp_path: Path) -> None:
         await user.open("/materials")
         with user:
             field = slider("length", 0.0, 1.0, 1e4, by_decades=True, from_zero=True)
-        (bar,) = (
-            one
-            for one in user.client.elements.values()
-            if isinstance(one, ui.slider) and one.props.get("aria-label") == "length"
-        )
+        bar = named(user, "length", ui.slider)
         assert (field.value, bar.value) == (0.0, 0.0)
         field.set_value(123.456)
         assert bar.value == pytest.approx(2.0915, abs=1e-4)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from elements import named
 from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import shown, until, visit
@@ -60,12 +61,7 @@ def test_reader_shows_what_the_lever_reads_between_the_distances_that_are_solved
             "-o reference.reader.csv"
         )
         # another tip temperature, at which the air jumps by less
-        (bias,) = (
-            one
-            for one in user.client.elements.values()
-            if isinstance(one, ui.number) and one.props.get("aria-label") == "Bias V_b"
-        )
-        bias.set_value(5.0)
+        named(user, "Bias V_b", ui.number).set_value(5.0)
         await until(lambda: "moving" in shown(user, "aria-live=polite"))
         await until(lambda: "coarse lever: voltage" in shown(user, "aria-live=polite"))
         assert number("reader_V") == pytest.approx(read_at(5.0).reader_V.item(), rel=2e-4)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import operator
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
@@ -11,6 +12,7 @@ import xarray as xr
 
 from hotlever import figures
 from hotlever.calibration import Calibration, calibrate
+from hotlever.calibration.calibration import rms
 from hotlever.calibration.summary import calibration_parts
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes
@@ -63,7 +65,7 @@ def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]
     tasks: list[tuple[Any, ...]] = [(predict, case) for case in every]
     tasks += [(_calibrated, changes) for changes in _OTHER_LEVERS.values()]
     with local_processes(PROCESSORS) as (run, _):
-        results = run(_done, tasks, progress)
+        results = run(operator.call, tasks, progress)
     now, calibrations = results[: len(every)], results[len(every) :]
     compared = comparison(every, now)
     page = Page("Published numbers, predicted and compared", _summary(compared))
@@ -186,10 +188,6 @@ def _bases(page: Page, every: Sequence[Case]) -> None:
     )
 
 
-def _done(function: Callable[[Any], Any], argument: Any) -> Any:
-    return function(argument)
-
-
 def _calibrated(changes: dict[str, Any]) -> Calibration:
     """Calibrate the one real I-V curve of the examples, with a lever that is other than assumed."""
     folder = resources.files("hotlever") / "examples"
@@ -212,7 +210,7 @@ def _real_curve(page: Page, calibrations: Sequence[Calibration]) -> None:
         "The I-V curve of a silicon lever of the University of Illinois, digitised from a "
         f"published picture, {off.size} points. Lever, surroundings and temperatures are not "
         "stated with it. Calibrated with what is usual of such levers, the model follows the "
-        f"current to {_rms(off):.1f} µA (rms), at worst {np.abs(off).max():.1f} µA; reading it off "
+        f"current to {rms(off):.1f} µA (rms), at worst {np.abs(off).max():.1f} µA; reading it off "
         f"was good to {_READ_UA:g} µA. At the last point, {last.power_mW.item():.2f} mW, the tip "
         f"is at {last.tip_K.item():.0f} K, with 95 % from {last.tip_low_K.item():.0f} to "
         f"{last.tip_high_K.item():.0f} K."
@@ -244,7 +242,7 @@ def _real_curve(page: Page, calibrations: Sequence[Calibration]) -> None:
         [
             [
                 name,
-                f"{_rms(_differences(other)):.1f}",
+                f"{rms(_differences(other)):.1f}",
                 f"{row.tip_K.item():.0f}",
                 f"{row.tip_low_K.item():.0f} to {row.tip_high_K.item():.0f}",
             ]
@@ -262,10 +260,6 @@ def _real_curve(page: Page, calibrations: Sequence[Calibration]) -> None:
         "the band is wide. Nothing in the picture is a thermometer, and the laws are common to all "
         "rows. The knee lies beyond the measured range, and is an extrapolation."
     )
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _differences(calibration: Calibration) -> Array:
