@@ -58,6 +58,24 @@ def test_probe_show_describes_and_draws(run, tmp_path):
     assert (tmp_path / "probe.svg").stat().st_size > 1.5 * plain
 
 
+def test_probe_show_says_all_that_a_probe_file_says(run, tmp_path):
+    probe = Probe.u_shape().with_(
+        **{"tip.height_um": 0.7, "tip.apex_radius_um": 0.03},
+        medium="air",
+        surface_gap_um=0.7,
+        sample="glass",
+        radiation=True,
+    )
+    (tmp_path / "lever.toml").write_text(f'{probe.to_toml()}[prior]\nn_d = "×/ 3"\n')
+    _, out, _ = run("probe", "show", "lever.toml")
+    for line in (
+        *("tip: height_um 0.7, half_angle_deg 20, apex_radius_um 0.03,", "contact: sample glass"),
+        *("surroundings: medium air, surface_gap_um 0.7", "physics: ", "prior: n_d ×/ 3"),
+    ):
+        assert f"\n{line}" in out
+    assert "surroundings" not in run("probe", "show")[1]
+
+
 def test_materials_are_listed_and_drawn(run, tmp_path):
     status, out, _ = run("materials", "--plot", str(tmp_path / "materials.svg"))
     assert status == 0

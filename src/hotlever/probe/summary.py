@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from hotlever.materials import Kind
 from hotlever.probe.layout import Layout, Taper
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.probe.probe import Probe
 from hotlever.probe.shapes import Parametric
-from hotlever.records import Record
 
 
 def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
@@ -37,7 +37,7 @@ def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
             else []
         ),
         *(f"  {name}: {contact}" for name, contact in circuit.contacts.items()),
-        *_materials(probe),
+        *_sections(probe),
         *(
             []
             if silicon is None
@@ -48,17 +48,22 @@ def probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
     return "\n".join([*lines, ""])
 
 
-def _materials(probe: Probe) -> list[str]:
-    """Return the values of what a probe is made of, a line for each material."""
-    plain: dict[str, Record] = {"material": probe.material} if probe.has_plain_silicon else {}
+def _sections(probe: Probe) -> list[str]:
+    """Return what else the probe file says, a line for each section; of surroundings their own."""
+    parts = {name: part for name, part in probe.parts.items() if name != "circuit"}
     lines = []
-    for name, material in {**plain, **probe.materials}.items():
+    for name, part in {**parts, **probe.materials}.items():
+        usual = name == "surroundings"
+        kept = part.model_dump(
+            exclude={"kind", "preset"}, exclude_none=True, exclude_defaults=usual
+        )
         values = [
-            f"{key} {value:g}" if isinstance(value, float) else str(value)
-            for key, value in material
-            if value is not None and key != "preset"
+            f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}"
+            for key, value in part
+            if key in kept
         ]
-        lines.append(f"{name}: {', '.join(values)}")
+        values[:0] = [part.kind] if isinstance(part, Kind) else []
+        lines += [f"{name}: {', '.join(values)}"] if values else []
     return lines
 
 
