@@ -119,6 +119,7 @@ def test_a_mark_at_the_beginning_is_no_text(tmp_path):
         ('{"a": -Infinity}', "found -Infinity, expected a finite number"),
         ('{"a": 1e999}', "found 1e999, expected a finite number"),
         ('{"a": 1' + "0" * 5000 + "}", "found 1000.*, expected a finite number"),
+        ('{"a": {"b": 1, "c": 2, "b": 3}}', "the key 'b' is there twice"),
         ("[1, 2]", "holds a list, expected an object"),
         ('{"a": "\x00"}', "Invalid control character"),
     ],

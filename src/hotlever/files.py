@@ -17,7 +17,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
-from hotlever.errors import HotleverError, InputError
+from hotlever.errors import HotleverError, InputError, quoted
 
 Name = str | os.PathLike[str]
 
@@ -93,7 +93,7 @@ def read_json(path: Name) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it cannot be read, or is no JSON, which has neither NaN nor infinities.
+        If it cannot be read, is no JSON, which has neither NaN nor infinities, or has a key twice.
     """
 
     def finite(text: str) -> float:
@@ -101,10 +101,17 @@ def read_json(path: Name) -> dict[str, Any]:
             raise ValueError(f"found {text[:20]}, expected a finite number")
         return int(text) if text.lstrip("-").isdigit() else float(text)
 
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        content = dict(pairs)
+        if len(content) < len(pairs):
+            names = [name for name, _ in pairs]
+            twice = next(name for name in names if names.count(name) > 1)
+            raise ValueError(f"the key {quoted(twice)} is there twice")
+        return content
+
+    numbers: Any = dict.fromkeys(("parse_int", "parse_float", "parse_constant"), finite)
     try:
-        content = json.loads(
-            read_text(path), parse_int=finite, parse_float=finite, parse_constant=finite
-        )
+        content = json.loads(read_text(path), object_pairs_hook=once, **numbers)
     except RecursionError:
         raise InputError(f"{path}: not valid JSON: nested too deeply") from None
     except ValueError as error:

@@ -174,7 +174,7 @@ BAD = {
         ["raman", "tip", "--calibration", "c.json", "--calibrate-from", "plate"],
         "--calibration or --calibrate-from, not both",
     ),
-    "broken calibration": (["raman", "tip", "--calibration", "log.csv"], "not a Raman calibr"),
+    "broken calibration": (["raman", "tip", "--calibration", "log.csv"], "not valid JSON"),
     "law": (["raman", "tip", "--law", "quadratic"], "unknown law 'quadratic'"),
     "shape": (["raman", "tip", "--shape", "gauss"], "unknown line shape 'gauss'"),
     "resolution": (
@@ -241,7 +241,7 @@ BAD = {
     ),
     "check with a broken calibration": (
         ["raman-check", "--calibration", "log.csv"],
-        "not a Raman calibration",
+        "not valid JSON",
     ),
 }
 

@@ -206,9 +206,10 @@ def test_broken_calibration_file_names_the_key(tmp_path, change, words):
 
 
 def test_file_that_is_no_calibration(tmp_path):
-    (tmp_path / "cal.json").write_text("520.0\t100\n")
-    with pytest.raises(InputError, match="not a Raman calibration"):
-        read_raman_calibration(tmp_path / "cal.json")
+    for text, words in {"520.0\t100\n": "not valid JSON", "{}": "not a Raman calibration"}.items():
+        (tmp_path / "cal.json").write_text(text)
+        with pytest.raises(InputError, match=words):
+            read_raman_calibration(tmp_path / "cal.json")
     with pytest.raises(InputError, match="no such file"):
         read_raman_calibration(tmp_path / "none.json")
 

@@ -8,6 +8,7 @@ of its axis cancels.
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
@@ -17,7 +18,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from hotlever import __version__
 from hotlever.errors import InputError
-from hotlever.files import read_text, write_text
+from hotlever.files import read_json, write_text
 from hotlever.materials.silicon import MELTING_POINT
 from hotlever.raman import anharmonic
 from hotlever.raman.peak import LineShape
@@ -324,6 +325,6 @@ def read_raman_calibration(path: str | os.PathLike[str]) -> RamanCalibration:
         Naming the key at fault and what was expected.
     """
     try:
-        return RamanCalibration.model_validate_json(read_text(path))
+        return RamanCalibration.model_validate_json(json.dumps(read_json(path)))
     except ValidationError as error:
         raise explained(error, RamanCalibration, f"{path}: not a Raman calibration") from None
