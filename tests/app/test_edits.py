@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 import tomllib
 from pathlib import Path
 
@@ -41,6 +42,15 @@ def test_new_keys_and_sections_find_their_place() -> None:
     assert text.splitlines()[1] == "tip_um = [1.0, 2.0]"
     layers = {"silicon": "1/0", "a b": {"drawn": "5/0"}}
     assert tomllib.loads(text) == {"probe": {"tip_um": [1.0, 2.0]}, "layers": layers}
+
+
+def test_a_file_with_an_outline_of_thousands_of_points_is_edited_at_once() -> None:
+    outline = [[float(number), 1.5] for number in range(2000)]
+    text = with_value("[probe]\ngap_um = 1\n", ("layers",), "heater", outline)
+    start = time.process_time()
+    changed = with_value(text, ("probe",), "gap_um", 2.0)
+    assert time.process_time() - start < 1.0
+    assert changed == text.replace("gap_um = 1", "gap_um = 2.0")
 
 
 def test_layers_change_what_they_are_made_of(tmp_path: Path) -> None:

@@ -39,6 +39,8 @@ def _entries(text: str) -> list[_Entry]:
     waiting: list[str] = []
     for line in text.splitlines():
         waiting.append(line)
+        if len(waiting) > 1 and line.endswith(",") and "#" not in line:
+            continue  # no value ends so: long outlines took minutes where each line was tried
         try:
             content = tomllib.loads("\n".join(waiting))
         except ValueError:
