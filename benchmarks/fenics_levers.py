@@ -37,7 +37,7 @@ def compared() -> dict[str, tuple[Probe, list[float]]]:
     )
     bias = [2.0, 5.0, 8.0]
     reference = Probe.reference()
-    scattering = reference.with_(impurity_exponent=0.5)
+    scattering = reference.with_(impurity_exponent=0.5, intrinsic_scale=1.2)
     held = wired(reference, "reader", kind="supply", bias_V=2.0, series_resistance_ohm=500.0)
     warm = wired(reference, "ground", kind="ground", base_temperature_K=350.0)
     current = wired(reference, "reader", kind="supply", current_mA=0.3)

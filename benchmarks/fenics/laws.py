@@ -69,10 +69,10 @@ def states(temperature):
     return 2.70e19 * (temperature / REFERENCE_TEMPERATURE_K) ** 1.5
 
 
-def carriers(temperature, doping, narrowing_ev):
-    """Return majority and minority carriers, Eqs. 6 and 7."""
+def carriers(temperature, material, doping, narrowing_ev):
+    """Return majority and minority carriers, Eqs. 6 and 7; the intrinsic ones may be scaled."""
     band_gap_ev = 1.17 - 4.73e-4 * temperature**2 / (temperature + 636.0) - narrowing_ev
-    intrinsic = states(temperature) * ufl.exp(
+    intrinsic = material["intrinsic_scale"] * states(temperature) * ufl.exp(
         -band_gap_ev / (2.0 * BOLTZMANN_EV_PER_K * temperature)
     )
     majority = (doping + ufl.sqrt(doping**2 + 4.0 * intrinsic**2)) / 2.0
@@ -102,7 +102,7 @@ def n_silicon_carried(temperature, material, doping):
     Of each kind the sign of its charge, its density, and its conductivity [S/cm].
     """
     narrowing_ev = 0.025 * (doping / 1e18) ** (1.0 / 3.0)
-    electrons, holes = carriers(temperature, doping, narrowing_ev)
+    electrons, holes = carriers(temperature, material, doping, narrowing_ev)
     ratios = IMPURITY_MOBILITY_RATIO, PHONON_MOBILITY_RATIO
     of_electrons = electrons * mobility_beside_phosphorus(temperature, material, doping)
     of_holes = holes * mobility_beside_phosphorus(temperature, material, doping, *ratios)
@@ -127,7 +127,7 @@ def p_silicon_carried(temperature, material, doping):
     """
     logarithm = ufl.ln(doping / 1.3e17)
     narrowing_ev = 6.92e-3 * (logarithm + ufl.sqrt(logarithm**2 + 0.5))
-    holes, electrons = carriers(temperature, doping, narrowing_ev)
+    holes, electrons = carriers(temperature, material, doping, narrowing_ev)
     relative = temperature / BORON_MEASURED_AT_K
     by_phonons = 1.305e16 / doping * relative ** material["p"]
     by_impurities = 1.133e17 / (doping * (1.0 + (2.58e-19 * doping) ** (-0.737)))

@@ -25,9 +25,9 @@ from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
 OPTION_III = published("option III").material
 #: One material of each kind, and of each choice that a kind offers.
 SECTIONS = {
-    "n-silicon": {"kind": "n-silicon", "impurity_exponent": 0.4},
+    "n-silicon": {"kind": "n-silicon", "impurity_exponent": 0.4, "intrinsic_scale": 1.2},
     "n-silicon, thin": {"kind": "n-silicon", "c_kappa": "thickness"},
-    "p-silicon": {"kind": "p-silicon", "impurity_exponent": 0.4},
+    "p-silicon": {"kind": "p-silicon", "impurity_exponent": 0.4, "intrinsic_scale": 0.8},
     "high-doped-silicon": {"kind": "high-doped-silicon"},
     "metal-film": {"kind": "metal-film", "preset": "Pd", "tcr": 2.1e-3},
     "metal-film, given κ": {"kind": "metal-film", "preset": "NiCr", "kappa": 0.11},
@@ -150,7 +150,7 @@ def test_boron_doped_silicon_has_an_inversion_temperature():
     found = inversion_temperature_p(5e17, 2.5)
     assert found == pytest.approx(T[conductivity_p(T, 5e17, 2.5)[0].argmin()], abs=0.02)
     assert MADE["p-silicon"].inversion_temperature() == pytest.approx(
-        inversion_temperature_p(OPTION_III.n_d, 2.23, 0.4)
+        inversion_temperature_p(OPTION_III.n_d, 2.23, 0.4, 0.8)
     )
 
 

@@ -80,7 +80,7 @@ class Silicon(Kind):
 class LowDopedSilicon(Silicon):
     """Silicon whose carriers are those of its dopant and, when hot, its own."""
 
-    #: Laws by temperature, doping, p and the impurity exponent; and where σ is least.
+    #: Laws by temperature, doping, p, impurity exponent and intrinsic scale; and where σ is least.
     conductivity: ClassVar[Law]
     inversion: ClassVar[Callable[..., Array]]
     #: Its law of thermoelectricity, by these and the scattering exponent; and the majority.
@@ -91,6 +91,12 @@ class LowDopedSilicon(Silicon):
     n_d: float = field_of(OF_SILICON["n_d"])
     p: float = field_of(OF_SILICON["p"])
     impurity_exponent: float = field_of(OF_SILICON["impurity_exponent"])
+    intrinsic_scale: float = field_of(OF_SILICON["intrinsic_scale"])
+
+    @property
+    def of_carriers(self) -> tuple[float, float, float]:
+        """What sets its carriers: p, the impurity exponent and the intrinsic scale."""
+        return self.p, self.impurity_exponent, self.intrinsic_scale
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -99,7 +105,7 @@ class LowDopedSilicon(Silicon):
 
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
-        return type(self).conductivity(T, n, self.p, self.impurity_exponent)
+        return type(self).conductivity(T, n, *self.of_carriers)
 
     @property
     def effects(self) -> tuple[Law, ...]:
@@ -108,8 +114,7 @@ class LowDopedSilicon(Silicon):
 
     def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""
-        exponents = self.p, self.impurity_exponent, self.scattering_exponent
-        return type(self).seebeck(T, n, *exponents)
+        return type(self).seebeck(T, n, *self.of_carriers, self.scattering_exponent)
 
     def inversion_temperature(self, n: Array | None = None) -> Array:
         """Return the temperature (K) at which the resistivity of a doping (cm⁻³) is highest.
@@ -117,7 +122,7 @@ class LowDopedSilicon(Silicon):
         Of its own doping by default; NaN where there is none below 1700 K.
         """
         doping = self.n_d if n is None else n
-        return type(self).inversion(doping, self.p, self.impurity_exponent)
+        return type(self).inversion(doping, *self.of_carriers)
 
 
 class NSilicon(LowDopedSilicon):

@@ -96,7 +96,11 @@ def hole_mobility(
     "al., Solid-State Electron. 35, 125 (1992)",
 )
 def conductivity_p(
-    T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float = 0.0
+    T: ArrayLike,
+    n: ArrayLike,
+    p: float,
+    impurity_exponent: float = 0.0,
+    intrinsic_scale: float = 1.0,
 ) -> Evaluated:
     """Electrical conductivity of silicon doped with boron, in S cm⁻¹.
 
@@ -108,14 +112,18 @@ def conductivity_p(
     >>> (1.0 / sigma).round(5).tolist()  # Ω cm
     [13.30622, 0.00117]
     """
-    return conducted(carried_in_p_silicon(T, n, p, impurity_exponent))
+    return conducted(carried_in_p_silicon(T, n, p, impurity_exponent, intrinsic_scale))
 
 
 def carried_in_p_silicon(
-    T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float = 0.0
+    T: ArrayLike,
+    n: ArrayLike,
+    p: float,
+    impurity_exponent: float = 0.0,
+    intrinsic_scale: float = 1.0,
 ) -> list[Carried]:
     """Return the carriers of silicon doped with boron; see `conductivity_p`."""
-    holes, electrons = carriers(T, n, band_gap_p)
+    holes, electrons = carriers(T, n, band_gap_p, intrinsic_scale)
     return [
         (holes, hole_mobility.formula(T, n, p, impurity_exponent), "hole"),
         (electrons, mobility.formula(T, n, p, impurity_exponent), "electron"),
@@ -123,7 +131,10 @@ def carried_in_p_silicon(
 
 
 def inversion_temperature_p(
-    n: ArrayLike, p: ArrayLike, impurity_exponent: ArrayLike = 0.0
+    n: ArrayLike,
+    p: ArrayLike,
+    impurity_exponent: ArrayLike = 0.0,
+    intrinsic_scale: ArrayLike = 1.0,
 ) -> Array:
     """Temperature (K) at which the resistivity of boron-doped silicon is highest; NaN without one.
 
@@ -134,4 +145,4 @@ def inversion_temperature_p(
     >>> inversion_temperature_p([5e17], p=2.65).round(0).tolist()
     [772.0]
     """
-    return highest_resistivity(conductivity_p, n, p, impurity_exponent)
+    return highest_resistivity(conductivity_p, n, p, impurity_exponent, intrinsic_scale)

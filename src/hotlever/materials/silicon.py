@@ -22,6 +22,8 @@ from hotlever.types import Array
 Carrier = Literal["electron", "hole"]
 # Density (cm⁻³) and mobility (cm² V⁻¹ s⁻¹) of carriers, and what they are.
 Carried = tuple[Evaluated, Evaluated, Carrier]
+# What the conductivity of doped silicon depends on.
+_CONDUCTS_BY = ("T", "n", "p", "impurity_exponent", "intrinsic_scale")
 #: Majority first.
 _CARRIERS: tuple[Carrier, Carrier] = ("electron", "hole")
 
@@ -106,8 +108,11 @@ def density_of_states(T: ArrayLike) -> Evaluated:
 
 
 @law(meant_for=(200.0, 1300.0), source="Eq. 7; Altermatt et al. (1999)")
-def intrinsic_density(T: ArrayLike, n: ArrayLike) -> Evaluated:
+def intrinsic_density(T: ArrayLike, n: ArrayLike, intrinsic_scale: float = 1.0) -> Evaluated:
     """Intrinsic carrier density, in cm⁻³ (Eq. 7, first line); doping narrows the gap.
+
+    Published formulas differ where silicon is hot (`hotlever.materials.parameters`):
+    `intrinsic_scale` multiplies that of Eq. 7.
 
     Examples
     --------
@@ -115,38 +120,44 @@ def intrinsic_density(T: ArrayLike, n: ArrayLike) -> Evaluated:
     >>> f"{n_i:.2e}"
     '9.68e+09'
     """
-    return _intrinsic(T, band_gap.formula(T, n))
+    return _intrinsic(T, band_gap.formula(T, n), intrinsic_scale)
 
 
-def _intrinsic(T: ArrayLike, band_gap: Evaluated) -> Evaluated:
-    """Eq. 7, first line, for a band gap."""
+def _intrinsic(T: ArrayLike, band_gap: Evaluated, scale: float) -> Evaluated:
+    """Eq. 7, first line, for a band gap; see `intrinsic_density`."""
     T, (gap, d_gap) = np.asarray(T, dtype=float), band_gap
     two_kT = 2.0 * BOLTZMANN * T
-    n_i = density_of_states.formula(T)[0] * np.exp(-gap / two_kT)
+    unscaled = density_of_states.formula(T)[0] * np.exp(-gap / two_kT)
+    n_i = scale * unscaled
     return n_i, {
         "T": n_i * (1.5 / T + (gap / T - d_gap["T"]) / two_kT),
         "n": -n_i * d_gap["n"] / two_kT,
+        "intrinsic_scale": unscaled,
     }
 
 
 @law(meant_for=(200.0, 1300.0), source="Eq. 6")
-def carrier_density(T: ArrayLike, n: ArrayLike, carrier: Carrier = "electron") -> Evaluated:
+def carrier_density(
+    T: ArrayLike, n: ArrayLike, carrier: Carrier = "electron", intrinsic_scale: float = 1.0
+) -> Evaluated:
     """Density of electrons, or of holes n_i²/n_e, in n-doped silicon, in cm⁻³ (Eq. 6)."""
-    majority, minority = carriers(T, n, band_gap)
+    majority, minority = carriers(T, n, band_gap, intrinsic_scale)
     return majority if carrier == "electron" else minority
 
 
-def carriers(T: ArrayLike, n: ArrayLike, gap_law: Law) -> tuple[Evaluated, Evaluated]:
+def carriers(
+    T: ArrayLike, n: ArrayLike, gap_law: Law, intrinsic_scale: float = 1.0
+) -> tuple[Evaluated, Evaluated]:
     """Return majority and minority carriers (cm⁻³) together, as they share n_i (Eq. 6)."""
     n = np.asarray(n, dtype=float)
-    n_i, d_i = _intrinsic(T, gap_law.formula(T, n))
+    n_i, d_i = _intrinsic(T, gap_law.formula(T, n), intrinsic_scale)
     root = np.sqrt(n**2 + 4.0 * n_i**2)
     majority = 0.5 * (n + root)
     minority = n_i**2 / majority
     # n_e - n_h = n and n_e n_h = n_i² give (n_e + n_h) dn_e = n_e dn + 2 n_i dn_i
-    d_T = 2.0 * n_i * d_i["T"] / root
-    d_n = (majority + 2.0 * n_i * d_i["n"]) / root
-    return (majority, {"T": d_T, "n": d_n}), (minority, {"T": d_T, "n": d_n - 1.0})
+    by_pair = {name: 2.0 * n_i * d / root for name, d in d_i.items()}
+    d_n = majority / root + by_pair["n"]
+    return (majority, {**by_pair, "n": d_n}), (minority, {**by_pair, "n": d_n - 1.0})
 
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 9")
@@ -223,10 +234,13 @@ def conductivity_low_doped(
     n: ArrayLike,
     p: float,
     impurity_exponent: float = 0.0,
+    intrinsic_scale: float = 1.0,
     mobility_law: Law = mobility,
 ) -> Evaluated:
     """Electrical conductivity of the low-doped heater and reader, in S cm⁻¹ (Eq. 5)."""
-    return conducted(carried_in_n_silicon(T, n, p, impurity_exponent, mobility_law))
+    return conducted(
+        carried_in_n_silicon(T, n, p, impurity_exponent, intrinsic_scale, mobility_law)
+    )
 
 
 def carried_in_n_silicon(
@@ -234,19 +248,22 @@ def carried_in_n_silicon(
     n: ArrayLike,
     p: float,
     impurity_exponent: float = 0.0,
+    intrinsic_scale: float = 1.0,
     mobility_law: Law = mobility,
 ) -> list[Carried]:
     """Return the carriers of n-doped silicon (Eqs. 6 to 10)."""
     return [
         (density, mobility_law.formula(T, n, p, impurity_exponent, carrier), carrier)
-        for density, carrier in zip(carriers(T, n, band_gap), _CARRIERS, strict=True)
+        for density, carrier in zip(
+            carriers(T, n, band_gap, intrinsic_scale), _CARRIERS, strict=True
+        )
     ]
 
 
 def conducted(carried: Iterable[Carried]) -> Evaluated:
     """Return the conductivity (S cm⁻¹) of carriers of some densities and mobilities (Eq. 5)."""
     sigma: Array = np.zeros(())
-    total: Partials = dict.fromkeys(("T", "n", "p", "impurity_exponent"), sigma)
+    total: Partials = dict.fromkeys(_CONDUCTS_BY, sigma)
     for (density, d_density), (speed, d_speed), _ in carried:
         sigma = sigma + ELEMENTARY_CHARGE * density * speed
         total = {
@@ -287,7 +304,12 @@ def conductivity_high_doped(T: ArrayLike, a0: float, a1: float) -> Evaluated:
     }
 
 
-def inversion_temperature(n: ArrayLike, p: ArrayLike, impurity_exponent: ArrayLike = 0.0) -> Array:
+def inversion_temperature(
+    n: ArrayLike,
+    p: ArrayLike,
+    impurity_exponent: ArrayLike = 0.0,
+    intrinsic_scale: ArrayLike = 1.0,
+) -> Array:
     """Temperature T_i (K) at which the resistivity of low-doped silicon is highest, dρ/dT = 0.
 
     Returns
@@ -301,7 +323,7 @@ def inversion_temperature(n: ArrayLike, p: ArrayLike, impurity_exponent: ArrayLi
     >>> inversion_temperature([4.10e17], p=2.64).round(0).tolist()
     [805.0]
     """
-    return highest_resistivity(conductivity_low_doped, n, p, impurity_exponent)
+    return highest_resistivity(conductivity_low_doped, n, p, impurity_exponent, intrinsic_scale)
 
 
 def highest_resistivity(conductivity: Callable[..., Evaluated], *parameters: ArrayLike) -> Array:

@@ -223,7 +223,12 @@ _SOURCE = (
 
 @law(meant_for=(300.0, 1300.0), source=_SOURCE)
 def thermoelectric_n_silicon(
-    T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float, scattering_exponent: float
+    T: ArrayLike,
+    n: ArrayLike,
+    p: float,
+    impurity_exponent: float,
+    intrinsic_scale: float,
+    scattering_exponent: float,
 ) -> Evaluated:
     """Thermoelectricity of n-doped silicon, β (A cm⁻¹ K⁻¹) and γ (W cm⁻¹ K⁻²), (2, ...).
 
@@ -234,26 +239,31 @@ def thermoelectric_n_silicon(
     Parameters
     ----------
     T, n : array_like
-    p, impurity_exponent : float
-        See `hotlever.materials.silicon.mobility`.
+    p, impurity_exponent, intrinsic_scale : float
+        See `hotlever.materials.silicon.conductivity_low_doped`.
     scattering_exponent : float
         See `seebeck_of_band`.
     """
 
     def carried(T: Array, n: ArrayLike) -> list[Carried]:
-        return carried_in_n_silicon(T, n, p, impurity_exponent)
+        return carried_in_n_silicon(T, n, p, impurity_exponent, intrinsic_scale)
 
     return _of_silicon(carried, np.asarray(T, dtype=float), n, scattering_exponent)
 
 
 @law(meant_for=(300.0, 1300.0), source=_SOURCE)
 def thermoelectric_p_silicon(
-    T: ArrayLike, n: ArrayLike, p: float, impurity_exponent: float, scattering_exponent: float
+    T: ArrayLike,
+    n: ArrayLike,
+    p: float,
+    impurity_exponent: float,
+    intrinsic_scale: float,
+    scattering_exponent: float,
 ) -> Evaluated:
     """Thermoelectricity of p-doped silicon, β and γ; see `thermoelectric_n_silicon`."""
 
     def carried(T: Array, n: ArrayLike) -> list[Carried]:
-        return carried_in_p_silicon(T, n, p, impurity_exponent)
+        return carried_in_p_silicon(T, n, p, impurity_exponent, intrinsic_scale)
 
     return _of_silicon(carried, np.asarray(T, dtype=float), n, scattering_exponent)
 

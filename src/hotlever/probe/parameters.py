@@ -72,16 +72,14 @@ def of_materials(
     --------
     >>> from hotlever import Probe
     >>> list(of_materials(Probe.reference()))
-    ['c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1', 'impurity_exponent', 'n_hd']
+    ['c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1', 'impurity_exponent', 'intrinsic_scale', 'n_hd']
     """
     usual, effects = usual_parameters(probe), probe.physics.effects
     counting = {"", *effects, *([IN_TIME] if in_time else [])}
     table = {
         name: parameter._replace(
             name=name,
-            spread=parameter.spread
-            if name in usual or parameter.counts or not parameter.relative
-            else None,
+            spread=parameter.spread if name in usual or not parameter.usual else None,
             value=float(getattr(kind, own)),
         )
         for material, kind in _kinds(probe)
