@@ -72,8 +72,10 @@ def states(temperature):
 def carriers(temperature, material, doping, narrowing_ev):
     """Return majority and minority carriers, Eqs. 6 and 7; the intrinsic ones may be scaled."""
     band_gap_ev = 1.17 - 4.73e-4 * temperature**2 / (temperature + 636.0) - narrowing_ev
-    intrinsic = material["intrinsic_scale"] * states(temperature) * ufl.exp(
-        -band_gap_ev / (2.0 * BOLTZMANN_EV_PER_K * temperature)
+    intrinsic = (
+        material["intrinsic_scale"]
+        * states(temperature)
+        * ufl.exp(-band_gap_ev / (2.0 * BOLTZMANN_EV_PER_K * temperature))
     )
     majority = (doping + ufl.sqrt(doping**2 + 4.0 * intrinsic**2)) / 2.0
     return majority, intrinsic**2 / majority

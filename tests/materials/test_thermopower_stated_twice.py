@@ -21,7 +21,7 @@ def test_of_two_carriers_is_that_of_fermi_integrals_by_quadrature(kind, n, r):
     else:
         law, conducts = thermopower.thermoelectric_p_silicon, conductivity_p
     conducted = conducts(T, n, p)[0]
-    beta = law(T, n, p, 0.0, 1.0, r)[0][0]
+    beta = law(T, n, p, 0.0, r)[0][0]
     for t, coefficient, sigma in zip(T.tolist(), 1e3 * beta / conducted, conducted, strict=True):
         assert coefficient == pytest.approx(seebeck(t, n, r, kind), rel=1e-8)
         assert sigma == pytest.approx(conductivity(t, n, kind), rel=1e-9)

@@ -94,9 +94,10 @@ class LowDopedSilicon(Silicon):
     intrinsic_scale: float = field_of(OF_SILICON["intrinsic_scale"])
 
     @property
-    def of_carriers(self) -> tuple[float, float, float]:
-        """What sets its carriers: p, the impurity exponent and the intrinsic scale."""
-        return self.p, self.impurity_exponent, self.intrinsic_scale
+    def of_carriers(self) -> dict[str, float]:
+        """The parameters of its carriers' density and mobility, by name."""
+        names = "p", "impurity_exponent", "intrinsic_scale"
+        return {name: getattr(self, name) for name in names}
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -105,7 +106,7 @@ class LowDopedSilicon(Silicon):
 
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
-        return type(self).conductivity(T, n, *self.of_carriers)
+        return type(self).conductivity(T, n, **self.of_carriers)
 
     @property
     def effects(self) -> tuple[Law, ...]:
@@ -114,7 +115,8 @@ class LowDopedSilicon(Silicon):
 
     def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""
-        return type(self).seebeck(T, n, *self.of_carriers, self.scattering_exponent)
+        exponent = self.scattering_exponent
+        return type(self).seebeck(T, n, scattering_exponent=exponent, **self.of_carriers)
 
     def inversion_temperature(self, n: Array | None = None) -> Array:
         """Return the temperature (K) at which the resistivity of a doping (cm⁻³) is highest.
@@ -122,7 +124,7 @@ class LowDopedSilicon(Silicon):
         Of its own doping by default; NaN where there is none below 1700 K.
         """
         doping = self.n_d if n is None else n
-        return type(self).inversion(doping, *self.of_carriers)
+        return type(self).inversion(doping, **self.of_carriers)
 
 
 class NSilicon(LowDopedSilicon):

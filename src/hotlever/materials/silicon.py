@@ -10,7 +10,7 @@ The laws take arrays of the temperature `T` (K), the local doping concentration 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
@@ -234,12 +234,12 @@ def conductivity_low_doped(
     n: ArrayLike,
     p: float,
     impurity_exponent: float = 0.0,
-    intrinsic_scale: float = 1.0,
     mobility_law: Law = mobility,
+    intrinsic_scale: float = 1.0,
 ) -> Evaluated:
     """Electrical conductivity of the low-doped heater and reader, in S cm⁻¹ (Eq. 5)."""
     return conducted(
-        carried_in_n_silicon(T, n, p, impurity_exponent, intrinsic_scale, mobility_law)
+        carried_in_n_silicon(T, n, p, impurity_exponent, mobility_law, intrinsic_scale)
     )
 
 
@@ -248,8 +248,8 @@ def carried_in_n_silicon(
     n: ArrayLike,
     p: float,
     impurity_exponent: float = 0.0,
-    intrinsic_scale: float = 1.0,
     mobility_law: Law = mobility,
+    intrinsic_scale: float = 1.0,
 ) -> list[Carried]:
     """Return the carriers of n-doped silicon (Eqs. 6 to 10)."""
     return [
@@ -326,15 +326,19 @@ def inversion_temperature(
     return highest_resistivity(conductivity_low_doped, n, p, impurity_exponent, intrinsic_scale)
 
 
-def highest_resistivity(conductivity: Callable[..., Evaluated], *parameters: ArrayLike) -> Array:
-    """Return the temperature (K) at which a conductivity of some parameters is lowest; or NaN."""
+def highest_resistivity(conductivity: Law, *parameters: ArrayLike) -> Array:
+    """Return the temperature (K) at which a conductivity of some parameters is lowest; or NaN.
+
+    They are doping, p, impurity exponent and intrinsic scale.
+    """
     arguments = np.broadcast_arrays(
         *(np.asarray(parameter, dtype=float) for parameter in parameters)
     )
     cold, hot = (np.full(arguments[0].shape, T) for T in (300.0, FORMULA_TO))
 
     def slope(T: Array, *arguments: Array) -> Array:
-        sigma, partials = conductivity(T, *arguments)
+        *first, intrinsic_scale = arguments
+        sigma, partials = conductivity(T, *first, intrinsic_scale=intrinsic_scale)
         return partials["T"] / sigma
 
     # takes a quarter of a second to load, which not every command has to wait for

@@ -227,8 +227,8 @@ def thermoelectric_n_silicon(
     n: ArrayLike,
     p: float,
     impurity_exponent: float,
-    intrinsic_scale: float,
     scattering_exponent: float,
+    intrinsic_scale: float = 1.0,
 ) -> Evaluated:
     """Thermoelectricity of n-doped silicon, β (A cm⁻¹ K⁻¹) and γ (W cm⁻¹ K⁻²), (2, ...).
 
@@ -246,7 +246,7 @@ def thermoelectric_n_silicon(
     """
 
     def carried(T: Array, n: ArrayLike) -> list[Carried]:
-        return carried_in_n_silicon(T, n, p, impurity_exponent, intrinsic_scale)
+        return carried_in_n_silicon(T, n, p, impurity_exponent, intrinsic_scale=intrinsic_scale)
 
     return _of_silicon(carried, np.asarray(T, dtype=float), n, scattering_exponent)
 
@@ -257,8 +257,8 @@ def thermoelectric_p_silicon(
     n: ArrayLike,
     p: float,
     impurity_exponent: float,
-    intrinsic_scale: float,
     scattering_exponent: float,
+    intrinsic_scale: float = 1.0,
 ) -> Evaluated:
     """Thermoelectricity of p-doped silicon, β and γ; see `thermoelectric_n_silicon`."""
 

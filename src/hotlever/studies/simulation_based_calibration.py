@@ -78,7 +78,7 @@ class MinimosSilicon(NSilicon):
 
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), see `hotlever.materials.kinds.Kind`."""
-        return conductivity_low_doped(T, n, *self.of_carriers, minimos_mobility)
+        return conductivity_low_doped(T, n, mobility_law=minimos_mobility, **self.of_carriers)
 
 
 class MinimosMaterial(Material):
