@@ -46,8 +46,12 @@ def test_a_calibration_says_what_it_said(folder):
     hottest = table[-1]
     assert calibration.bias_for(hottest["tip_K"]) == pytest.approx(hottest["bias_V"])
     assert calibration.knee.power_mW == content["knee"]["power_mW"]
-    heights = content["pulse"]["table"]
-    peak = calibration.pulse.tip_temperature(heights[-1]["height_V"])
+
+
+def test_a_calibration_of_pulses_says_what_it_said():
+    path = FOLDERS[0] / "calibration.json"
+    heights = json.loads(path.read_text(encoding="utf-8"))["pulse"]["table"]
+    peak = read_calibration(path).pulse.tip_temperature(heights[-1]["height_V"])
     assert peak == pytest.approx(heights[-1]["peak_K"])
 
 
