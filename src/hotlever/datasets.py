@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import zlib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+#: Attribute of a written dataset, see `checksum`.
+CHECKSUM = "checksum"
 #: Name: unit and meaning.
 QUANTITIES: dict[str, tuple[str, str]] = {
     # what an instrument and a thermometer see
@@ -371,9 +374,18 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str], columns: Seque
         write_text(path, csv_text(data, columns))
     elif suffix == ".nc":
         with whole_file(path) as temporary:
-            # with sums by which a damaged file is known
-            numbers = [name for name in data.variables if data[name].dtype.kind in "if"]
-            sums = {name: {"fletcher32": True} for name in numbers if data[name].ndim}
-            data.to_netcdf(temporary, engine="netcdf4", encoding=sums)
+            summed = data.assign_attrs({CHECKSUM: checksum(data)})
+            summed.to_netcdf(temporary, engine="netcdf4")
     else:
         raise InputError(f"{path}: unknown file type '{suffix}', expected .csv or .nc")
+
+
+def checksum(data: xr.Dataset) -> int:
+    """Return a sum over all numbers of a dataset, by which a damaged file is known."""
+    total = 0
+    for name in sorted(map(str, data.variables)):
+        values = data[name].values
+        if values.dtype.kind == "f":
+            # files do not keep what kind of NaN it was
+            total = zlib.crc32(np.where(np.isnan(values), np.nan, values).tobytes(), total)
+    return total

@@ -69,6 +69,18 @@ def test_a_damaged_file_gives_the_same_numbers_or_none(sweep, tmp_path):
             np.testing.assert_array_equal(found[name].values, sweep[name].values)
 
 
+def test_numbers_that_became_none_are_damage(sweep, tmp_path):
+    """As where an address in a file is damaged: what stands there counts as never written."""
+    path = tmp_path / "a.nc"
+    write_sweep(sweep, path)
+    with xr.open_dataset(path) as data:
+        lost = data.load()
+    lost["current_mA"][:] = np.nan
+    lost.to_netcdf(path)
+    with pytest.raises(InputError, match=r"a\.nc: the file is damaged"):
+        read_sweep(path)
+
+
 def test_other_file_types_are_refused(sweep, tmp_path):
     with pytest.raises(InputError, match=r"unknown file type '.xls', expected .csv or .nc"):
         write_sweep(sweep, tmp_path / "a.xls")

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import csv_text, in_a_file, labelled, offer_plots, quantity, write_dataset
+from hotlever.datasets import (
+    CHECKSUM,
+    checksum,
+    csv_text,
+    in_a_file,
+    labelled,
+    offer_plots,
+    quantity,
+    write_dataset,
+)
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.lever.balances import BALANCES, balance_columns, balance_names, balance_slopes
@@ -198,9 +207,13 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     try:
         with xr.open_dataset(path, engine="netcdf4") as data:
             loaded = data.load()
+        # files of 1.0 have none
+        damaged = loaded.attrs.pop(CHECKSUM, None) not in (None, checksum(loaded))
     except Exception as error:
         # a damaged file raises what its libraries think of
         raise InputError(f"{path}: not a NetCDF file, or a damaged one") from error
+    if damaged:
+        raise InputError(f"{path}: the file is damaged: its numbers are not those written")
     missing = [name for name in SWEEP_COLUMNS if name not in loaded.variables]
     if missing:
         raise InputError(f"{path}: not a sweep: variable '{missing[0]}' is missing")
