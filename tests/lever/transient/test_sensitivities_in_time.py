@@ -15,7 +15,7 @@ from hotlever.measurands import observables_of
 #: So that every observable is there.
 BRIDGE = {"bridge_upper_ohm": 5600.0, "bridge_lower_ohm": 2000.0}
 NAMES = ["heat_capacity_scale", "series_resistance_ohm"]
-OF_SILICON = [*PARAMETERS, "impurity_exponent", "n_hd"]
+OF_SILICON = [*PARAMETERS, "impurity_exponent", "intrinsic_scale", "n_hd"]
 #: What each parameter moves the tip by (K), and the largest share of its value that it moves by.
 MOVED_K, MOST = 1.0, 0.2
 
