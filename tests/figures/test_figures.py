@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import cycle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from numpy.testing import assert_allclose
 
 import made_up
 from hotlever import figures
+from hotlever.calibration import read_calibration
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement
@@ -21,6 +24,8 @@ from hotlever.lever.fields import heater_profile, seen_from_above
 from hotlever.lever.transient import pulse, simulate, spectrum, time_constants
 from hotlever.probe import Probe
 from hotlever.report.page import Page
+
+STORED = Path(__file__).parents[1] / "stored" / "1.0.0"
 
 
 @pytest.fixture(scope="module")
@@ -156,3 +161,20 @@ def test_page_is_self_contained(made, tmp_path):
     assert "data:image/png;base64," in html
     assert "http" not in html
     assert (written.parent / "iv.pdf").exists()
+
+
+def test_every_source_of_an_error_is_drawn_however_many_there_are():
+    calibration = read_calibration(STORED / "calibration.json")
+    table = calibration.table
+    others = table.assign_coords(source=[f"other {name}" for name in table.source.values])
+    many = xr.concat([table, others], "source", data_vars="minimal", coords="minimal")
+    made = figures.calibration_curves(replace(calibration, table=many))
+    lines = made.axes[-1].get_lines()
+    assert [line.get_label() for line in lines] == [*many.source.values, "together"]
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == len(lines) > 10
+
+
+def test_every_sweep_is_drawn_however_many_there_are(coarse):
+    sweep = coarse.sweep([1.0, 2.0])
+    (axes,) = figures.iv_curves({f"lever {number}": sweep for number in range(9)}).axes
+    assert len(axes.get_lines()) == 9

@@ -16,7 +16,6 @@ from hotlever.calibration.pulses import PulseCalibration
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION
 from hotlever.estimation.lack_of_fit import USUAL_SCATTER
 from hotlever.figures.style import (
-    COLOURS,
     LINES,
     MEASURED,
     NOT_DESCRIBED,
@@ -197,8 +196,11 @@ def _pulse(axes: Axes, pulse: PulseCalibration) -> None:
 
 def _budget(axes: Axes, table: xr.Dataset) -> None:
     """Draw the standard error of the tip temperature by source."""
-    for source, colour in zip(table.source.values, COLOURS, strict=False):
-        axes.plot(table.tip_K, table.budget_K.sel(source=source), color=colour, label=source)
+    # black is that of all together
+    lines = cycle((line, colour) for line, colour in LINES if colour != BLACK)
+    for source, (line, colour) in zip(table.source.values, lines, strict=False):
+        part = table.budget_K.sel(source=source)
+        axes.plot(table.tip_K, part, ls=line, color=colour, label=source)
     axes.plot(table.tip_K, table.tip_stderr_K, color=BLACK, lw=2.0, label="together")
     axes.set(xlabel=axis_label("tip_K"), ylabel="standard error (K)", ylim=(0, None))
     axes.legend(loc="upper left")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,7 +35,7 @@ def held_states(data: xr.Dataset, curve: xr.Dataset | None = None) -> Figure:
             style: Any = {"color": "0.6", "lw": 1.0, "label": "all states"}
             quantity.plot(curve.tip_K, whole, **style)
             bias.plot(curve.tip_K, curve.bias_V, **style)
-        for number, colour in zip(np.unique(data.state).tolist(), COLOURS, strict=False):
+        for number, colour in zip(np.unique(data.state).tolist(), cycle(COLOURS), strict=False):
             some = data.isel(bias=data.state.values == number)
             label = f"state {number:g} of a set point"
             for axes, values in ((quantity, some[column] / scale), (bias, some.bias_V)):

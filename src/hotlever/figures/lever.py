@@ -58,7 +58,7 @@ def sweep_overview(sweep: xr.Dataset) -> Figure:
         curve(current, sweep, "bias_V", "current_mA", "o-", color=BLUE, label="I$_h$, swept supply")
         held = [name for name in map(str, sweep.data_vars) if name.endswith("_mA")]
         held = [name for name in held if name not in ("current_mA", "ground_current_mA")]
-        for name, colour in zip(held, COLOURS[1:], strict=False):
+        for name, colour in zip(held, cycle(COLOURS[1:]), strict=False):
             label = f"at {name.removesuffix('_mA')}"
             current.plot(sweep.bias_V, sweep[name], "s-", color=colour, label=label)
         if held:
@@ -94,12 +94,12 @@ def iv_curves(
     published : sequence of `hotlever.spieser2017` operating points, optional
     """
     with figure(4.8, 3.6) as (made, axes):
-        for (name, sweep), colour in zip(sweeps.items(), COLOURS, strict=False):
+        for (name, sweep), colour in zip(sweeps.items(), cycle(COLOURS), strict=False):
             line = marker(sweep, "bias") or "-"
             curve(axes, sweep, "lever_V", "current_mA", line, color=colour, label=name)
         if measured is not None:
             curve(axes, measured, "lever_V", "current_mA", **MEASURED)
-        for (name, knee), colour in zip((knees or {}).items(), COLOURS, strict=False):
+        for (name, knee), colour in zip((knees or {}).items(), cycle(COLOURS), strict=False):
             seen = f"knee{'' if len(sweeps) < 2 else f' in {name}'}: {knee.tip_K.item():.0f} K"
             seen += f", {knee.lever_V.item():.2f} V, {knee.current_mA.item():.2f} mA"
             axes.plot(knee.lever_V, knee.current_mA, "D", ms=6, color=colour, label=seen)
@@ -193,7 +193,7 @@ def heater_profiles(profiles: Mapping[str, xr.Dataset]) -> Figure:
         From `heater_profile`, by the name of the operating point.
     """
     with figure(5.2, 5.2, 2, 1, sharex=True) as (made, (upper, lower)):
-        for (name, profile), colour in zip(profiles.items(), COLOURS, strict=False):
+        for (name, profile), colour in zip(profiles.items(), cycle(COLOURS), strict=False):
             rho, metallic = profile.resistivity, profile.resistivity_slope.values > 0
             # let the dashed part reach the solid one
             inverted = ~metallic | ~np.roll(metallic, 1) | ~np.roll(metallic, -1)
