@@ -12,6 +12,7 @@ from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
+    Field,
     GetPydanticSchema,
     PlainSerializer,
     TypeAdapter,
@@ -39,10 +40,10 @@ _LIMITS = {
     "less_than": "less than",
 }
 
-# A number of a result file; NaN where the file has none.
-Number = Annotated[
-    float, WrapValidator(lambda value, check: math.nan if value is None else check(value))
-]
+_NAN_IF_NONE = WrapValidator(lambda value, check: math.nan if value is None else check(value))
+# A number of a result file, and a standard error; NaN where the file has none.
+Number = Annotated[float, _NAN_IF_NONE]
+StandardError = Annotated[float, Field(ge=0), _NAN_IF_NONE]
 
 
 def stored_as(

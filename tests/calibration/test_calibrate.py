@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -188,6 +189,9 @@ def test_a_curve_too_cold_is_refused_by_the_rule(reference):
     curve = measured_curve(reference, np.random.default_rng(3), to_V=1.8, from_V=0.9)
     with pytest.raises(InputError, match=r"too cold|too little to calibrate with"):
         calibrate(measurement_of(curve), law=EQ12)
+    few = replace(measurement_of(curve.rows(np.arange(3))), path="iv.csv")
+    with pytest.raises(InputError, match=r"^iv.csv: 3 points with bias and current"):
+        calibrate(few, law=EQ12)
 
 
 def test_routes_exclude_each_other(reference):
@@ -248,6 +252,10 @@ def test_a_calibration_file_is_read_back_whole(calibrated, tmp_path):
         (("notes",), {}, "notes = {}"),
         (("gum_bias_V",), 99.0, "gum_bias_V: expected the bias of a row of the table"),
         (("gum", 0, "type"), "C", "gum.0.type = 'C'"),
+        (("gum", 0, "u"), None, "gum.0.u = None"),
+        (("gum", 0, "dof"), 0.0, "gum.0.dof = 0: expected more than 0"),
+        (("k_stderr",), -1.0, "k_stderr = -1: expected at least 0"),
+        (("route",), "by eye", "route = 'by eye'"),
         (("gum_correlation",), [[1.0]], "gum_correlation: expected numbers in"),
     ],
 )

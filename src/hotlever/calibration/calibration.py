@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import pandas as pd
@@ -51,7 +51,7 @@ from hotlever.measurands import FITTED
 from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import PriorUse
-from hotlever.records import Number, stored_as
+from hotlever.records import Number, StandardError, stored_as
 from hotlever.text import value_with_error
 from hotlever.types import Array
 
@@ -288,15 +288,15 @@ class CalibrationFile(BudgetFields, ResultFile[Calibration]):
     largest errors in the table, all in all and by source.
     """
 
-    route: str
+    route: Literal["power law", "probe", "fit in vacuum", "fit in air"]
     medium: str
     power_law: _Law | None
     power_law_residual_K: Number
     k: Number
-    k_stderr: Number
+    k_stderr: StandardError
     # beside numbers, whether it was measured
     knee: Annotated[dict[str, Number], PlainSerializer(dict)]
-    tip_temperature_uncertainty_K: Number = np.nan
+    tip_temperature_uncertainty_K: StandardError = np.nan
     uncertainty_budget_K: dict[str, Number] = Field(default_factory=dict)
     base_temperature_K: Number = np.nan
     table: Columns

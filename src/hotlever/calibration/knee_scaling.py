@@ -138,8 +138,7 @@ def calibrated_by_knee(
     try:
         knee = find_knee(curve, vacuum)
     except KneeOutsideError as outside:
-        where = f"{measured.path or 'measurement'}: {outside}"
-        knee = _estimated_knee(curve, vacuum, reference, similar, where)
+        knee = _estimated_knee(curve, vacuum, reference, similar, str(outside))
         notes.append(
             f"{outside}; until then the power of the knee is estimated from the points below it, "
             f"as {value_with_error(knee.power_mW, knee.power_mW_stderr)} mW"

@@ -129,7 +129,10 @@ def calibrate(
         anywhere = measured if law is None else replace(measured, medium=None)
         probe, of_circuit = with_measured_circuit(origin, anywhere, "vacuum")
         probe.circuit.need_cold_start("a power law")
-        result = calibrated_by_knee(measured, probe, law, route)
+        try:
+            result = calibrated_by_knee(measured, probe, law, route)
+        except InputError as error:
+            raise InputError(f"{measured.path or 'measurement'}: {error}") from error
         return replace(result, notes=[*of_circuit, *notes, *result.notes])
     if pulse is not None:
         origin.circuit.need_cold_start("a calibration for pulses")

@@ -23,7 +23,7 @@ from hotlever.estimation.experiment import TIP
 from hotlever.estimation.gum import Budget, CoverageInterval, InputQuantity, propagate
 from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.load_lines import Rows
-from hotlever.estimation.outcome import IF_ANY, Matrix, Section
+from hotlever.estimation.outcome import IF_ANY, Correlations, Section
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.measurands import FITTED, OBSERVABLES
 from hotlever.probe.parameters import parameters_of
@@ -313,7 +313,7 @@ class BudgetFields(Section):
     """An uncertainty budget as calibration files hold it, with what follows from it for 95 %."""
 
     gum: list[_Row] | None = IF_ANY
-    gum_correlation: Matrix | None = IF_ANY
+    gum_correlation: Correlations | None = IF_ANY
     gum_bias_V: float | None = IF_ANY
     gum_of: BudgetOf | None = IF_ANY
     effective_dof: Number | None = IF_ANY

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import WrapValidator
+from pydantic import Field, WrapValidator
 from scipy.special import stdtrit
 
 from hotlever.records import Number
@@ -21,7 +21,11 @@ _BLOCK, _MOST_TRIALS = 10_000, 1_000_000
 _SETTLED = 0.2
 
 # Infinite where a file has none.
-_Dof = Annotated[float, WrapValidator(lambda dof, check: math.inf if dof is None else check(dof))]
+_Dof = Annotated[
+    float,
+    Field(gt=0),
+    WrapValidator(lambda dof, check: math.inf if dof is None else check(dof)),
+]
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,7 @@ class InputQuantity:
     quantity: str
     estimate: Number
     unit: str
-    u: Number
+    u: Annotated[float, Field(ge=0)]
     type: Literal["A", "B"]
     distribution: str
     sensitivity: Number

@@ -37,6 +37,8 @@ from hotlever.types import Array
 
 #: No column of a measurement has larger values, in the units inside.
 _LARGEST = 1e9
+#: What a correlation of 1 may be off by.
+_ROUNDED = 1e-6
 
 
 def array(values: Sequence[Any] | Array, shape: tuple[int, ...], where: str) -> Array:
@@ -62,6 +64,14 @@ def _matrix(values: list[list[float]]) -> Array:
     return np.array(values, dtype=float)
 
 
+def _correlations(rows: list[list[float]]) -> Array:
+    """Return a matrix of correlations of its rows."""
+    matrix = _matrix(rows)
+    if np.any(abs(matrix) > 1.0 + _ROUNDED) or np.any(abs(np.diag(matrix) - 1.0) > _ROUNDED):
+        raise ValueError("expected numbers from -1 to 1, and 1 along the diagonal")
+    return matrix
+
+
 def _probe(sections: dict[str, dict[str, Any]], info: ValidationInfo) -> Probe:
     return Probe.from_sections(sections, f"{info.context}: probe")
 
@@ -79,6 +89,7 @@ def _rows(columns: dict[str, Array]) -> list[dict[str, float]]:
 # Arrays of one and of two dimensions, NaN where there is nothing.
 Vector = Annotated[Array, stored_as(list[Number])]
 Matrix = Annotated[Array, stored_as(list[list[Number]], _matrix)]
+Correlations = Annotated[Array, stored_as(list[list[Number]], _correlations)]
 # Columns of a table, of which files hold the rows.
 Columns = Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)]
 _Count = Annotated[float, Field(ge=1, multiple_of=1)]

@@ -28,6 +28,7 @@ from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.outcome import (
+    Correlations,
     Matrix,
     MeasurementSection,
     Outcome,
@@ -306,7 +307,7 @@ def _options(values: Any, check: ValidatorFunctionWrapHandler, info: ValidationI
 
 class _Correlation(Section):
     names: list[str]
-    matrix: Matrix
+    matrix: Correlations
 
 
 class _FittedData(MeasurementSection):
@@ -338,6 +339,12 @@ class FitFile(ResultFile[Fit]):
             raise InputError(f"{path}: parameters and correlation do not belong together")
         for name in names:
             parameter_of(self.probe, name, f"{path}: correlation", in_time=in_time)
+            found, of_probe = self.parameters[name].value, self.probe.values([name]).item()
+            if not np.isclose(found, of_probe, rtol=1e-9, atol=0.0):
+                raise InputError(
+                    f"{path}: parameters: {name} = {found:g}, expected that of the probe, "
+                    f"{of_probe:g}"
+                )
         try:
             self.options.of(self.probe, in_time=in_time)
         except InputError as error:

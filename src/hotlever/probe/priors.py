@@ -25,7 +25,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.materials.parameters import Parameter
 from hotlever.probe.parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.parts import ProbeParts
-from hotlever.records import Number
+from hotlever.records import StandardError
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 from hotlever.text import with_unit
 
@@ -124,7 +124,7 @@ class PriorUse:
     value: float
     spread: Annotated[float, Field(gt=0)]
     posterior_value: float
-    posterior_spread: Number
+    posterior_spread: StandardError
     distribution: Distribution = "normal"
 
     @property
