@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from hotlever.calibration.table import TABLE_COLUMNS
 from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.priors import default_priors
+from hotlever.probe.priors import PriorUse, default_priors
 from made_up import GONE, damaged
 from synthetic_curves import measured_curve, measurement_of
 
@@ -255,6 +255,10 @@ def test_a_calibration_file_is_read_back_whole(calibrated, tmp_path):
         (("gum", 0, "u"), None, "gum.0.u = None"),
         (("gum", 0, "dof"), 0.0, "gum.0.dof = 0: expected more than 0"),
         (("k_stderr",), -1.0, "k_stderr = -1: expected at least 0"),
+        (
+            *(("priors", "n_q"), asdict(PriorUse(1.0, 0.1, 1.0, 0.1))),
+            "unknown prior 'n_q': did you mean 'n_d'",
+        ),
         (("route",), "by eye", "route = 'by eye'"),
         (("gum_correlation",), [[1.0]], "gum_correlation: expected numbers in"),
     ],

@@ -142,8 +142,15 @@ def test_data_that_are_not_described_get_no_proposals(first):
     doubtful = replace(first[1], reason="the current differs")
     with pytest.raises(InputError, match="no lever like this one shows these data"):
         plan_next(doubtful)
-    with pytest.raises(InputError, match="without the weights of its data"):
-        plan_next(replace(first[1], weights=None))
+    for missing in ({"weights": None}, {"priors": {}}):
+        with pytest.raises(InputError, match="without priors or the weights of its data"):
+            plan_next(replace(first[1], **missing))
+
+
+def test_where_all_rows_were_set_aside_the_next_has_the_usual_noise(first):
+    none = {name: 0.0 * weights for name, weights in first[1].weights.items()}
+    plan = plan_next(replace(first[1], weights=none), at_K=500.0, count=1)
+    assert plan.proposals.stderr_then_K.item() < plan.proposals.stderr_now_K.item()
 
 
 def test_the_command_writes_a_row_for_each_proposal(run, first):

@@ -83,11 +83,11 @@ class LinearisedLever:
         """
         calibration.need_described("what to measure next")
         probe, measurement = calibration.probe, calibration.measurement
-        if calibration.weights is None:
+        if calibration.weights is None or not calibration.priors:
             raise InputError(
                 f"what to measure next: found a calibration by route '{calibration.route}' without "
-                "the weights of its data, expected one of a probe with priors (hotlever calibrate "
-                "DATA.csv --probe PROBE.toml -o CAL.json) by this version"
+                "priors or the weights of its data, expected one of a probe with priors (hotlever "
+                "calibrate DATA.csv --probe PROBE.toml -o CAL.json) by this version"
             )
         if measurement.out_of_contact.any():
             raise InputError(
@@ -278,8 +278,7 @@ class LinearisedLever:
         law, size = _USUAL_NOISE.get(observable, _USUAL_OF_METERS), self._size(observable, values)
         if share is not None:
             law = NoiseLaw(0.0, share)
-        elif self.measurement is not None and observable in self.weights:
-            counts = self.weights[observable] > 0
+        elif (counts := self.weights.get(observable, np.empty(0)) > 0).any():
             errors = 1.0 / self.weights[observable][counts]
             return NoiseLaw.of(errors, self._size(observable, self._measured)[counts]).at(size)
         return np.hypot(law.at(size), _DISCREPANCY * size)

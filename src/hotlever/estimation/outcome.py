@@ -24,13 +24,14 @@ from pydantic import (
 )
 
 from hotlever import __version__
-from hotlever.errors import InputError
+from hotlever.errors import InputError, unknown_name
 from hotlever.files import json_text, read_json, without_nan, write_text
 from hotlever.lever.transient.waveform import Polyline, Sine
 from hotlever.measurement import MEASURED, Measurement
 from hotlever.measurement.data import OPTIONAL
 from hotlever.probe import Probe
-from hotlever.probe.priors import PriorUse
+from hotlever.probe.parameters import parameters_of
+from hotlever.probe.priors import SCALES, PriorUse
 from hotlever.probe.surroundings import Medium
 from hotlever.records import Number, explained, stored_as
 from hotlever.types import Array
@@ -220,6 +221,14 @@ class ResultFile(Section, Generic[Result]):
             command = {"calibration": "calibrate"}.get(kind, kind)
             where = f"{path}: not a {kind} file (hotlever {command} -o)"
             raise explained(error, cls, where) from None
+
+    @model_validator(mode="after")
+    def _priors_are_of_the_probe(self, info: ValidationInfo) -> Self:
+        known = [*parameters_of(self.probe, anywhere=True, in_time=True), *SCALES]
+        for name in self.priors:
+            if name not in known:
+                raise unknown_name("prior", name, known, f"{info.context}: priors")
+        return self
 
     @model_validator(mode="after")
     def _bias_heats_the_lever(self, info: ValidationInfo) -> Self:
