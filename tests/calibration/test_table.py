@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.calibration.table import even_rows, table_with_budget, with_steep_rows
+from hotlever.calibration.table import (
+    even_rows,
+    interpolated,
+    table_with_budget,
+    with_steep_rows,
+)
 from hotlever.errors import InputError
 
 NAMES = ("bias_V", "power_mW", "tip_K")
@@ -65,8 +70,14 @@ def test_between_the_ends_of_a_jump_there_are_no_rows():
 
     bias = with_steep_rows(even, fine, jumping(fine))
     np.testing.assert_array_equal(bias, even)
-    rows = even_rows(table_of(bias, jumping(bias)), NAMES, "tip_K", 10.0)
+    table = table_of(bias, jumping(bias))
+    rows = even_rows(table, NAMES, "tip_K", 10.0)
     cold, hot = 300.0 + 7.5**2, 700.0 + 7.6**2
+    for along, at in (("tip_K", [cold + 1.0, 500.0, hot - 1.0]), ("bias_V", [7.52, 7.54, 7.58])):
+        assert np.isnan(interpolated(table, at, along, "bias_V")).all()
+    ends = interpolated(table, [cold - 1.0, cold, hot, hot + 1.0], "tip_K", "bias_V")
+    assert interpolated(table.isel(bias=[-1]), [1.0, 10.0], "bias_V", "bias_V")[1] == 10.0
+    np.testing.assert_allclose(ends, [7.4329, 7.5, 7.6, 7.6654], atol=1e-3)
     assert not np.any((rows["tip_K"] > cold) & (rows["tip_K"] < hot))
     assert {350.0, 760.0} <= set(rows["tip_K"])
 

@@ -24,6 +24,7 @@ from hotlever.app.work import probe_of
 from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.levers import calibration_rows, compare_calibrations
+from hotlever.calibration.table import interpolated
 from hotlever.errors import InputError
 from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
@@ -150,7 +151,7 @@ def doubted(report: Report, name: str) -> str:
 def settings(report: Report, name: str, along: str, value: float) -> dict[str, float] | None:
     """Return what to set, and what follows, for a tip temperature, a bias or a power.
 
-    None outside the calibrated range.
+    None outside the calibrated range, and where the lever jumps.
 
     Raises
     ------
@@ -165,8 +166,7 @@ def settings(report: Report, name: str, along: str, value: float) -> dict[str, f
     elif along == "power_mW":
         bias = float(calibration.bias_for(calibration.tip_temperature(value)))
     else:
-        inside = float(table.bias_V.min()) <= value <= float(table.bias_V.max())
-        bias = value if inside else np.nan
+        bias = float(interpolated(table, value, "bias_V", "bias_V"))
     if not np.isfinite(bias):
         return None
     row = {

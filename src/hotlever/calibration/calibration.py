@@ -161,6 +161,8 @@ class Calibration(Outcome):
     def tip_temperature(self, power_mW: ArrayLike) -> Array:
         """Return the tip temperature (K) by power (mW); NaN outside the measured range.
 
+        NaN too where a slow ramp of the bias jumps over temperatures.
+
         Raises
         ------
         InputError
@@ -188,7 +190,8 @@ class Calibration(Outcome):
         Returns
         -------
         ndarray
-            NaN outside the measured range; from the coldest tip on, if it cools at first.
+            NaN outside the measured range, and where a slow ramp jumps over the temperature: no
+            bias leads to it. From the coldest tip on, if it cools at first.
 
         Raises
         ------

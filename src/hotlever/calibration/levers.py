@@ -132,7 +132,7 @@ def _why_none(calibration: Calibration, at: Setting, tip: Mapping[str, float]) -
         return "its tip temperature does not follow from a power; expected a bias"
     low, high = calibration.heating[at.along].values[[0, -1]]
     unit = QUANTITIES[at.along][0]
-    return f"{at.text} is out of its range, {low:.4g} to {high:.4g} {unit}"
+    return f"{at.text} is out of its range, {low:.4g} to {high:.4g} {unit}, or where it jumps"
 
 
 def _answer(described: bool | None) -> str:
@@ -151,7 +151,8 @@ def tips_along(calibrations: Mapping[str, Calibration], along: str) -> xr.Datase
     Returns
     -------
     xarray.Dataset
-        ``tip_K`` and ``tip_stderr_K`` on (``lever``, ``along``); NaN out of a lever's range.
+        ``tip_K`` and ``tip_stderr_K`` on (``lever``, ``along``); NaN out of a lever's range,
+        and where it jumps.
     """
     tables = {
         lever: each.table if along == "bias_V" else each.heating

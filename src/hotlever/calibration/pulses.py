@@ -109,7 +109,7 @@ class PulseCalibration:
         height_V : array_like
         moment : {"peak", "end", "mean"}
         """
-        return interpolated(self.table, height_V, "height_V", _column(moment))
+        return interpolated(self.table, height_V, "height_V", _column(moment), tip="peak_K")
 
     def height_for(self, tip_K: ArrayLike, moment: str = "peak") -> Array:
         """Return the height (V) of the pulse for a tip temperature (K); NaN out of range.
@@ -119,7 +119,7 @@ class PulseCalibration:
         tip_K : array_like
         moment : {"peak", "end", "mean"}
         """
-        return interpolated(self.table, tip_K, _column(moment), "height_V")
+        return interpolated(self.table, tip_K, _column(moment), "height_V", tip="peak_K")
 
     def section(self) -> PulseSection:
         """Return the section of the calibration file."""

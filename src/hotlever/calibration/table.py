@@ -14,7 +14,7 @@ from hotlever.errors import InputError
 from hotlever.estimation.outcome import array
 from hotlever.probe import Circuit
 from hotlever.text import BAND
-from hotlever.types import Array
+from hotlever.types import Array, Mask
 
 #: Columns of a calibration's table; the last say how sure it is.
 STATED = ("tip_stderr_K", "tip_low_K", "tip_high_K")
@@ -68,10 +68,21 @@ def total_error(parts: Mapping[str, Array]) -> Array:
     return np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
 
 
-def interpolated(table: xr.Dataset, values: ArrayLike, along: str, column: str) -> Array:
-    """Return a column of a table at values of another one that rises; NaN outside of it."""
+def interpolated(
+    table: xr.Dataset, values: ArrayLike, along: str, column: str, tip: str = "tip_K"
+) -> Array:
+    """Return a column of a table at values of another one that rises; NaN outside and in a jump."""
     at, rising = np.asarray(values, dtype=float), table[along].values
-    return np.interp(at, rising, table[column].values, left=np.nan, right=np.nan)
+    line = np.interp(at, rising, table[column].values)
+    return np.where(_no_jump(table, along, at, tip), line, np.nan)
+
+
+def _no_jump(table: xr.Dataset, along: str, at: Array, tip: str) -> Mask:
+    """Return whether values of a column are those of a row, or lie between two near each other."""
+    rising = table[along].values
+    steps = np.concatenate([[np.inf], np.abs(np.diff(table[tip].values)), [np.inf]])
+    near = steps[np.searchsorted(rising, at, side="right")] <= _FAR_K
+    return np.asarray(near | np.isin(at, rising))
 
 
 def with_steep_rows(even: Array, bias: Array, tip: Array) -> Array:
@@ -140,8 +151,7 @@ def even_rows(
     even = step * np.arange(np.floor(values[0] / step) + 1.0, np.ceil(values[-1] / step))
     # steps such as 0.1 are no binary numbers
     even = even[(even > values[0]) & (even < values[-1])]
-    before = np.searchsorted(values, even, side="right") - 1
-    even = even[np.abs(np.diff(table[tip].values))[before] <= _FAR_K]
+    even = even[_no_jump(table, along, even, tip)]
     at = np.concatenate([values[:1], even, values[-1:]])
     return {name: np.interp(at, values, table[name].values) for name in names}
 

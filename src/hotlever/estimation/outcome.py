@@ -224,10 +224,10 @@ class ResultFile(Section, Generic[Result]):
 
     @model_validator(mode="after")
     def _priors_are_of_the_probe(self, info: ValidationInfo) -> Self:
-        known = [*parameters_of(self.probe, anywhere=True, in_time=True), *SCALES]
+        of_probe = [*parameters_of(self.probe, anywhere=True, in_time=True), *SCALES]
         for name in self.priors:
-            if name not in known:
-                raise unknown_name("prior", name, known, f"{info.context}: priors")
+            if name not in of_probe:
+                raise unknown_name("prior", name, of_probe, f"{info.context}: priors")
         return self
 
     @model_validator(mode="after")

@@ -339,10 +339,10 @@ class FitFile(ResultFile[Fit]):
             raise InputError(f"{path}: parameters and correlation do not belong together")
         for name in names:
             parameter_of(self.probe, name, f"{path}: correlation", in_time=in_time)
-            found, of_probe = self.parameters[name].value, self.probe.values([name]).item()
-            if not np.isclose(found, of_probe, rtol=1e-9, atol=0.0):
+            stated, of_probe = self.parameters[name].value, self.probe.values([name]).item()
+            if not np.isclose(stated, of_probe, rtol=1e-9, atol=0.0):
                 raise InputError(
-                    f"{path}: parameters: {name} = {found:g}, expected that of the probe, "
+                    f"{path}: parameters: {name} = {stated:g}, expected that of the probe, "
                     f"{of_probe:g}"
                 )
         try:

@@ -124,7 +124,9 @@ class _Question:
             try:
                 asked = self._name, self._along, value
                 row = await self._session.ask("full", "showing:settings", *asked)
-                text = "outside of what was calibrated" if row is None else _answer(row)
+                text = (
+                    "outside of what was calibrated, or in a jump" if row is None else _answer(row)
+                )
             except HotleverError as error:
                 text = str(error)
         self._answer.set_text(text)
