@@ -12,6 +12,7 @@ import xarray as xr
 from hotlever.datasets import csv_text, frame_text, labelled
 from hotlever.errors import InputError
 from hotlever.lever import probe_of, read_sweep, write_sweep
+from hotlever.lever.dataset import circuit_of
 from hotlever.lever.fields import FieldMapper, heater_profile, write_vtu
 from hotlever.materials.silicon import inversion_temperature
 
@@ -95,6 +96,16 @@ def test_what_is_no_sweep_is_refused(tmp_path):
     xr.Dataset({"x": ("a", [1.0])}).to_netcdf(tmp_path / "other.nc")
     with pytest.raises(InputError, match="variable 'bias_V' is missing"):
         read_sweep(tmp_path / "other.nc")
+
+
+@pytest.mark.parametrize("text", [None, "{", "3", 5.0])
+def test_a_sweep_that_does_not_say_its_circuit_is_not_taken_for_one_in_the_usual(sweep, text):
+    attributes = {name: value for name, value in sweep.attrs.items() if name != "circuit"}
+    other = sweep.copy()
+    other.attrs = attributes if text is None else {**attributes, "circuit": text}
+    for ask in (probe_of, circuit_of):
+        with pytest.raises(InputError, match=r"\[circuit\] is missing or damaged"):
+            ask(other)
 
 
 def test_vtu_holds_the_fields(coarse, tmp_path):

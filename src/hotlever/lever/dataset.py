@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -226,15 +226,33 @@ def probe_of(data: xr.Dataset) -> Probe:
     Raises
     ------
     InputError
-        If it has a material with laws of its own, whose class is not at hand.
+        If it does not say, or has a material with laws of its own, whose class is not at hand.
     """
-    names = [name for name in (*SECTIONS, LAWS) if name in data.attrs]
-    return Probe.from_sections({name: json.loads(data.attrs[name]) for name in names}, "sweep")
+    # every dataset has a circuit, without which the probe would be in the reference's
+    names = [name for name in (*SECTIONS, LAWS) if name in data.attrs or name == "circuit"]
+    return Probe.from_sections({name: _section(data, name) for name in names}, "sweep")
+
+
+def _section(data: xr.Dataset, name: str) -> dict[str, Any]:
+    """Return a section of the probe file that a dataset holds."""
+    try:
+        section = json.loads(data.attrs[name])
+    except (KeyError, TypeError, ValueError):
+        section = None
+    if not isinstance(section, dict):
+        raise InputError(f"sweep: [{name}] is missing or damaged")
+    return section
 
 
 def circuit_of(data: xr.Dataset) -> Circuit:
-    """Return the circuit in which a sweep was made."""
-    return Circuit.from_values(json.loads(data.attrs["circuit"]), "sweep: [circuit]")
+    """Return the circuit in which a sweep was made.
+
+    Raises
+    ------
+    InputError
+        If it does not say.
+    """
+    return Circuit.from_values(_section(data, "circuit"), "sweep: [circuit]")
 
 
 def checked_bias(bias: ArrayLike, probe: Probe) -> Array:
