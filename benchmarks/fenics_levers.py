@@ -38,6 +38,7 @@ def compared() -> dict[str, tuple[Probe, list[float]]]:
     bias = [2.0, 5.0, 8.0]
     reference = Probe.reference()
     scattering = reference.with_(impurity_exponent=0.5, intrinsic_scale=1.2)
+    hot_boron = boron.with_(**{"hot.impurity_exponent": 0.5, "hot.intrinsic_scale": 0.85})
     held = wired(reference, "reader", kind="supply", bias_V=2.0, series_resistance_ohm=500.0)
     warm = wired(reference, "ground", kind="ground", base_temperature_K=350.0)
     current = wired(reference, "reader", kind="supply", current_mA=0.3)
@@ -46,7 +47,7 @@ def compared() -> dict[str, tuple[Probe, list[float]]]:
     return drawn | {
         "n-type, hot impurities": (scattering, bias),
         "p-type, slanted": (boron, [2.0, 4.5, 6.0]),
-        "p-type, hot impurities": (boron.with_(**{"hot.impurity_exponent": 0.5}), [2.0, 4.0]),
+        "p-type, hot impurities": (hot_boron, [2.0, 4.0]),
         "metal film on a dielectric": (film, [0.2, 0.4, 0.6]),
         "metal film, κ given": (film.with_(**{"film.kappa": 0.5}), [0.2, 0.4, 0.6]),
         "two supplies": (held, [0.0, *bias]),
