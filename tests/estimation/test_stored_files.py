@@ -43,6 +43,9 @@ def test_a_calibration_says_what_it_said(folder):
     assert calibration.describes_data
     for column in ("bias_V", "tip_K", "tip_stderr_K", "tip_low_K", "tip_high_K"):
         np.testing.assert_array_equal(calibration.table[column], [row[column] for row in table])
+    # tables of 0.1.0 have rows 50 K apart, and no jump
+    tips = calibration.table.tip_K.values
+    assert np.isfinite(calibration.bias_for(np.linspace(tips.min(), tips.max(), 300))).all()
     hottest = table[-1]
     assert calibration.bias_for(hottest["tip_K"]) == pytest.approx(hottest["bias_V"])
     assert calibration.knee.power_mW == content["knee"]["power_mW"]

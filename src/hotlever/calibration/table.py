@@ -27,8 +27,9 @@ OF_THE_CONTACT = ("apex_K", "apex_stderr_K", "surface_K", "surface_stderr_K")
 BUDGETS = ("budget_K", "apex_budget_K")
 #: A table has more rows where the tip rises by more than this (K) from one to the next.
 STEEP_K = 10.0
-#: Between rows further apart (K) nothing is known, or a lever jumps.
-_FAR_K = 2.5 * STEEP_K
+#: Between rows further apart (K), and by so many times further than those beside them, a lever
+#: jumps.
+_FAR_K, _FURTHER = 2.5 * STEEP_K, 2.4
 #: Rows of a table for an instrument.
 MOST_ROWS = 10_000
 #: What rows may be even in, by the word for it: their column and its unit.
@@ -79,10 +80,11 @@ def interpolated(
 
 def _no_jump(table: xr.Dataset, along: str, at: Array, tip: str) -> Mask:
     """Return whether values of a column are those of a row, or lie between two near each other."""
-    rising = table[along].values
-    steps = np.concatenate([[np.inf], np.abs(np.diff(table[tip].values)), [np.inf]])
-    near = steps[np.searchsorted(rising, at, side="right")] <= _FAR_K
-    return np.asarray(near | np.isin(at, rising))
+    rising, steps = table[along].values, np.abs(np.diff(table[tip].values))
+    # tables of 0.1 have no more rows where the tip is steep: neighbours are as far apart there
+    beside = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))
+    smooth = np.concatenate([[False], steps <= np.maximum(_FAR_K, _FURTHER * beside), [False]])
+    return np.asarray(smooth[np.searchsorted(rising, at, side="right")] | np.isin(at, rising))
 
 
 def with_steep_rows(even: Array, bias: Array, tip: Array) -> Array:
