@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from documents import EXAMPLES
 from hotlever.calibration import calibrate, plan_next, read_calibration
 from hotlever.calibration.linearised_lever import LinearisedLever
 from hotlever.errors import InputError
@@ -186,3 +187,11 @@ def test_what_cannot_be_is_said_in_one_line(run, words, expected):
     status, _, err = run("next", *words)
     assert status == 2
     assert expected in err.splitlines()[-1]
+
+
+def test_no_spectra_are_proposed_of_a_heater_without_silicon():
+    film = Probe.from_file(EXAMPLES / "palladium-on-nitride.toml")
+    plan = plan_next(probe=film, count=3, at_K=400.0)
+    assert set(plan.proposals.what.values.tolist()) == {"bias"}
+    asked = plan_next(probe=film, count=3, at_K=400.0, allowed={"spectra": None})
+    assert set(asked.proposals.what.values.tolist()) == {"spectra"}

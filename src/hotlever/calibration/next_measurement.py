@@ -32,8 +32,7 @@ from hotlever.types import Array
 
 #: What can be measured, and what that shows beside the current.
 KINDS = {"bias": (), "reader": ("reader",), "spectra": ("tip",)}
-#: Of these several at one bias are proposed; a sweep is a check of the lever where it does not
-#: return.
+#: Of these several at one bias are proposed; a sweep does not return to one.
 REPEATED = ("spectra",)
 #: With this probability the tip is no hotter than is said.
 SURE = 0.99
@@ -156,7 +155,7 @@ def plan_next(
         Of that lever, in place of some of the usual ones.
     allowed : mapping of str to int or None, optional
         Which of `KINDS` may be measured, and at most how many of each; by default all but the
-        reader, which counts where the data have it.
+        reader, and spectra where the heater is no silicon; these count where the data have them.
     count : int
         Proposals, at most.
     at_K : float, optional
@@ -326,9 +325,10 @@ def _error_of_model(lever: LinearisedLever, bias: Array) -> Array:
 def _allowed(
     lever: LinearisedLever, allowed: Mapping[str, int | None] | None
 ) -> dict[str, int | None]:
-    """Return what may be measured; by default all but the reader where that was not measured."""
+    """Return what may be measured; by default what was, and what every such lever shows."""
     if allowed is None:
-        return {kind: None for kind in KINDS if kind != "reader" or kind in lever.weights}
+        shown = {*lever.weights, *(["tip"] if lever.probe.heater_silicon else [])}
+        return {kind: None for kind, of_kind in KINDS.items() if {*of_kind} <= shown}
     for kind in allowed:
         if kind == "pulse":
             raise InputError(
