@@ -27,10 +27,7 @@ _FILM = 0.2
 #: Of the exponent of the temperature in mobility limited by impurities: half of what it is without
 #: screening, 1.5. The paper takes 0.
 _IMPURITIES = 0.75
-#: Of the intrinsic carrier density of hot silicon. At 700 K formulas that others quote, from
-#: measurements, are by +27 % (Morin and Maita, 1954), +13 % (Wasserrab, 1977), +2 % (Putley and
-#: Mitchell, 1958) and −41 % (Barber, 1967) off that of Eq. 7 without dopants, whose narrowing of
-#: the gap, +15 % at 3e17 cm⁻³, was measured when cold.
+#: Of the intrinsic carrier density of hot silicon, of which published formulas differ (theory).
 _INTRINSIC = 0.15
 #: Of the power of the energy in the relaxation time of carriers: half of what lies between acoustic
 #: phonons, −1/2, and the half-way to ionised impurities, 3/2; and of a metal's Seebeck coefficient
@@ -268,11 +265,8 @@ def field_of(parameter: Parameter, **others: Any) -> Any:
     fit's own.
     """
     least, most = field_bounds(parameter)
-    stated = {
-        "description": f"{parameter.meaning}, {parameter.symbol} ({parameter.unit})",
-        "ge": least,
-        "le": most,
-    }
+    words = f"{parameter.meaning}, {parameter.symbol} ({parameter.unit})"
+    stated = {"description": words, "ge": least, "le": most}
     if not math.isnan(parameter.value):
         stated["default"] = parameter.value
     field = Field(**{**stated, **others})
@@ -329,8 +323,6 @@ def parameter_named(name: str) -> Parameter:
     --------
     >>> parameter_named("heater_width_um").symbol, parameter_named("heater_width_um").unit
     ('heater width', 'µm')
-    >>> parameter_named("n_hd").unit
-    'cm⁻³'
     >>> parameter_named("film.tcr").symbol, parameter_named("film.tcr").unit
     ('α (film)', 'K⁻¹')
     """
@@ -356,8 +348,6 @@ def label(name: str) -> str:
     --------
     >>> label("n_d"), label("heater_width_um")
     ('doping concentration of the heater, n_d', 'heater width')
-    >>> label("film.tcr")
-    'temperature coefficient of the resistivity, α (film)'
     """
     named = parameter_named(name)
     meaning = named.meaning.removesuffix(f", {name.rpartition('.')[0]}")
@@ -406,5 +396,5 @@ def sentence(text: str) -> str:
     ('The levers differ.', 'n_d is not determined.')
     """
     first = re.split(r"[^\w.]", text, maxsplit=1)[0]
-    is_symbol = first == "k" or is_of_material(first)
-    return f"{text if is_symbol else text[0].upper() + text[1:]}."
+    named = first == "k" or is_of_material(first)
+    return f"{text if named else text[0].upper() + text[1:]}."
