@@ -326,19 +326,21 @@ def inversion_temperature(
     return highest_resistivity(conductivity_low_doped, n, p, impurity_exponent, intrinsic_scale)
 
 
-def highest_resistivity(conductivity: Law, *parameters: ArrayLike) -> Array:
-    """Return the temperature (K) at which a conductivity of some parameters is lowest; or NaN.
-
-    They are doping, p, impurity exponent and intrinsic scale.
-    """
+def highest_resistivity(
+    conductivity: Law,
+    n: ArrayLike,
+    p: ArrayLike,
+    impurity_exponent: ArrayLike,
+    intrinsic_scale: ArrayLike,
+) -> Array:
+    """Return the temperature (K) at which a conductivity of doped silicon is lowest; or NaN."""
     arguments = np.broadcast_arrays(
-        *(np.asarray(parameter, dtype=float) for parameter in parameters)
+        *(np.asarray(each, dtype=float) for each in (n, p, impurity_exponent, intrinsic_scale))
     )
     cold, hot = (np.full(arguments[0].shape, T) for T in (300.0, FORMULA_TO))
 
-    def slope(T: Array, *arguments: Array) -> Array:
-        *first, intrinsic_scale = arguments
-        sigma, partials = conductivity(T, *first, intrinsic_scale=intrinsic_scale)
+    def slope(T: Array, n: Array, p: Array, exponent: Array, scale: Array) -> Array:
+        sigma, partials = conductivity(T, n, p, exponent, intrinsic_scale=scale)
         return partials["T"] / sigma
 
     # takes a quarter of a second to load, which not every command has to wait for
