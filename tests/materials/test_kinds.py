@@ -15,11 +15,10 @@ from hotlever.materials.p_silicon import (
     band_gap_p,
     conductivity_p,
     hole_mobility,
-    inversion_temperature_p,
 )
 from hotlever.materials.presets import PRESETS
 from hotlever.materials.sections import material_of
-from hotlever.materials.silicon import band_gap
+from hotlever.materials.silicon import band_gap, inversion_temperature
 from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
 
 OPTION_III = published("option III").material
@@ -147,10 +146,10 @@ def test_the_gap_of_boron_doped_silicon_narrows_by_what_was_published():
 
 def test_boron_doped_silicon_has_an_inversion_temperature():
     T = np.linspace(500.0, 1200.0, 70001)
-    found = inversion_temperature_p(5e17, 2.5)
+    found = inversion_temperature(5e17, 2.5, conductivity=conductivity_p)
     assert found == pytest.approx(T[conductivity_p(T, 5e17, 2.5)[0].argmin()], abs=0.02)
     assert MADE["p-silicon"].inversion_temperature() == pytest.approx(
-        inversion_temperature_p(OPTION_III.n_d, 2.23, 0.4, 0.8)
+        inversion_temperature(OPTION_III.n_d, 2.23, 0.4, 0.8, conductivity_p)
     )
 
 

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from hotlever.materials.laws import limited_temperature
-from hotlever.materials.minimos import minimos_mobility
 from hotlever.materials.silicon import (
     band_gap,
-    carrier_density,
+    carriers,
     conductivity_high_doped,
     conductivity_low_doped,
     impurity_mobility,
     intrinsic_density,
     inversion_temperature,
+    minimos_mobility,
     mobility,
     phonon_mobility,
     thermal_conductivity,
@@ -30,12 +30,16 @@ DOPING = np.array([1e16, 3.3e17, 5.75e17, 1e19, 2.2e20])
 TEMPERATURES = np.array([210.0, 293.0, 500.0, 679.5, 680.3, 900.0, 1300.0, 1690.0])
 BEYOND = np.array([20.0, 150.0, 1750.0, 1900.0])
 
+
+def carrier_density(T, n, carrier, intrinsic_scale=1.0):
+    return carriers(T, n, band_gap, intrinsic_scale)[carrier == "hole"]
+
+
 #: Law, the arguments after T, and the names of the arguments it has derivatives for.
 LAWS = [
     (thermal_conductivity, {"c_kappa": 0.686}),
     (band_gap, {"n": 5.75e17}),
     (intrinsic_density, {"n": 5.75e17, "intrinsic_scale": 1.3}),
-    (carrier_density, {"n": 5.75e17, "intrinsic_scale": 1.3}),
     (phonon_mobility, {"p": 2.65}),
     (impurity_mobility, {"n": 5.75e17, "impurity_exponent": 0.75}),
     (mobility, {"n": 5.75e17, "p": 2.65, "impurity_exponent": 0.75}),
@@ -48,7 +52,10 @@ LAWS = [
 CARRIERS = [
     (law, {**arguments, "carrier": "hole"})
     for law, arguments in LAWS
-    if law in (carrier_density, impurity_mobility, phonon_mobility, mobility)
+    if law in (impurity_mobility, phonon_mobility, mobility)
+] + [
+    (carrier_density, {"n": 5.75e17, "intrinsic_scale": 1.3, "carrier": carrier})
+    for carrier in ("electron", "hole")
 ]
 #: Of another reference than the paper.
 MINIMOS = [

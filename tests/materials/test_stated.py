@@ -14,10 +14,10 @@ from hotlever.errors import InputError
 from hotlever.materials.film_kinds import Dielectric, MetalFilm
 from hotlever.materials.films import metal_conductivity
 from hotlever.materials.formulas import parsed
-from hotlever.materials.monotone import monotone_cubic
 from hotlever.materials.sections import material_of
 from hotlever.materials.stated import Formula, Table
 from hotlever.materials.table_files import read_law
+from hotlever.piecewise import monotone_cubic
 from hotlever.units import product_conversion
 
 T = np.linspace(300.0, 1200.0, 37)

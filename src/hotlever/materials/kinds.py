@@ -11,7 +11,6 @@ have it: what a fit may vary, probe files and ``[material]`` follow from these.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -20,7 +19,7 @@ from hotlever.materials.film_kinds import Dielectric, MetalFilm
 from hotlever.materials.heat import enthalpy
 from hotlever.materials.kind import Kind
 from hotlever.materials.laws import Evaluated, Law
-from hotlever.materials.p_silicon import conductivity_p, inversion_temperature_p
+from hotlever.materials.p_silicon import conductivity_p
 from hotlever.materials.parameters import OF_SILICON, field_of
 from hotlever.materials.silicon import (
     Carrier,
@@ -80,9 +79,8 @@ class Silicon(Kind):
 class LowDopedSilicon(Silicon):
     """Silicon whose carriers are those of its dopant and, when hot, its own."""
 
-    #: Laws by temperature, doping, p, impurity exponent and intrinsic scale; and where σ is least.
+    #: Its law by temperature, doping, p, impurity exponent and intrinsic scale.
     conductivity: ClassVar[Law]
-    inversion: ClassVar[Callable[..., Array]]
     #: Its law of thermoelectricity, by these and the scattering exponent; and the majority.
     seebeck: ClassVar[Law]
     carrier: ClassVar[Carrier]
@@ -124,14 +122,15 @@ class LowDopedSilicon(Silicon):
         Of its own doping by default; NaN where there is none below 1700 K.
         """
         doping = self.n_d if n is None else n
-        return type(self).inversion(doping, **self.of_carriers)
+        return inversion_temperature(
+            doping, **self.of_carriers, conductivity=type(self).conductivity
+        )
 
 
 class NSilicon(LowDopedSilicon):
     """Silicon doped with phosphorus, as in the paper."""
 
     conductivity: ClassVar = conductivity_low_doped
-    inversion: ClassVar = inversion_temperature
     seebeck: ClassVar = thermoelectric_n_silicon
     carrier: ClassVar = "electron"
 
@@ -142,7 +141,6 @@ class PSilicon(LowDopedSilicon):
     """Silicon doped with boron."""
 
     conductivity: ClassVar = conductivity_p
-    inversion: ClassVar = inversion_temperature_p
     seebeck: ClassVar = thermoelectric_p_silicon
     carrier: ClassVar = "hole"
 

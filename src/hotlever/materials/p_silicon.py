@@ -16,11 +16,9 @@ from hotlever.materials.silicon import (
     band_gap,
     carriers,
     conducted,
-    highest_resistivity,
     matthiessen,
     mobility,
 )
-from hotlever.types import Array
 
 #: Of the resistivity of boron-doped silicon at 23 °C (Thurber et al.; ASTM F723): resistivity
 #: times doping (Ω cm⁻²) by phonons and, at the highest doping, by impurities; the inverse of the
@@ -128,21 +126,3 @@ def carried_in_p_silicon(
         (holes, hole_mobility.formula(T, n, p, impurity_exponent), "hole"),
         (electrons, mobility.formula(T, n, p, impurity_exponent), "electron"),
     ]
-
-
-def inversion_temperature_p(
-    n: ArrayLike,
-    p: ArrayLike,
-    impurity_exponent: ArrayLike = 0.0,
-    intrinsic_scale: ArrayLike = 1.0,
-) -> Array:
-    """Temperature (K) at which the resistivity of boron-doped silicon is highest; NaN without one.
-
-    See `hotlever.materials.silicon.inversion_temperature`.
-
-    Examples
-    --------
-    >>> inversion_temperature_p([5e17], p=2.65).round(0).tolist()
-    [772.0]
-    """
-    return highest_resistivity(conductivity_p, n, p, impurity_exponent, intrinsic_scale)

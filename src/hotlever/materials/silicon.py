@@ -40,6 +40,12 @@ IMPURITY_RATIO: dict[Carrier, float] = {"electron": 1.0, "hole": 0.746}
 PHONON_RATIO: dict[Carrier, float] = {"electron": 1.0, "hole": 0.279}  # (m_e/m_h)^(5/2)
 #: Where the slope of Eq. 4 steps (K), through a tanh that is 1 K wide.
 STEP = 680.0
+#: Of MINIMOS, electrons and holes: lattice mobility at 300 K, how its exponent differs from that of
+#: electrons, mobility at the highest doping, and the doping that halves what is between (cm⁻³).
+_MINIMOS: dict[Carrier, tuple[float, float, float, float]] = {
+    "electron": (1430.0, 0.0, 80.0, 1.12e17),
+    "hole": (460.0, 0.18, 45.0, 2.23e17),
+}
 
 
 @law(
@@ -108,7 +114,9 @@ def density_of_states(T: ArrayLike) -> Evaluated:
 
 
 @law(meant_for=(200.0, 1300.0), source="Eq. 7; Altermatt et al. (1999)")
-def intrinsic_density(T: ArrayLike, n: ArrayLike, intrinsic_scale: float = 1.0) -> Evaluated:
+def intrinsic_density(
+    T: ArrayLike, n: ArrayLike, intrinsic_scale: float = 1.0, gap_law: Law = band_gap
+) -> Evaluated:
     """Intrinsic carrier density, in cm⁻³ (Eq. 7, first line); doping narrows the gap.
 
     Published formulas differ where silicon is hot (`hotlever.materials.parameters`):
@@ -120,15 +128,10 @@ def intrinsic_density(T: ArrayLike, n: ArrayLike, intrinsic_scale: float = 1.0) 
     >>> f"{n_i:.2e}"
     '9.68e+09'
     """
-    return _intrinsic(T, band_gap.formula(T, n), intrinsic_scale)
-
-
-def _intrinsic(T: ArrayLike, band_gap: Evaluated, scale: float) -> Evaluated:
-    """Eq. 7, first line, for a band gap; see `intrinsic_density`."""
-    T, (gap, d_gap) = np.asarray(T, dtype=float), band_gap
+    T, (gap, d_gap) = np.asarray(T, dtype=float), gap_law.formula(T, n)
     two_kT = 2.0 * BOLTZMANN * T
     unscaled = density_of_states.formula(T)[0] * np.exp(-gap / two_kT)
-    n_i = scale * unscaled
+    n_i = intrinsic_scale * unscaled
     return n_i, {
         "T": n_i * (1.5 / T + (gap / T - d_gap["T"]) / two_kT),
         "n": -n_i * d_gap["n"] / two_kT,
@@ -136,21 +139,12 @@ def _intrinsic(T: ArrayLike, band_gap: Evaluated, scale: float) -> Evaluated:
     }
 
 
-@law(meant_for=(200.0, 1300.0), source="Eq. 6")
-def carrier_density(
-    T: ArrayLike, n: ArrayLike, carrier: Carrier = "electron", intrinsic_scale: float = 1.0
-) -> Evaluated:
-    """Density of electrons, or of holes n_i²/n_e, in n-doped silicon, in cm⁻³ (Eq. 6)."""
-    majority, minority = carriers(T, n, band_gap, intrinsic_scale)
-    return majority if carrier == "electron" else minority
-
-
 def carriers(
-    T: ArrayLike, n: ArrayLike, gap_law: Law, intrinsic_scale: float = 1.0
+    T: ArrayLike, n: ArrayLike, gap_law: Law, intrinsic_scale: float
 ) -> tuple[Evaluated, Evaluated]:
-    """Return majority and minority carriers (cm⁻³) together, as they share n_i (Eq. 6)."""
+    """Return majority and minority carriers (cm⁻³) of doped silicon, which share n_i (Eq. 6)."""
     n = np.asarray(n, dtype=float)
-    n_i, d_i = _intrinsic(T, gap_law.formula(T, n), intrinsic_scale)
+    n_i, d_i = intrinsic_density.formula(T, n, intrinsic_scale, gap_law)
     root = np.sqrt(n**2 + 4.0 * n_i**2)
     majority = 0.5 * (n + root)
     minority = n_i**2 / majority
@@ -225,6 +219,42 @@ def matthiessen(by_impurities: Evaluated, by_phonons: Evaluated) -> Evaluated:
         "p": by_phonon * d_phonon["p"],
         "n": by_impurity * d_impurity["n"],
         "impurity_exponent": by_impurity * d_impurity["impurity_exponent"],
+    }
+
+
+@law(
+    meant_for=(200.0, 500.0),
+    source="MINIMOS; Selberherr et al., Solid-State Electron. 33, 1425 (1990)",
+)
+def minimos_mobility(
+    T: ArrayLike, n: ArrayLike, p: float, _: float = 0.0, carrier: Carrier = "electron"
+) -> Evaluated:
+    """Carrier mobility as in MINIMOS, in cm² V⁻¹ s⁻¹: impurities scatter less when it is hot.
+
+    Selberherr et al., Solid-State Electron. 33, 1425 (1990), in place of Eq. 8, whose
+    impurity term has no temperature. The exponent of the lattice is 2 there; it is `p` here, since
+    levers have higher ones (Table II).
+
+    Examples
+    --------
+    >>> minimos_mobility([300.0, 800.0], 4e17, p=2.0)[0].round().tolist()
+    [466.0, 172.0]
+    """
+    T, n = np.asarray(T, dtype=float), np.asarray(n, dtype=float)
+    lattice_300, steeper, lowest_300, half_300 = _MINIMOS[carrier]
+    hot = T / 300.0
+    exponent = p + steeper
+    lattice, lowest = lattice_300 * hot**-exponent, lowest_300 * hot**-0.45
+    power, doping = 0.72 * hot**0.065, n / (half_300 * hot**3.2)
+    scattered = doping**power
+    free = 1.0 / (1.0 + scattered)
+    by_scattered = -(lattice - lowest) * free**2 * scattered
+    scattered_by_T = power * (0.065 * np.log(doping) - 3.2) / T
+    lattice_by_T, lowest_by_T = -exponent * lattice / T, -0.45 * lowest / T
+    return lowest + (lattice - lowest) * free, {
+        "T": lowest_by_T + (lattice_by_T - lowest_by_T) * free + by_scattered * scattered_by_T,
+        "p": -lattice * np.log(hot) * free,
+        "n": by_scattered * power / n,
     }
 
 
@@ -309,8 +339,16 @@ def inversion_temperature(
     p: ArrayLike,
     impurity_exponent: ArrayLike = 0.0,
     intrinsic_scale: ArrayLike = 1.0,
+    conductivity: Law = conductivity_low_doped,
 ) -> Array:
     """Temperature T_i (K) at which the resistivity of low-doped silicon is highest, dρ/dT = 0.
+
+    Parameters
+    ----------
+    n, p, impurity_exponent, intrinsic_scale : array_like
+        See `conductivity_low_doped`.
+    conductivity : law
+        By temperature and these.
 
     Returns
     -------
@@ -323,17 +361,6 @@ def inversion_temperature(
     >>> inversion_temperature([4.10e17], p=2.64).round(0).tolist()
     [805.0]
     """
-    return highest_resistivity(conductivity_low_doped, n, p, impurity_exponent, intrinsic_scale)
-
-
-def highest_resistivity(
-    conductivity: Law,
-    n: ArrayLike,
-    p: ArrayLike,
-    impurity_exponent: ArrayLike,
-    intrinsic_scale: ArrayLike,
-) -> Array:
-    """Return the temperature (K) at which a conductivity of doped silicon is lowest; or NaN."""
     arguments = np.broadcast_arrays(
         *(np.asarray(each, dtype=float) for each in (n, p, impurity_exponent, intrinsic_scale))
     )

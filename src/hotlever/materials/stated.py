@@ -19,8 +19,7 @@ from hotlever.errors import counted, quoted, shown, unknown_name
 from hotlever.materials.formulas import Expression, names_in, parsed
 from hotlever.materials.heat import STANDARD_TEMPERATURE
 from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO, LEVELLING, Evaluated
-from hotlever.materials.monotone import monotone_cubic
-from hotlever.piecewise import Piecewise
+from hotlever.piecewise import Piecewise, monotone_cubic
 from hotlever.text import with_unit
 from hotlever.types import Array
 

@@ -12,7 +12,7 @@ Units are those of `hotlever.materials.silicon`; S is in V/K, β in A cm⁻¹ K�
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -195,17 +195,18 @@ def _bipolar(summed: Evaluated) -> Evaluated:
     return gamma - beta * S, {name: d[2] - 2.0 * S * d[1] + S**2 * d[0] for name, d in by.items()}
 
 
-def _of_silicon(
-    carried: Callable[[Array, ArrayLike], Sequence[Carried]],
-    T: Array,
-    n: ArrayLike,
-    exponent: float,
-) -> Evaluated:
-    """Return β and γ of carriers by temperature and doping, less what κ of pure silicon has."""
+def _beside_pure(T: Array, n: ArrayLike) -> Array:
+    """Return the doping at each temperature and, as a second one, that of pure silicon."""
     n = np.broadcast_to(np.asarray(n, dtype=float), np.broadcast_shapes(T.shape, np.shape(n)))
-    # pure silicon as the second of two dopings
-    both = np.stack([n, np.full_like(n, _PURE)])
-    summed, by = _summed(carried(T, both), density_of_states.formula(T), exponent)
+    return np.stack([n, np.full_like(n, _PURE)])
+
+
+def _less_pure(carried: Sequence[Carried], T: Array, exponent: float) -> Evaluated:
+    """Return β and γ of carriers at two dopings, the second pure, less what κ of pure silicon has.
+
+    See `_beside_pure`.
+    """
+    summed, by = _summed(carried, density_of_states.formula(T), exponent)
     pure, pure_by = _bipolar((summed[:, 1], {name: d[:, 1] for name, d in by.items()}))
     pure_by.pop("n")
     values, by = summed[1:, 0], {name: d[1:, 0] for name, d in by.items()}
@@ -244,11 +245,11 @@ def thermoelectric_n_silicon(
     scattering_exponent : float
         See `seebeck_of_band`.
     """
-
-    def carried(T: Array, n: ArrayLike) -> list[Carried]:
-        return carried_in_n_silicon(T, n, p, impurity_exponent, intrinsic_scale=intrinsic_scale)
-
-    return _of_silicon(carried, np.asarray(T, dtype=float), n, scattering_exponent)
+    T = np.asarray(T, dtype=float)
+    carried = carried_in_n_silicon(
+        T, _beside_pure(T, n), p, impurity_exponent, intrinsic_scale=intrinsic_scale
+    )
+    return _less_pure(carried, T, scattering_exponent)
 
 
 @law(meant_for=(300.0, 1300.0), source=_SOURCE)
@@ -261,11 +262,9 @@ def thermoelectric_p_silicon(
     intrinsic_scale: float = 1.0,
 ) -> Evaluated:
     """Thermoelectricity of p-doped silicon, β and γ; see `thermoelectric_n_silicon`."""
-
-    def carried(T: Array, n: ArrayLike) -> list[Carried]:
-        return carried_in_p_silicon(T, n, p, impurity_exponent, intrinsic_scale)
-
-    return _of_silicon(carried, np.asarray(T, dtype=float), n, scattering_exponent)
+    T = np.asarray(T, dtype=float)
+    carried = carried_in_p_silicon(T, _beside_pure(T, n), p, impurity_exponent, intrinsic_scale)
+    return _less_pure(carried, T, scattering_exponent)
 
 
 @law(meant_for=(300.0, 1300.0), source=f"{_SOURCE}; σ of Eq. 11")

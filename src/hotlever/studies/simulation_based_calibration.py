@@ -31,10 +31,10 @@ from hotlever.lever import Branch, Lever
 from hotlever.materials import LOW_DOPED, Material
 from hotlever.materials.kinds import NSilicon
 from hotlever.materials.laws import Evaluated
-from hotlever.materials.minimos import minimos_mobility
 from hotlever.materials.silicon import (
     conductivity_low_doped,
     inversion_temperature,
+    minimos_mobility,
 )
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.priors import default_priors
