@@ -16,9 +16,9 @@ import numpy as np
 from sksundae import ida
 
 from hotlever import Lever, Probe
-from hotlever.lever.space import Fluxes
 from hotlever.lever.transient import Waveform, pulse, simulate, sine, step
 from hotlever.lever.transient.problem import TransientProblem
+from hotlever.lever.transport import Fluxes
 from hotlever.threads import one_blas_thread
 
 CASES = (

@@ -116,8 +116,8 @@ def test_modes_in_time_are_the_full_lever(touching):
     few = reduced_in_time(touching, np.concatenate([state.x for state in states], axis=1))
     few_state = few.polished(few.space.coordinates(states[2].x), 6.5)
     assert few_state.tip_K == pytest.approx(states[2].tip_K, abs=0.1)
-    assert few.equations.into_tip(few_state.x)[0].sum() == pytest.approx(
-        touching.equations.into_tip(states[2].x)[0].sum(), rel=1e-3
+    assert few.equations.losses(few_state.x)["footprint"][0].sum() == pytest.approx(
+        touching.equations.losses(states[2].x)["footprint"][0].sum(), rel=1e-3
     )
 
 

@@ -16,8 +16,8 @@ from taylor import remainder_orders
 from hotlever.errors import BranchEndError
 from hotlever.estimation.experiment_at_rest import ExperimentAtRest
 from hotlever.lever import Branch, Lever
-from hotlever.lever.balances import BALANCES, balance_columns
 from hotlever.lever.branch import Reach
+from hotlever.lever.equations import BALANCES, balance_columns
 from hotlever.lever.lever import COARSE
 from hotlever.lever.monitors import MonitorMap
 from hotlever.lever.reduced.lever import ReducedLever

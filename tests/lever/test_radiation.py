@@ -159,8 +159,8 @@ def test_modes_of_a_train_radiate_as_the_full_lever(bright):
     reduced = reduced_in_time(lever, np.hstack(snapshots))
     x = snapshots[-1]
     few = reduced.equations
-    found = few.by_rim(reduced.space.coordinates(x))[0].sum()
-    assert found == pytest.approx(lever.equations.by_rim(x)[0].sum(), rel=1e-4)
+    found = few.losses(reduced.space.coordinates(x))["rim"][0].sum()
+    assert found == pytest.approx(lever.equations.losses(x)["rim"][0].sum(), rel=1e-4)
     (rest,) = lever.solve([5.0])
     late = integrate(reduced, step(5.0), at=[20000.0])
     assert late.tip_K.item() - BASE == pytest.approx(rest.tip_K - BASE, rel=2e-3)

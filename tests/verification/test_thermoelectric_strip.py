@@ -10,9 +10,8 @@ from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 from skfem import MeshTri
 
-from hotlever.lever.balances import heat_left
 from hotlever.lever.elements import FiniteElements
-from hotlever.lever.equations import LeverEquations
+from hotlever.lever.equations import LeverEquations, heat_left
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.parametrisation import Constrained

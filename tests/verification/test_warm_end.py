@@ -6,9 +6,8 @@ import numpy as np
 from bare import bare_equations
 from skfem import MeshTri
 
-from hotlever.lever.balances import heat_left
 from hotlever.lever.continuation import without_bias
-from hotlever.lever.equations import LeverEquations
+from hotlever.lever.equations import LeverEquations, heat_left
 from hotlever.materials import LOW_DOPED, published
 from hotlever.probe import Circuit, Taper, Terminal
 

@@ -1,22 +1,46 @@
-"""The states of a lever at its quadrature points: fields, fluxes, and the heat that they hold."""
+"""The states of a lever at its quadrature points: fields, fluxes, and the heat that they hold.
+
+Each terminal gives its potential V one equation, and the leg end there the temperature at which the
+chip holds it:
+
+=======  =========================================  ===========================================
+kind     what it is                                 equation of the potential
+=======  =========================================  ===========================================
+ground   wired to ground, nothing between           V = 0, no unknown
+held     a supply of its own, of a voltage behind   one unknown, the same all over the contact;
+         a resistor or of a current, or a ground    current into the lever I = J − G V
+         behind a resistor (Norton)
+sense    floating                                   no current density; V is the mean over it
+swept    the supply that is swept                   V_l, the last unknown: a constraint selects
+                                                    a state, or the circuit V_l + R_s I_h = V_b
+=======  =========================================  ===========================================
+
+Which terminals are what is a matter of the space, whose unknowns depend on it; what is behind them
+and how warm the leg ends are is one of the circuit.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 
 from hotlever.air.stores import HeatInAir
 from hotlever.contact.law import ContactLaw, contact_of
+from hotlever.lever.films import Rim
 from hotlever.lever.laws import LawsAtPoints
-from hotlever.lever.motion import Motion
-from hotlever.lever.radiation import RimRadiation
-from hotlever.lever.rim import Rim
-from hotlever.lever.space import Fields, Fluxes, Space, Tangent
-from hotlever.lever.terminals import Terminals
-from hotlever.lever.transport import Properties, fluxes_of, tangent_of
+from hotlever.lever.space import Space
+from hotlever.lever.transport import (
+    Fields,
+    Fluxes,
+    Motion,
+    Properties,
+    Tangent,
+    fluxes_of,
+    tangent_of,
+)
 from hotlever.materials import Kind
 from hotlever.materials.air import kirchhoff_variable
 from hotlever.materials.laws import Evaluated
@@ -27,11 +51,73 @@ from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
 
-class Radiated(NamedTuple):
-    """What radiates: faces at the quadrature points (mW/µm²), and the points of the rim (mW)."""
+class Terminals:
+    """What is wired to the terminals of a lever, in its equations; see the module's text.
 
-    faces: Array
-    by_rim: Array
+    Parameters
+    ----------
+    space : Space
+    circuit : Circuit
+
+    Attributes
+    ----------
+    conductance : ndarray, shape (held,)
+        G of the held terminals (mA/V).
+    source_mA : ndarray, shape (held,)
+        J of the held terminals.
+    end_rises : dict of str to float
+        How much warmer than the base temperature leg ends are (K), if they are.
+    """
+
+    def __init__(self, space: Space, circuit: Circuit) -> None:
+        self._space, self._held = space, np.array(list(space.held.values()), dtype=int)
+        self.conductance, self.source_mA = circuit.norton(space.held)
+        self.end_rises = circuit.end_rises()
+
+    def scaled(self, sources: float, rises: float) -> Terminals:
+        """Return the same with so many times the sources, and the rises of leg ends."""
+        other = copy(self)
+        other.source_mA = sources * self.source_mA
+        other.end_rises = {name: rises * rise for name, rise in self.end_rises.items()}
+        return other
+
+    def add_currents(self, weak: Array, x: Array) -> None:
+        """Add what held terminals take from states (size + 1, n), G V − J, to the balances there.
+
+        Of an ideal supply both parts are large, so that the difference is taken first.
+        """
+        weak[self._held] += self._conducted(x) - self.source_mA[:, None]
+
+    def add_current_changes(self, weak: Array, change: Array) -> None:
+        """Do the same with changes of the unknowns, (size + 1, n) or (size + 1, n, k)."""
+        weak[self._held] += self._conducted(change)
+
+    def _conducted(self, x: Array) -> Array:
+        conductance = self.conductance.reshape(-1, *(1,) * (x.ndim - 1))
+        return np.asarray(conductance * x[self._held])
+
+    def power(self, x: Array, into: Array) -> Array:
+        """Return the power (mW) that supplies put into states, (n,), by the currents (mA) there.
+
+        These are the weak form of the fluxes, (size + 1, n).
+        """
+        by_held = (x[self._held] * into[self._held]).sum(axis=0)
+        return np.asarray(x[-1] * into[-1] + by_held)
+
+    def warmed(self, T: Array, grad_T: Array) -> tuple[Array, Array]:
+        """Return temperatures and slopes at the points with leg ends as warm as they are held."""
+        for name, rise in self.end_rises.items():
+            value, slope = np.split(self._space.end_tests[name][..., None], [1])
+            T, grad_T = T + rise * value[0], grad_T + rise * slope
+        return T, grad_T
+
+    def warmed_by_base(self, fields: Fields) -> Fields:
+        """Return how fields change with the base temperature: leg ends of their own stay."""
+        warmer, slope = np.ones_like(fields.T), np.zeros_like(fields.grad_T)
+        for name in self.end_rises:
+            value, slopes = np.split(self._space.end_tests[name][..., None], [1])
+            warmer, slope = warmer - value[0], slope - slopes
+        return Fields(warmer, slope, np.zeros_like(fields.grad_V))
 
 
 class StatesAtPoints:
@@ -87,9 +173,6 @@ class StatesAtPoints:
         self.terminals = Terminals(space, circuit)
         self.laws = laws(space, materials, self.base_temperature_K, physics, self.motions)
         self.rim = space.rim if physics.radiation else Rim.nothing(space.size)
-        self._radiation = RimRadiation(
-            self.rim, materials, circuit.base_temperature_K, self.motions
-        )
         self.contact = contact
         self.footprint = Rim.nothing(space.size) if contact is None else space.footprint
         self._polarity = 1.0
@@ -107,27 +190,23 @@ class StatesAtPoints:
         """Return fields of states (size + 1, n), properties and those by T, at the points."""
         return self._evaluated(x)[1]
 
-    def by_rim(self, x: Array, names: Sequence[str] = ()) -> Evaluated:
-        """Return what the rim radiates, see `hotlever.lever.radiation`."""
-        if names:
-            return self._radiation.heat(x, self.terminals.end_rises, names)
-        return self._evaluated(x)[2]
-
-    def into_tip(self, x: Array, names: Sequence[str] = ()) -> Evaluated:
-        """Return the heat that enters the tip at the points of its footprint (mW), (points, n).
-
-        With its derivatives by ``T``, the temperature there, and by parameters.
-        """
-        rise, shares = self.footprint.rise(x), self.footprint.weights
-        if self.contact is None:
-            return rise, dict.fromkeys(("T", *names), rise)
-        heat, by = self.contact.heat(rise, names)
-        return shares * heat, {name: shares * slope for name, slope in by.items()}
-
     def losses(self, x: Array, names: Sequence[str] = ()) -> dict[str, Evaluated]:
-        """Return what leaves at the points of ``rim`` and ``footprint``, of those that count."""
-        every = {"rim": (self.rim, self.by_rim), "footprint": (self.footprint, self.into_tip)}
-        return {name: leaves(x, names) for name, (at, leaves) in every.items() if len(at.weights)}
+        """Return the heat that leaves at the points of ``rim`` and ``footprint`` (mW), (points, n).
+
+        Each if it counts, with derivatives by ``T``, the temperature there, and by parameters.
+        """
+        found = {}
+        if len(self.rim.weights):
+            found["rim"] = (
+                self.laws.radiated(self.rim, x, self.terminals.end_rises, names)
+                if names
+                else self._evaluated(x)[2]
+            )
+        if self.contact is not None:
+            heat, by = self.contact.heat(self.footprint.rise(x), names)
+            shares = self.footprint.weights
+            found["footprint"] = shares * heat, {name: shares * by[name] for name in by}
+        return found
 
     def _evaluated(
         self, x: Array
@@ -140,7 +219,7 @@ class StatesAtPoints:
             T, grad_T = self.terminals.warmed(T, moved.grad_T)
             properties, by = self.properties(T)
             at_points = Fields(T, grad_T, moved.grad_V), properties, by["T"]
-            by_rim = self._radiation.heat(x, self.terminals.end_rises)
+            by_rim = self.laws.radiated(self.rim, x, self.terminals.end_rises)
             self._latest = x.copy(), at_points, by_rim
         return self._latest
 
@@ -193,20 +272,6 @@ class StatesAtPoints:
     def tangent(self, x: Array) -> Tangent:
         """Return how the fluxes of states change with their fields, to first order."""
         return tangent_of(*self.at(x))
-
-    def radiated(self, x: Array) -> Radiated:
-        """Return what states radiate."""
-        faces = self.at(x)[1].emission
-        if faces is None:
-            faces = np.zeros((len(self.space.weights), x.shape[1]))
-        return Radiated(faces, self.by_rim(x)[0])
-
-    def radiated_change(self, x: Array, change: Array) -> Radiated:
-        """Return how `radiated` changes with one change of each state."""
-        by_T = self.at(x)[2].emission
-        rise = self.space.temperature.at_points(change)[0]
-        faces = np.zeros_like(rise) if by_T is None else by_T * rise
-        return Radiated(faces, self.by_rim(x)[1]["T"] * self.rim.rise(change))
 
     def kirchhoff(self, x: Array) -> tuple[Array, Array]:
         """Return θ (mW/µm) and κ (mW/(K µm)) of the gas at the sites of the air operator."""

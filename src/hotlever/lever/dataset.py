@@ -23,9 +23,15 @@ from hotlever.datasets import (
 )
 from hotlever.errors import InputError
 from hotlever.files import read_text
-from hotlever.lever.balances import BALANCES, balance_columns, balance_names, balance_slopes
 from hotlever.lever.branch import Branch
-from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.equations import (
+    BALANCES,
+    SHOWN,
+    LeverEquations,
+    balance_columns,
+    balance_names,
+    balance_slopes,
+)
 from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.observables import with_bridge
 from hotlever.materials import Kind

@@ -1,4 +1,4 @@
-"""The coupled electro-thermal equations of a lever.
+"""The coupled electro-thermal equations of a lever, and where its heat and charge go.
 
 Heat (paper's first equation, with the sign corrected) and charge::
 
@@ -7,7 +7,7 @@ Heat (paper's first equation, with the sign corrected) and charge::
 and, where a probe asks for them, what the current carries and the surface radiates
 (`hotlever.lever.transport`),
 
-with what is wired to the terminals (`hotlever.lever.terminals`). One more condition, the
+with what is wired to the terminals (`hotlever.lever.at_points`). One more condition, the
 *constraint*, selects a state: its tip temperature. What is behind the swept supply does not enter:
 what a lever shows at a tip temperature does not depend on it. Units are µm, V, mA, mW and K.
 Several states stand side by side, see `hotlever.lever.space`.
@@ -20,27 +20,34 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from hotlever.lever.at_points import StatesAtPoints
+from hotlever.lever.films import Rim
+from hotlever.lever.full_space import FullSpace
 from hotlever.lever.laws import BASE, GAP, GAS
 from hotlever.lever.newton import refined
-from hotlever.lever.rim import Rim
-from hotlever.lever.space import (
-    LEVER,
-    TIP,
-    Constraint,
-    Factors,
-    Fluxes,
-    SurfaceTangent,
-)
-from hotlever.lever.transport import fluxes_of
-from hotlever.probe.circuit import Circuit
-from hotlever.types import Array
+from hotlever.lever.space import LEVER, TIP, Constraint, Factors, SurfaceTangent
+from hotlever.lever.transport import Fluxes, fluxes_of
+from hotlever.probe.circuit import Circuit, Wiring
+from hotlever.types import Array, Index
 
 #: What an instrument shows of a state, in the order of `LeverEquations.observed`.
 SHOWN = ("lever_V", "current_mA", "reader_V")
+#: What `balance_columns` returns: heat made in heater and legs (mW; NaN without legs), current to
+#: ground (mA), heat through the leg ends, into the air, radiated and into a tip in contact (mW).
+BALANCES = (
+    "heater_mW",
+    "leg1_mW",
+    "leg2_mW",
+    "ground_current_mA",
+    "end_heat_mW",
+    "air_heat_mW",
+    "radiated_mW",
+    "into_tip_mW",
+)
 
 #: Error (relative) to which derivatives are solved.
 _EXACT = 1e-6
@@ -233,8 +240,8 @@ class LeverEquations(StatesAtPoints):
         flat = np.zeros_like(tangent.charge_flux_T)
         gradient = np.zeros((*x.shape, len(SHOWN)))
         gradient[-1, :, 0] = 1.0
-        if tangent.thermoelectric is not None:
-            flat = tangent.thermoelectric.charge_T * supply
+        if tangent.charge_T is not None:
+            flat = tangent.charge_T * supply
         gradient[..., 1] = self.space.weak_form(Fluxes(along, flat, tangent.sigma * supply))
         if self.space.reader is not None:
             unknowns, weights = self.space.reader
@@ -248,3 +255,115 @@ def steps_of(equations: LeverEquations) -> Array:
     rises = np.array(equations.laws.steps_K) - equations.base_temperature_K
     u = np.sqrt(rises[rises > 0])
     return np.concatenate([-u[::-1], u])
+
+
+# --- where heat and charge go ---------------------------------------------------------------------
+
+
+def balance_names(wiring: Wiring) -> tuple[str, ...]:
+    """Return what `balance_columns` returns: `BALANCES`, and currents into the lever (mA).
+
+    These are at the terminals that the paper's circuit does not have.
+    """
+    return (*BALANCES, *(f"{name}_mA" for name in _unusual(wiring)))
+
+
+def _unusual(wiring: Wiring) -> tuple[str, ...]:
+    """Return those that a current passes, without the ground of the paper's circuit."""
+    usual = "ground" if "ground" in wiring.grounds else None
+    return tuple(name for name in wiring.conducting if name != usual)
+
+
+def balance_columns(equations: LeverEquations, x: Array) -> Array:
+    """Return what is at the terminals, and where heat goes, of states (size + 1, n), (n, k).
+
+    Currents and heats at terminals are consistent fluxes: reactions of the weak form at the nodes
+    of each. The names are `balance_names`.
+    """
+    return _balances(equations, equations.fluxes(x), _leaving(equations, x))
+
+
+def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
+    """Return how the `balance_columns` of states change with changes (size + 1, n) of them."""
+    by_T = equations.at(x)[2].emission
+    rise = equations.space.temperature.at_points(slopes)[0]
+    leaving = _Leaving(
+        equations.kirchhoff(x)[1] * equations.space.air.rise(slopes),
+        np.zeros_like(rise) if by_T is None else by_T * rise,
+        {
+            name: by["T"] * getattr(equations, name).rise(slopes)
+            for name, (_, by) in equations.losses(x).items()
+        },
+    )
+    return _balances(equations, equations.flux_changes(x, slopes), leaving)
+
+
+def heat_left(equations: LeverEquations, x: Array) -> Array:
+    """Return all heat that leaves states: by the leg ends and from the surface (mW), (n,)."""
+    return np.asarray(sum(_heat_out(equations, equations.fluxes(x), _leaving(equations, x))))
+
+
+def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
+    """Return the heat in states (nJ), (n,), and its part that is tested at the leg ends."""
+    space = equations.space
+    (heat,) = space.weighted(equations.laws.heat_density(equations.at(x)[0].T)[0][None])
+    return heat.sum(axis=0), space.end_test[0] @ heat
+
+
+class _Leaving(NamedTuple):
+    """What leaves the surface of states.
+
+    θ at the sites of the air, what faces radiate (mW/µm²), and the `LeverEquations.losses` (mW).
+    """
+
+    theta: Array
+    faces: Array
+    losses: dict[str, Array]
+
+
+def _leaving(equations: LeverEquations, x: Array) -> _Leaving:
+    faces = equations.at(x)[1].emission
+    if faces is None:
+        faces = np.zeros((len(equations.space.weights), x.shape[1]))
+    losses = {name: heat for name, (heat, _) in equations.losses(x).items()}
+    return _Leaving(equations.kirchhoff(x)[0], faces, losses)
+
+
+def _heat_out(
+    equations: LeverEquations, fluxes: Fluxes, leaving: _Leaving
+) -> tuple[Array, Array, Array, Array]:
+    """Return the heat through the leg ends, into the air, radiated, and into the tip."""
+    space = equations.space
+    heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
+    by_ends = -np.einsum("dp,dpn->n", space.end_test, heat)
+    into_air, at_ends = space.air.heat(leaving.theta)
+    light = (space.weights * leaving.faces).sum(axis=0)
+    if "rim" in leaving.losses:
+        at_ends = at_ends + equations.rim.end_test @ leaving.losses["rim"]
+        light = light + leaving.losses["rim"].sum(axis=0)
+    into_tip = np.sum(leaving.losses.get("footprint", np.zeros((0, light.size))), axis=0)
+    return by_ends - at_ends, into_air, light, into_tip
+
+
+def _balances(equations: LeverEquations, fluxes: Fluxes, leaving: _Leaving) -> Array:
+    """Return the balances of fluxes and what leaves the surface; all linear."""
+    space = equations.space
+    assert isinstance(space, FullSpace)  # a reduced lever has no ends
+    heats = _heat_out(equations, fluxes, leaving)
+    made = space.weights * (leaving.faces - fluxes.heat_source)
+    charge = space.weighted(fluxes.charge)
+    of_parts = [_made(made, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
+    into = {
+        name: np.einsum("dp,dpn->n", space.charge_tests[name], charge)
+        for name in space.wiring.conducting
+    }
+    grounds = [name for name in into if equations.circuit.contact(name).kind == "ground"]
+    ground = -sum((into[name] for name in grounds), start=np.zeros_like(heats[0]))
+    currents = [into[name] for name in _unusual(space.wiring)]
+    return np.stack([*of_parts, ground, *heats, *currents], axis=-1)
+
+
+def _made(heat: Array, points: Index) -> Array:
+    """Return the heat made at some points; NaN if the lever has no such part."""
+    made = heat[points].sum(axis=0)
+    return np.asarray(made if points.size else np.full_like(made, np.nan))

@@ -13,10 +13,9 @@ from functools import cached_property
 import numpy as np
 
 from hotlever.errors import ComputationError
-from hotlever.lever.films import PlacedFilm
-from hotlever.lever.motion import Motion
+from hotlever.lever.films import PlacedFilm, Rim
 from hotlever.lever.space import Space
-from hotlever.lever.transport import Properties
+from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind, full_name
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.doping import tapered_doping
@@ -199,6 +198,36 @@ class LawsAtPoints:
             FilmLaws(film, materials, number, motions, carriers_of(film, space, materials))
             for number, film in enumerate(space.films)
         ]
+
+    def radiated(
+        self, rim: Rim, x: Array, end_rises: Mapping[str, float], names: Sequence[str] = ()
+    ) -> Evaluated:
+        """Return what states (size + 1, n) radiate at each point of a rim (mW), (points, n).
+
+        With derivatives by ``T``, the temperature there, and by parameters or dimensions, the
+        rises being the same. Some leg ends may be warmer than the base temperature. What the faces
+        of a flat lever radiate is among the `properties` of the sheet.
+        """
+        T = self.base_temperature_K + rim.rise(x)
+        of_base = np.ones_like(T)
+        # a rim that does not count has none
+        for name in rim.end_tests.keys() & end_rises.keys():
+            T += end_rises[name] * rim.end_tests[name][:, None]
+            of_base -= rim.end_tests[name][:, None]
+        heat, by = np.zeros_like(T), {name: np.zeros_like(T) for name in ("T", *names)}
+        for number, film in enumerate(rim.films):
+            kind, points = self.made_of[film.material], film.points
+            own, unit = names_in_laws(film.material, kind), PER_CM2_TO_MILLI_PER_UM2 * rim.weights
+            value, by_own = kind.emission(T[points], self.base_temperature_K)
+            heat[points] += unit[points] * film.counted_um * value
+            for name, change in by.items():
+                if own.get(name) in by_own:
+                    change[points] += unit[points] * film.counted_um * by_own[own[name]]
+                elif name in self.motions:
+                    change[points] += unit[points] * self.motions[name].rim[number] * value
+        if BASE in by:
+            by[BASE] += of_base * by["T"]
+        return heat, by
 
     @property
     def limit(self) -> tuple[float, str]:

@@ -10,17 +10,16 @@ nothing else.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.lever.elements import FiniteElements
-from hotlever.lever.films import PlacedFilm
-from hotlever.lever.linear_map import LinearMap
-from hotlever.lever.rim import Rim
+from hotlever.lever.elements import FiniteElements, LinearMap
+from hotlever.lever.films import PlacedFilm, Rim
+from hotlever.lever.transport import Fields, Fluxes, Tangent
 from hotlever.types import Array, Index
 
 if TYPE_CHECKING:
@@ -37,110 +36,6 @@ class Factors(Protocol):
     def replaced(self, states: Index, other: Any) -> Any:
         """Return the same factors, those of some states taken from others, in their order."""
         ...
-
-
-@dataclass(frozen=True)
-class Fields:
-    """Temperature and potential of some states at the quadrature points.
-
-    Attributes
-    ----------
-    T : ndarray, shape (points, n)
-        K.
-    grad_T, grad_V : ndarray, shape (dimension, points, n)
-        K/µm and V/µm. Of k changes of each state the shapes end in (n, k).
-    """
-
-    T: Array
-    grad_T: Array
-    grad_V: Array
-
-
-@dataclass(frozen=True)
-class Fluxes:
-    """What the weak equations test at the quadrature points, or changes of it.
-
-    Attributes
-    ----------
-    heat_source : ndarray, shape (points, n)
-        Tested with φ; the heat made is negative.
-    heat : ndarray, shape (dimension, points, n)
-        The heat flux turned round, κ ∇T and what the current carries, tested with ∇φ.
-    charge : ndarray, shape (dimension, points, n)
-        The current density turned round, σ ∇V and what ∇T drives, tested with ∇φ.
-    """
-
-    heat_source: Array
-    heat: Array
-    charge: Array
-
-    def __add__(self, other: Fluxes) -> Fluxes:
-        return Fluxes(*(mine + its for mine, its in zip(self, other, strict=True)))
-
-    def __iter__(self) -> Iterator[Array]:
-        return iter((self.heat_source, self.heat, self.charge))
-
-
-class Thermoelectric(NamedTuple):
-    """What thermoelectricity adds to a tangent: ∫ φ e·∇ψ, f ∇φ·∇ψ and g ∇φ·∇ψ.
-
-    Of the heat source with the slope of the temperature, of the heat flux with that of the
-    potential, and of the current density with that of the temperature.
-    """
-
-    heat_source_slope: Array
-    heat_V: Array
-    charge_T: Array
-
-
-@dataclass(frozen=True)
-class Tangent:
-    """Coefficients of the linearised equations at the quadrature points, shapes (..., points, n).
-
-    The names say test function, then trial function: ``heat_source_V`` is how the heat equation
-    changes with the potential. Heat: ∫ φ a ψ + ∇φ·b ψ + κ ∇φ·∇ψ for a temperature ψ and
-    ∫ φ c·∇ψ for a potential ψ; charge: ∫ ∇φ·d ψ for a temperature and σ ∇φ·∇ψ for a potential.
-    With thermoelectricity slopes of each field drive the flux of the other as well.
-    """
-
-    heat_source_T: Array
-    heat_flux_T: Array
-    kappa: Array
-    heat_source_V: Array
-    charge_flux_T: Array
-    sigma: Array
-    thermoelectric: Thermoelectric | None = None
-
-    def of(self, state: int) -> Tangent:
-        """Return the coefficients of one state."""
-        return self._each(lambda coefficient: coefficient[..., state])
-
-    def _each(self, of: Callable[[Array], Array]) -> Tangent:
-        coefficients = {name: of(value) for name, value in self._own().items()}
-        more = self.thermoelectric
-        return Tangent(**coefficients, thermoelectric=more and Thermoelectric(*map(of, more)))
-
-    def _own(self) -> dict[str, Array]:
-        return {name: value for name, value in vars(self).items() if name != "thermoelectric"}
-
-    def fluxes(self, changes: Fields) -> Fluxes:
-        """Return the changes of the fluxes with one change of each state, or with several."""
-        at = self
-        if changes.T.ndim > self.sigma.ndim:
-            at = self._each(lambda coefficient: coefficient[..., None])
-        fluxes = Fluxes(
-            at.heat_source_T * changes.T + (at.heat_source_V * changes.grad_V).sum(axis=0),
-            at.heat_flux_T * changes.T + at.kappa * changes.grad_T,
-            at.charge_flux_T * changes.T + at.sigma * changes.grad_V,
-        )
-        if at.thermoelectric is None:
-            return fluxes
-        source, heat, charge = at.thermoelectric
-        return Fluxes(
-            fluxes.heat_source + (source * changes.grad_T).sum(axis=0),
-            fluxes.heat + heat * changes.grad_V,
-            fluxes.charge + charge * changes.grad_T,
-        )
 
 
 @dataclass(frozen=True)
@@ -213,7 +108,7 @@ class Space(ABC):
     reader : tuple of (ndarray of int, ndarray), or None
         The same for the reader voltage V_r; None without a reader.
     held : dict of str to int
-        The unknowns that are potentials of held terminals, see `hotlever.lever.terminals`.
+        The unknowns that are potentials of held terminals, see `hotlever.lever.at_points`.
     end_test : ndarray, shape (1 + dimension, points)
         Values and slopes of the function that is one at the leg ends.
     end_tests : dict of str to ndarray

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError
 from hotlever.lever import Lever
-from hotlever.lever.balances import BALANCES, balance_columns
+from hotlever.lever.equations import BALANCES, balance_columns
 from hotlever.materials.kinds import LowDopedSilicon
 from hotlever.materials.radiation import sheet_emissivity
 from hotlever.probe import Probe
@@ -63,7 +63,8 @@ def radiated_heat(probe: Probe, tip_K: ArrayLike, emissivity: float | None = Non
     without = dark.branch(dark.equations.laws.limit[0])  # as hot as that power makes it
     x = branch.states(np.sqrt(tip - branch.base_temperature_K))
     columns = dict(zip(BALANCES, balance_columns(branch.equations, x).T, strict=True))
-    faces, edges = branch.equations.radiated(x)
+    faces, (edges, _) = branch.equations.at(x)[1].emission, branch.equations.losses(x)["rim"]
+    assert faces is not None  # the lever radiates
     heater = lever.space.parts["heater"]
     of_heater = (lever.space.weights * faces)[heater].sum(axis=0)
     power = branch.power(tip)

@@ -33,8 +33,8 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.laws import LawsAtPoints
 from hotlever.lever.parametrisation import state_at_bias
-from hotlever.lever.space import TIP, Fluxes
-from hotlever.lever.transport import Properties, dot
+from hotlever.lever.space import TIP
+from hotlever.lever.transport import Fluxes, Properties, dot
 from hotlever.materials import HIGH_DOPED, LOW_DOPED
 from hotlever.materials.kind import Kind
 from hotlever.materials.kinds import LowDopedSilicon, PSilicon

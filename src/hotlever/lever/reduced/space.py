@@ -18,11 +18,11 @@ from scipy.optimize import nnls
 from scipy.sparse import csr_matrix
 
 from hotlever.air.coupling import ReducedAir
-from hotlever.lever.films import at_some
+from hotlever.lever.elements import LinearMap
+from hotlever.lever.films import Rim, at_some
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.linear_map import LinearMap
-from hotlever.lever.rim import Rim
-from hotlever.lever.space import Constraint, Space, SurfaceTangent, Tangent
+from hotlever.lever.space import Constraint, Space, SurfaceTangent
+from hotlever.lever.transport import Tangent
 from hotlever.types import Array, Index
 
 #: Random combinations of the training integrals that a cubature is made to reproduce.
@@ -258,17 +258,15 @@ class ReducedSpace(Space):
         heat_V = np.einsum("dqm,dqm->qm", scaled(tangent.heat_source_V), V)
         charge_T = scaled(tangent.charge_flux_T) * T[0]
         charge_V = scaled(tangent.sigma) * V
-        heat_slope_V = None
-        if tangent.thermoelectric is not None:
-            source, heat, charge = map(scaled, tangent.thermoelectric)
-            heat_T[0] += np.einsum("dqm,dqm->qm", source, T[1:])
-            charge_T += charge * T[1:]
-            heat_slope_V = heat * V
+        if tangent.heat_source_slope is not None:
+            heat_T[0] += np.einsum("dqm,dqm->qm", scaled(tangent.heat_source_slope), T[1:])
+        if tangent.charge_T is not None:
+            charge_T += scaled(tangent.charge_T) * T[1:]
         test_T, test_V = self.temperature.matrix.T, self.potential.matrix.T
         matrix[:split, :split] = test_T @ heat_T.reshape(-1, split)
         matrix[:split, split:] = T[0].T @ heat_V
-        if heat_slope_V is not None:
-            slopes = T[1:].reshape(-1, split)
+        if tangent.heat_V is not None:
+            slopes, heat_slope_V = T[1:].reshape(-1, split), scaled(tangent.heat_V) * V
             matrix[:split, split:] += slopes.T @ heat_slope_V.reshape(-1, V.shape[2])
         matrix[split:, :split] = test_V @ charge_T.reshape(-1, split)
         matrix[split:, split:] = test_V @ charge_V.reshape(-1, V.shape[2])

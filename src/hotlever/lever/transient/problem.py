@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.air.stores import HeatInAir
-from hotlever.lever.balances import heat_held, heat_left
-from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.equations import SHOWN, LeverEquations, heat_held, heat_left
 from hotlever.lever.laws import GAS
 from hotlever.lever.space import LEVER, Factors
 from hotlever.probe import Circuit

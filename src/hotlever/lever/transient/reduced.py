@@ -11,10 +11,9 @@ import numpy as np
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.laws import LawsAtPoints
 from hotlever.lever.lever import State
-from hotlever.lever.motion import Motion
 from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.lever.space import Space
-from hotlever.lever.transport import Properties
+from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind
 from hotlever.probe.physics import Physics
 from hotlever.threads import one_blas_thread
