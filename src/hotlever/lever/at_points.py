@@ -195,9 +195,9 @@ class StatesAtPoints:
 
         Each if it counts, with derivatives by ``T``, the temperature there, and by parameters.
         """
-        found = {}
+        every = {}
         if len(self.rim.weights):
-            found["rim"] = (
+            every["rim"] = (
                 self.laws.radiated(self.rim, x, self.terminals.end_rises, names)
                 if names
                 else self._evaluated(x)[2]
@@ -205,8 +205,8 @@ class StatesAtPoints:
         if self.contact is not None:
             heat, by = self.contact.heat(self.footprint.rise(x), names)
             shares = self.footprint.weights
-            found["footprint"] = shares * heat, {name: shares * by[name] for name in by}
-        return found
+            every["footprint"] = shares * heat, {name: shares * by[name] for name in by}
+        return every
 
     def _evaluated(
         self, x: Array
