@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hotlever.calibration.power_law import EQ12
-from hotlever.calibration.power_law_fit import PowerLawFit, fit_power_law
+from hotlever.calibration.power_law import EQ12, PowerLawFit, fit_power_law
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from hotlever.spieser2017 import RAMP

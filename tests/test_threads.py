@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from hotlever.calibration import smoothing
+from hotlever.calibration import knee
 from hotlever.threads import one_blas_thread
 
 
@@ -43,9 +43,9 @@ def test_a_curve_is_smoothed_with_one_thread(monkeypatch):
         seen.append(blas_threads())
         return scipy.linalg.cho_factor(*arguments, **options)
 
-    monkeypatch.setattr(smoothing, "cho_factor", factorised)
+    monkeypatch.setattr(knee, "cho_factor", factorised)
     x = np.linspace(0.0, 1.0, 12)
     with threadpool_limits(2, user_api="blas"):
-        smoothing.SmoothCurve(x, np.sin(x), np.full(12, 1e-3))
+        knee.SmoothCurve(x, np.sin(x), np.full(12, 1e-3))
     assert seen
     assert all(threads == {1} for threads in seen)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hotlever.calibration.inference import what_data_lack
 from hotlever.calibration.knee import IVCurve
-from hotlever.calibration.plausibility import what_data_lack
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement

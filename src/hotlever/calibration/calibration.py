@@ -135,9 +135,10 @@ class Calibration(Outcome):
         every = (*STATED, *OF_THE_CONTACT[1::2], *BUDGETS)
         errors = [name for name in every if name in self.table]
         unknown = {name: xr.full_like(self.table[name], np.nan) for name in errors}
+        knee = self.knee
         return {
             "table": self.table.assign(unknown),
-            "knee": self.knee.without_errors,
+            "knee": Knee(knee.lever_V, knee.current_mA, knee.power_mW, knee.bias_V),
             "k_stderr": np.nan,
             "pulse": None,
             "gum": None,

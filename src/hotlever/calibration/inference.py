@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.special import chdtrc
 
 from hotlever.calibration.calibration import Calibration, rms
 from hotlever.calibration.knee import Knee
-from hotlever.calibration.plausibility import misfit, what_data_lack
-from hotlever.calibration.power_law_fit import law_of_model, power_turns
+from hotlever.calibration.power_law import law_of_model, power_turns
 from hotlever.calibration.tip_temperature import (
     OF_THE_MEASUREMENT,
     highest_bias,
@@ -24,11 +24,11 @@ from hotlever.calibration.tip_temperature import (
     tips_in_contact,
 )
 from hotlever.calibration.uncertainty_budget import BudgetOf, budget_of_estimate
-from hotlever.errors import ComputationError
+from hotlever.errors import ComputationError, counted
 from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.experiment_at_rest import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
-from hotlever.estimation.lack_of_fit import outlier_notes
+from hotlever.estimation.lack_of_fit import lack_of_fit_text, outlier_notes, run_of_outliers
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
@@ -47,6 +47,17 @@ from hotlever.types import Array, Progress
 
 #: Share of the measured biases that a lever must reach to show the data.
 _REACHED = 0.98
+#: Rows with a current that are not few for a lever.
+_FEW = 6
+#: Currents are coarse in steps of this share of the largest, each a multiple within so much.
+_COARSE, _EVEN = 0.01, 0.02
+#: A lever is cold that was never hotter (K).
+_COLD_K = 400.0
+#: Data are not described where parameters are as far from their priors as one lever in 500 is.
+_UNLIKELY = 2e-3
+#: The same where data and all other priors are so many standard deviations from one prior: of the
+#: nearly twenty of a lever one is, by chance, in one lever of 500.
+UNLIKELY_PULL = 3.85
 
 
 def estimate_lever(
@@ -223,30 +234,72 @@ def _weights(measured: Measurement, estimate: Estimate) -> dict[str, Array] | No
 
 def _verdict(estimate: Estimate, priors: Mapping[str, PriorUse]) -> tuple[bool, str]:
     """Return whether the search came to an end, and why the data are not described, if so."""
-    residuals, values = estimate.residuals, estimate.prediction.values
-    lack_of_fit = misfit(residuals, values, priors, estimate.posterior.moved)
-    converged, reason = estimate.verdict(lack_of_fit)
+    converged, reason = estimate.verdict(_misfit(estimate, priors))
     circuit = estimate.probe.circuit
     reason = reason or not_of_a_ramp(estimate.branch, circuit, *tips_in_contact(estimate))
     highest = highest_bias(estimate)
-    if not reason and highest < _REACHED * float(residuals.bias.max()):
+    if not reason and highest < _REACHED * float(estimate.residuals.bias.max()):
         reason = f"the lever that comes nearest has no steady state above {highest:.4g} V"
     return converged, reason
 
 
+def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -> list[str]:
+    """Say what the data lack, to tell more of a lever."""
+    remarks, count = [], np.isfinite(measured.current(circuit)).sum()
+    if count < _FEW:
+        remarks.append(
+            f"{counted(count, 'row')} with a current: few for a lever, so that the answer leans on "
+            f"what was known beforehand; {_FEW} or more would tell"
+        )
+    levels = np.unique(measured.current_mA[np.isfinite(measured.current_mA)])
+    step = float(np.diff(levels).min()) if levels.size > 1 else 0.0
+    share = step / float(levels[-1]) if step else 0.0
+    if share > _COARSE and np.allclose(levels / step, np.round(levels / step), atol=_EVEN):
+        remarks.append(
+            f"I_h has a resolution of {step:.2g} mA only, {share:.1%} of its largest value, in "
+            f"{counted(levels.size, 'step')}"
+        )
+    hottest = float(np.nanmax(tip_K))
+    if hottest < _COLD_K:
+        remarks.append(
+            f"the lever was measured only up to a tip of {hottest:.0f} K; what it does beyond is "
+            "not known"
+        )
+    return remarks
+
+
+def _misfit(estimate: Estimate, priors: Mapping[str, PriorUse]) -> str:
+    """Return why data are not described by what was fitted to them; empty if they are."""
+    of_data, moved = (estimate.residuals, estimate.prediction.values), estimate.posterior.moved
+    if reason := lack_of_fit_text(*of_data) or run_of_outliers(*of_data):
+        return reason
+    name = max(moved, key=lambda name: abs(moved[name].pull), default="")
+    if name and abs(moved[name].pull) > UNLIKELY_PULL:
+        use = priors[name]
+        return (
+            f"{name}, known as {use.stated}, would have to be another; the "
+            f"data are {abs(moved[name].pull):.1f} σ from it"
+        )
+    # as many are free to be away as the data tell of
+    told = sum(each.told for each in moved.values())
+    if told > 0 and chdtrc(told, sum(each.size**2 for each in moved.values())) < _UNLIKELY:
+        most = sorted(moved, key=lambda name: -abs(moved[name].size))[:3]
+        away = ", ".join(f"{name} by {moved[name].size:+.1f} σ" for name in most)
+        return f"what was known beforehand would have to be wrong by too much together, {away}"
+    return ""
+
+
 def _missed(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
-    """Return how far tips were measured from those of a branch, NaN away from a sample."""
-    return np.where(
-        measured.out_of_contact, np.nan, measured.tip_K - _tips(branch, measured, circuit)
-    )
+    """Return how far tips were measured from those of a branch, NaN away from a sample.
 
-
-def _tips(branch: Branch, measured: Measurement, circuit: Circuit) -> Array:
-    """Return the tip temperatures of a branch at the measured power; or bias, if not that tells."""
+    They are those at the measured power; or bias, if the power does not tell.
+    """
     one_way = measured.bias_V.min() >= 0.0
     if one_way and branch.starts_cold and branch.power_turns_K is None:
-        return branch.tip_temperature(circuit.power(measured.bias_V, measured.current(circuit)))
-    return branch.tip_K(branch.read(circuit, measured.bias_V).u)
+        tip = branch.tip_temperature(circuit.power(measured.bias_V, measured.current(circuit)))
+    else:
+        tip = branch.tip_K(branch.read(circuit, measured.bias_V).u)
+    return np.where(measured.out_of_contact, np.nan, measured.tip_K - tip)
 
 
 def knee_with_errors(estimate: Estimate, branch: Branch) -> Knee:

@@ -12,12 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import curve_fit
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import curve_fit, minimize
 
-from hotlever.calibration.smoothing import SmoothCurve
 from hotlever.errors import InputError, counted
-from hotlever.lever import Branch, OperatingPoint
+from hotlever.lever import Branch
 from hotlever.probe import Circuit
+from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
 #: Points whose power is within this factor of the highest lever voltage's are used.
@@ -31,10 +32,17 @@ _FALLEN = 0.05
 #: The knee is sought within this factor of the highest measured lever voltage's power, at so many
 #: powers, and as many smooth curves tell its error.
 _SEARCH, _GRID, _SAMPLES = 1.35, 151, 300
-#: Rows of a smooth table, and powers that they are read from.
-_ROWS, _POWERS = 101, 2000
 #: The knee of another lever is looked for up to this factor of the highest measured power.
 _FARTHEST = 20.0
+#: Ranges of length, amplitude and noise of a smooth curve whose coordinates and values are of the
+#: order of one.
+_BOUNDS = ((0.03, 5.0), (1e-3, 20.0), (1e-6, 0.3))
+#: The likelihood may have two optima: a bent curve with little noise, a smooth one with more.
+_STARTS = ((0.25, 0.5, 2e-3), (0.5, 0.5, 2e-2))
+#: Prior variance of the mean.
+_MEAN_VARIANCE = 1.0
+#: Added to the variances of the points, so that rounding leaves their covariance positive.
+_ROUNDING = 1e-11
 
 
 class KneePoint(NamedTuple):
@@ -148,11 +156,6 @@ class Knee:
         """Whether the points show it."""
         return bool(np.isfinite(self.lever_V))
 
-    @property
-    def without_errors(self) -> Knee:
-        """The same knee, of which it is not known how far it may be off."""
-        return Knee(self.lever_V, self.current_mA, self.power_mW, self.bias_V)
-
 
 class KneeOutsideError(InputError):
     """The measured range does not include the knee; the text says which way to go."""
@@ -186,7 +189,7 @@ def find_knee(curve: IVCurve, like: Branch | None = None) -> Knee:
     _check_sides(curve, like)
     peak_mW = float(curve.power_mW[curve.peak])
     near = curve.rows(np.abs(np.log(curve.power_mW / peak_mW)) < np.log(_NEARBY))
-    smooth = _SmoothCurves(near, peak_mW, like)
+    smooth = SmoothCurves(near, peak_mW, like)
     measured = smooth.points.power_mW
     beside = min((measured < peak_mW).sum(), (measured > peak_mW).sum())
     if measured.size < _FEWEST or beside < _FEWEST_BESIDE:
@@ -220,8 +223,9 @@ def _check_sides(curve: IVCurve, like: Branch | None) -> None:
         return
     advice = "; measure to a higher bias"
     if like is not None and like.knee is not None:
-        knee = scale_to(curve, like).applied(like.knee)
-        bias = curve.circuit.bias(knee.lever_V, knee.current_mA)
+        scale = scale_to(curve, like)
+        lever = like.knee.lever_V * float(np.sqrt(scale.power * scale.resistance))
+        bias = curve.circuit.bias(lever, scale.power * like.knee.power_mW / lever)
         beyond = max(bias, float(bias_V[-1])) * 1.1
         advice = (
             f", at about {bias:.1f} V by comparison with the model; measure to {beyond:.1f} V or "
@@ -233,7 +237,7 @@ def _check_sides(curve: IVCurve, like: Branch | None) -> None:
     )
 
 
-class _SmoothCurves:
+class SmoothCurves:
     """Smooth I-V curves through measured points.
 
     The logarithm of the root of the resistance, V_l = sqrt(P_l R_l), is smoothed along the
@@ -272,22 +276,70 @@ class _SmoothCurves:
         return IVCurve(np.asarray(circuit.bias(power / current, current)), current, circuit)
 
 
-def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> IVCurve:
-    """Return points over the measured range, evenly spaced in bias and also in power, smoothed.
+class SmoothCurve:
+    """A curve with its uncertainty, found from noisy values by largest likelihood.
 
-    At the knee, where the bias hardly tells temperatures apart, the power does.
+    Gaussian-process regression (Rasmussen and Williams, "Gaussian Processes for Machine Learning",
+    MIT Press (2006), chapters 2, 4 and 5) with the Matérn 5/2 covariance: functions with two
+    derivatives, no more, which does not round off a sharp bend as smoother covariances do.
 
-    The power of the knee may be measured or estimated; for `like` see `find_knee`.
+    Parameters
+    ----------
+    x, y : ndarray, shape (n,)
+        Points and values, both of the order of one.
+    noise : ndarray, shape (n,)
+        Standard errors of the values up to a common factor, `noise_factor`, which is found.
     """
-    smooth = _SmoothCurves(curve, knee_mW, like)
-    measured = smooth.points
-    power = np.linspace(measured.power_mW[0], measured.power_mW[-1], _POWERS)
-    fine = smooth.likeliest(power)
-    bias = np.maximum.accumulate(fine.bias_V)
-    low, high = max(measured.bias_V[0], bias[0]), min(measured.bias_V.max(), bias[-1])
-    by_power = np.interp(np.linspace(power[0], power[-1], _ROWS), power, bias)
-    rows = np.unique(np.concatenate([np.linspace(low, high, _ROWS), np.clip(by_power, low, high)]))
-    return IVCurve(rows, np.interp(rows, bias, fine.current_mA), curve.circuit)
+
+    @one_blas_thread
+    def __init__(self, x: Array, y: Array, noise: Array) -> None:
+        self._x, self._mean, self._noise = x, float(np.mean(y)), noise
+        values = y - self._mean
+
+        def cost(logarithms: Array) -> float:
+            """Minus the logarithm of the marginal likelihood, less a constant."""
+            factor = self._factorised(*np.exp(logarithms))
+            return float(
+                0.5 * values @ cho_solve(factor, values) + np.log(np.diag(factor[0])).sum()
+            )
+
+        optima = [
+            minimize(cost, start, method="L-BFGS-B", bounds=np.log(_BOUNDS))
+            for start in np.log(_STARTS)
+        ]
+        best = min(optima, key=lambda optimum: optimum.fun)
+        self._length, self._amplitude, self.noise_factor = np.exp(best.x).tolist()
+        self._factor = self._factorised(*np.exp(best.x))
+        self._weights = cho_solve(self._factor, values)
+
+    def _factorised(self, length: float, amplitude: float, noise_factor: float) -> tuple:
+        covariance = _covariance(self._x, self._x, length, amplitude)
+        variance = (noise_factor * self._noise) ** 2 + _ROUNDING
+        return cho_factor(covariance + np.diag(variance), lower=True)
+
+    def value(self, x: Array) -> Array:
+        """Return the curve at some places, (m,)."""
+        cross = _covariance(x, self._x, self._length, self._amplitude)
+        return np.asarray(self._mean + cross @ self._weights)
+
+    @one_blas_thread
+    def samples(self, x: Array, count: int) -> Array:
+        """Return curves that are as likely as this one by the points, (count, m); always the same.
+
+        They scatter about it by its standard error.
+        """
+        cross = _covariance(x, self._x, self._length, self._amplitude)
+        prior = _covariance(x, x, self._length, self._amplitude)
+        covariance = prior - cross @ cho_solve(self._factor, cross.T)
+        rng = np.random.default_rng(0)
+        return rng.multivariate_normal(self.value(x), covariance, count, method="eigh")
+
+
+def _covariance(x: Array, y: Array, length: float, amplitude: float) -> Array:
+    """Return the covariance of the curve at some places, (n,), with that at others, (m,)."""
+    distance = np.abs(x[:, None] - y) * np.sqrt(5.0) / length
+    matern = (1.0 + distance + distance**2 / 3.0) * np.exp(-distance)
+    return np.asarray(amplitude**2 * matern + _MEAN_VARIANCE)
 
 
 # --- the scale between a measured curve and a lever that resembles it -----------------------------
@@ -304,12 +356,6 @@ class Scale:
     power: float
     resistance: float
     power_stderr: float
-
-    def applied(self, point: OperatingPoint) -> OperatingPoint:
-        """Return a point of the other lever, stretched."""
-        lever_V = point.lever_V * float(np.sqrt(self.power * self.resistance))
-        power = self.power * point.power_mW
-        return OperatingPoint(lever_V, power / lever_V, power, point.tip_K)
 
 
 def scale_to(curve: IVCurve, like: Branch) -> Scale:

@@ -19,12 +19,11 @@ from hotlever.calibration.knee import (
     IVCurve,
     Knee,
     KneeOutsideError,
+    SmoothCurves,
     find_knee,
     scale_to,
-    smooth_rows,
 )
-from hotlever.calibration.power_law import PowerLaw
-from hotlever.calibration.power_law_fit import law_of_model, power_turns
+from hotlever.calibration.power_law import PowerLaw, law_of_model, power_turns
 from hotlever.calibration.table import table_by_bias
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.noise import METERS
@@ -46,6 +45,8 @@ _LOOKS_LIKE_AIR = 1.08
 _WORST_ESTIMATE = 0.3
 #: How far (standard deviations) a parameter is moved for a derivative.
 _ASIDE = 0.1
+#: Rows of a smooth table, and powers that they are read from.
+_ROWS, _POWERS = 101, 2000
 #: Highest bias (V) to which a lever is followed.
 _HIGHEST_V = 1e3
 
@@ -184,6 +185,24 @@ def calibrated_by_knee(
         measurement=measured,
         notes=notes,
     )
+
+
+def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> IVCurve:
+    """Return points over the measured range, evenly spaced in bias and also in power, smoothed.
+
+    At the knee, where the bias hardly tells temperatures apart, the power does.
+
+    The power of the knee may be measured or estimated; for `like` see `find_knee`.
+    """
+    smooth = SmoothCurves(curve, knee_mW, like)
+    measured = smooth.points
+    power = np.linspace(measured.power_mW[0], measured.power_mW[-1], _POWERS)
+    fine = smooth.likeliest(power)
+    bias = np.maximum.accumulate(fine.bias_V)
+    low, high = max(measured.bias_V[0], bias[0]), min(measured.bias_V.max(), bias[-1])
+    by_power = np.interp(np.linspace(power[0], power[-1], _ROWS), power, bias)
+    rows = np.unique(np.concatenate([np.linspace(low, high, _ROWS), np.clip(by_power, low, high)]))
+    return IVCurve(rows, np.interp(rows, bias, fine.current_mA), curve.circuit)
 
 
 def _estimated_knee(

@@ -9,9 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from hotlever.calibration.calibration import Calibration
-from hotlever.calibration.inference import calibrated_by_estimate, estimate_lever
+from hotlever.calibration.inference import (
+    UNLIKELY_PULL,
+    calibrated_by_estimate,
+    estimate_lever,
+)
 from hotlever.calibration.knee_scaling import calibrated_by_knee
-from hotlever.calibration.plausibility import check_plausible
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
 from hotlever.calibration.table import BUDGETS, table_with_budget
@@ -22,11 +25,25 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.estimation.inverse_problem import Estimate, error_of_choice, in_medium
+from hotlever.lever.branch import Reach
+from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import given_measurement, with_measured_circuit
+from hotlever.measurement.contents import colder_than_base
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import Prior, known_beforehand
 from hotlever.types import Progress
+
+#: The resistance of a cold lever is within this factor of its model's.
+_WITHIN = 2.5
+#: Beyond so many times that of its model hardly any current flows.
+_OPEN = 100.0
+#: Different biases that a calibration needs.
+_FEWEST = 3
+#: Biases below this share of the largest hardly change what other supplies drive.
+_HARDLY = 0.05
 
 
 def calibrate(
@@ -191,3 +208,82 @@ def _in_either(result: Calibration, other: Calibration) -> Calibration:
         limits = limits_of(table.isel(bias=row), gum.of)
         gum = gum.in_either(other.gum, choices[f"{gum.of}_K"][row].item(), limits)
     return replace(result, table=table, gum=gum)
+
+
+# --- whether data can be those of a lever at all -------------------------------------------------
+
+
+def check_plausible(
+    measured: Measurement, probe: Probe, causes: Diagnosis, priors: Mapping[str, Prior]
+) -> None:
+    """Refuse data whose resistance at low bias, or whose temperatures, are far from the lever's.
+
+    Raises
+    ------
+    InputError
+        Saying what was compared, and the likeliest cause.
+    """
+    where = measured.path or "measurement"
+    alone, size = probe.circuit.starts_cold, np.abs(measured.bias_V)
+    current = measured.current(probe.circuit)
+    here = np.isfinite(current) & (measured.bias_V > 0) & (current > 0)
+    if not alone:
+        # other supplies drive a current as well, which is known less well than what is added
+        here = np.isfinite(current) & (size > _HARDLY * size.max())
+    different = np.unique(measured.bias_V[here]).size
+    if different < _FEWEST:
+        above = " above 0" if alone else ""
+        raise InputError(
+            f"{where}: currents{above} at {different} different biases{above}, expected "
+            f"{_FEWEST} or more"
+        )
+    _check_temperatures(measured, probe, where)
+    bias, current = measured.bias_V[here], current[here]
+    low = np.argsort(np.abs(bias))[: max(_FEWEST, bias.size // 8)]
+    # what a cold lever shows does not depend on what is around it
+    cold = probe.in_medium("vacuum") if alone else probe
+    rest = Lever(cold, COARSE).branch_to(0.0)
+    lever = float(rest.value_slopes[0, 0] / rest.value_slopes[0, 1])
+    series = probe.circuit.series_kohm
+    added = current[low] - rest.values[0, 1]
+    cold_kohm = float(np.median(bias[low] / np.where(added == 0.0, np.nan, added)))
+    ratio = cold_kohm / (lever + series)
+    if cold_kohm > series and abs(np.log(ratio)) < np.log(_WITHIN):
+        return
+    # an owner who knows little of a lever expects no less of it
+    spread = cold_resistance_spread(cold, priors) if alone else 0.0
+    if cold_kohm > series and abs(np.log((cold_kohm - series) / lever)) < UNLIKELY_PULL * spread:
+        return
+    shown = "V_b / I_h" if alone else "the change of V_b over that of I_h"
+    cause = causes.likeliest()
+    if not cause and cold_kohm > _OPEN * (lever + series):
+        cause = "hardly any current flows, as if a terminal was open or the meter at another one"
+    cause = cause or "no single cause that is known explains it"
+    raise InputError(
+        f"{where}: {shown} is {cold_kohm:.4g} kΩ at low bias, expected about "
+        f"{lever + series:.4g} kΩ ({series:g} kΩ in series and {lever:.3g} kΩ of the lever): "
+        f"{cause}"
+    )
+
+
+def cold_resistance_spread(probe: Probe, priors: Mapping[str, Prior]) -> float:
+    """Return the standard deviation of the logarithm of a cold lever's resistance by its priors."""
+    lever = SimilarLevers(Lever(probe, COARSE))
+    names = tuple(name for name in priors if name in parameters_of(probe))
+    branch = lever.linearised(probe, Reach(probe.circuit, 0.0), names=names)
+    first = int(branch.branch.solved[0])
+    by = branch.shown[first, :2] / branch.branch.values[first, :2, None]
+    spreads = np.array([priors[name].absolute for name in names])
+    return float(np.linalg.norm((by[0] - by[1]) * spreads))
+
+
+def _check_temperatures(measured: Measurement, probe: Probe, where: str) -> None:
+    """Refuse tips that are colder than the base of the lever."""
+    base = probe.circuit.base_temperature_K
+    colder = colder_than_base(measured.tip_K, measured.tip_error_K, base)
+    if colder.any():
+        row = int(np.argmax(colder))
+        raise InputError(
+            f"{where}: T_tip is {measured.tip_K[row]:.4g} K at {measured.bias_V[row]:.4g} V, "
+            f"expected more than the base temperature, {base:g} K: is it in °C, or another column?"
+        )

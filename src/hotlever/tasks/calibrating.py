@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hotlever.calibration import Calibration
-from hotlever.calibration.batch import calibrate_many
 from hotlever.calibration.levers import (
     Setting,
+    calibrate_many,
     calibrations_csv,
     calibrations_text,
     compare_calibrations,
