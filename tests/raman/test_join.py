@@ -8,7 +8,7 @@ import xarray as xr
 
 from hotlever.errors import InputError
 from hotlever.measurement import read_measurement
-from hotlever.raman.bias_log import join, read_bias_log
+from hotlever.raman.tables import join, read_bias_log
 
 
 def read(*spectra):

@@ -9,7 +9,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.raman.fit import fit_peak
-from hotlever.raman.peak import NoSiliconLine
+from hotlever.raman.lineshape import NoSiliconLine
 from hotlever.raman.reading import read_spectrum
 
 

@@ -11,7 +11,7 @@ import synthetic_spectra as synthetic
 from hotlever.errors import InputError
 from hotlever.raman import lineshape, noise
 from hotlever.raman.fit import fit_peak
-from hotlever.raman.peak import NoSiliconLine, PeakOptions
+from hotlever.raman.lineshape import NoSiliconLine, PeakOptions
 from synthetic_spectra import Instrument
 
 X = np.arange(440.0, 600.0, 0.527)
@@ -259,11 +259,11 @@ def test_noise_alone_hardly_ever_makes_a_line():
 
 def test_options_are_checked():
     with pytest.raises(InputError, match="did you mean 'lorentzian'"):
-        PeakOptions(shape="lorenzian").validate()
+        PeakOptions(shape="lorenzian")
     with pytest.raises(InputError, match="between 0 and 50"):
-        PeakOptions("voigt", resolution=-1.0).validate()
+        PeakOptions("voigt", resolution=-1.0)
     with pytest.raises(InputError, match="use the shape 'voigt'"):
-        PeakOptions(resolution=1.0).validate()
+        PeakOptions(resolution=1.0)
 
 
 def test_too_few_samples_in_the_window():

@@ -19,10 +19,11 @@ from hotlever.raman.calibration import (
     read_raman_calibration,
 )
 from hotlever.raman.fit import fit_peak
-from hotlever.raman.peak import PeakOptions
+from hotlever.raman.lineshape import PeakOptions
 from hotlever.raman.reading import read_spectra
-from hotlever.raman.series import calibrate_from, measure, read_lines, read_temperatures
+from hotlever.raman.series import calibrate_from, measure, read_lines
 from hotlever.raman.spectrum import Spectrum
+from hotlever.raman.tables import read_temperatures
 from hotlever.raman.thermometer import Thermometer, laser_heating
 from hotlever.spieser2017 import HEATER_STRESS_MPA, RAMAN_CONSTANT_K, RAMAN_SLOPE_K_CM
 

@@ -13,7 +13,7 @@ import numpy as np
 from hotlever.app.workers import Report
 from hotlever.errors import HotleverError, InputError
 from hotlever.raman import measure, read_lines
-from hotlever.raman.peak import WINDOW, in_window
+from hotlever.raman.lineshape import WINDOW, in_window
 from hotlever.raman.reading import read_file, spectrum_files
 from hotlever.raman.series import Line
 from hotlever.raman.spectrum import Spectrum

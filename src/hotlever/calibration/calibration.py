@@ -319,7 +319,6 @@ class CalibrationFile(BudgetFields, ResultFile[Calibration]):
         check_rows(self.table, self.budget_K, "bias", str(info.context), self.apex_budget_K)
         if self.gum is not None and self.gum_bias_V not in self.table["bias_V"]:
             raise InputError(f"{info.context}: gum_bias_V: expected the bias of a row of the table")
-        self.check_correlation(str(info.context))
         for name, weights in (self.weights or {}).items():
             if name not in FITTED:
                 raise unknown_name("observable", name, FITTED, f"{info.context}: weights")

@@ -94,7 +94,7 @@ class LinearisedLever:
                 "what to measure next: found rows at a distance from the sample, expected a lever "
                 "at one place"
             )
-        _check(probe)
+        probe.circuit.need_cold_start("what to measure next")
         priors = {
             name: Prior(use.value, use.spread / use.value, True)
             if use.distribution == "log-normal"
@@ -116,7 +116,7 @@ class LinearisedLever:
             raise InputError(
                 "what to measure first: expected priors, without which nothing is known"
             )
-        _check(probe)
+        probe.circuit.need_cold_start("what to measure next")
         values = {name: prior.value for name, prior in priors.items() if name not in SCALES}
         shares = dict.fromkeys(SCALES, METERS) | {_SCALED["tip"]: RAMAN_ERROR_SHARE}
         scales = {name: Prior(1.0, share) for name, share in shares.items()}
@@ -247,13 +247,10 @@ class LinearisedLever:
     def information(self) -> Information:
         """That of priors and data."""
         prior = PriorDensity.of_priors(self.priors)
-        numbers, values = (
-            [self.names.index(name) for name in prior.names],
-            self.probe.values(prior.names),
-        )
-        count = len(self.names)
+        numbers, count = [self.names.index(name) for name in prior.names], len(self.names)
         rows = np.zeros((len(numbers), count + len(_SCALED)))
-        rows[:, numbers] = prior.slopes(values) * self._coordinates.rates(self._point)[numbers]
+        slopes = prior.slopes(self.probe.values(prior.names))
+        rows[:, numbers] = slopes * self._coordinates.rates(self._point)[numbers]
         low, high = self._coordinates.bounds
         # uniform within its bounds where there is no prior
         uniform = np.where(rows[:, :count].any(axis=0), 0.0, 12.0 / (high - low) ** 2)
@@ -288,7 +285,3 @@ class LinearisedLever:
         """All that was measured, (observables, n)."""
         assert self.measurement is not None
         return np.stack([self.measurement.observable(name) for name in FITTED])
-
-
-def _check(probe: Probe) -> None:
-    probe.circuit.need_cold_start("what to measure next")

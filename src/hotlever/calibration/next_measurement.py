@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from scipy.special import ndtri
 
@@ -23,7 +22,6 @@ from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.optimal_design import Candidate, Information, best_first
-from hotlever.materials.parameters import sentence
 from hotlever.measurands import FITTED
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
@@ -42,12 +40,6 @@ SHOWN_AFTER = (0, 1, 2, 5)
 #: from which share of the highest on, how many of them are even, and by how many the others are
 #: found. So often what lies between the last that is safe and the next one is halved.
 _BEYOND, _LOWEST, _EVEN, _FINE, _HALVED = 1.5, 0.02, 21, 1001, 4
-#: Columns of a file, and what they are of the proposals.
-_COLUMNS = {name: name for name in ("what", "bias_V", "gain", "tip_K")} | {
-    "tip_high_K": "tip_limit_K",
-    "stderr_now_K": "stderr_now_K",
-    "stderr_then_K": "stderr_then_K",
-}
 
 
 @dataclass(frozen=True)
@@ -86,31 +78,23 @@ class Plan:
 
     def to_csv(self) -> str:
         """Return the proposals as CSV, one row each, best first."""
-        columns = {name: self.proposals[own].values for name, own in _COLUMNS.items()}
-        return frame_text(pd.DataFrame(columns), index=False, float_format="%.6g")
+        table = self.proposals.to_dataframe().rename(columns={"tip_limit_K": "tip_high_K"})
+        return frame_text(table, index=False, float_format="%.6g")
 
-    @property
-    def rows(self) -> list[list[str]]:
-        """The proposals as a table for people, with its head."""
+    def text(self) -> str:
+        """Return what is proposed as lines of text."""
         head = ["measure", "V_b (V)", "T_tip (K)", f"{SURE:.0%} below (K)", "then ± (K)"]
         numbers = {"bias_V": 3, "tip_K": 0, "tip_limit_K": 0, "stderr_then_K": 1}
         columns = [
             [f"{value:.{digits}f}" for value in self.proposals[name].values.tolist()]
             for name, digits in numbers.items()
         ]
-        cells = zip(self.proposals.what.values.tolist(), *columns, strict=True)
-        return [head, *map(list, cells)]
-
-    @property
-    def _now(self) -> str:
-        """How sure the tip temperature is now, in words."""
-        stderr = self.proposals.stderr_now_K.values[0]
-        return f"the tip at {self.at_K:.0f} K is known to ± {stderr:.1f} K now (standard error)"
-
-    def text(self) -> str:
-        """Return what is proposed as lines of text."""
-        table = aligned(self.rows, right=True)
-        return "\n".join([sentence(self._now), "", *table, "", sentence(self._safety)])
+        rows = zip(self.proposals.what.values.tolist(), *columns, strict=True)
+        now = (
+            f"The tip at {self.at_K:.0f} K is known to ± "
+            f"{self.proposals.stderr_now_K.values[0]:.1f} K now (standard error)."
+        )
+        return "\n".join([now, "", *aligned([head, *rows], right=True), "", self._safety])
 
     @property
     def _safety(self) -> str:
@@ -120,13 +104,13 @@ class Plan:
             if self.stay_below_K is None
             else f"keeps the tip below {self.stay_below_K:.0f} K"
         )
-        text = f"a bias of up to {self.safe_V:.3g} V {limit} with a certainty of {SURE:.0%}"
+        text = f"A bias of up to {self.safe_V:.3g} V {limit} with a certainty of {SURE:.0%}"
         then = f"{self.safe_then_V:.3g} V"
         if then == f"{self.safe_V:.3g} V":
-            return text
+            return f"{text}."
         return (
             f"{text}; after these measurements probably one of up to {then}: "
-            "calibrate and ask again before going there"
+            "calibrate and ask again before going there."
         )
 
 
@@ -198,8 +182,7 @@ def plan_next(
     )
     most = _allowed(lever, allowed)
     limit = np.inf if stay_below_K is None else stay_below_K
-    biases, information = _safe_biases(lever, bias, limit), lever.information
-    bias, safe = biases.bias_V, biases.safe
+    bias, highest_K, safe = _safe_biases(lever, bias, limit)
     tip_K, by_unknowns = lever.tip(bias)
     if at_K is None:
         tips = tip_K[:safe] if calibration is None else calibration.table.tip_K.values
@@ -208,9 +191,9 @@ def plan_next(
     _, (gradient,) = lever.tip(np.array([aim]))
     candidates = _candidates(lever, most, bias[:safe], costs or {}, noise or {})
     limited = {kind: number for kind, number in most.items() if number is not None}
-    chosen = best_first(information, candidates, gradient, count, limited)
+    chosen = best_first(lever.information, candidates, gradient, count, limited)
     each = (candidates[number].rows for number in chosen)
-    after = list(accumulate(each, Information.with_rows, initial=information))
+    after = list(accumulate(each, Information.with_rows, initial=lever.information))
     stays, notes = _errors_that_stay(lever, calibration, np.append(bias, aim))
     of_tip = np.array([information.stderr(gradient) for information in after])
     stderr = np.hypot(of_tip, stays[-1])
@@ -221,13 +204,13 @@ def plan_next(
         "bias_V": bias[rows],
         "gain": -np.diff(stderr) / cost,
         "tip_K": tip_K[rows],
-        "tip_limit_K": biases.highest_K[rows],
+        "tip_limit_K": highest_K[rows],
         "stderr_now_K": np.full(rows.size, stderr[0]),
         "stderr_then_K": stderr[1:],
     }
     shown = sorted({n for n in (*SHOWN_AFTER, len(chosen)) if n <= len(chosen)})
     along = np.array([np.hypot(after[n].stderr(by_unknowns), stays[:-1]) for n in shown])
-    errors = {"tip_K": tip_K, "tip_limit_K": biases.highest_K}
+    errors = {"tip_K": tip_K, "tip_limit_K": highest_K}
     return Plan(
         labelled(columns, "proposal", {"proposal": np.arange(1, rows.size + 1)}),
         labelled(
@@ -238,36 +221,28 @@ def plan_next(
         at_K,
         stay_below_K,
         float(bias[safe - 1]),
-        biases.safe_then(lever, after[-1], limit),
+        _safe_then(lever, bias, safe, after[-1], limit),
         lever.probe.title,
         notes,
     )
 
 
-@dataclass(frozen=True)
-class _Biases:
-    """Biases (V), rising, with the tip temperatures (K) not exceeded there; some of them are safe.
+def _safe_then(
+    lever: LinearisedLever, bias: Array, safe: int, information: Information, limit_K: float
+) -> float:
+    """Return the highest bias (V) that will be safe when so much is known, of which some are now.
 
     A bias beyond one that is not safe is none either.
     """
-
-    bias_V: Array
-    highest_K: Array
-    safe: int
-
-    def safe_then(self, lever: LinearisedLever, information: Information, limit_K: float) -> float:
-        """Return the highest bias (V) that will be safe when so much is known."""
-        beyond = self.safe
-        while (
-            beyond < self.bias_V.size
-            and _highest(lever, self.bias_V[[beyond]], information)[0] < limit_K
-        ):
-            beyond += 1
-        return float(self.bias_V[beyond - 1])
+    while safe < bias.size and _highest(lever, bias[[safe]], information)[0] < limit_K:
+        safe += 1
+    return float(bias[safe - 1])
 
 
-def _safe_biases(lever: LinearisedLever, stated: Array | None, limit_K: float) -> _Biases:
-    """Return the biases that are compared, with the highest safe one among them.
+def _safe_biases(
+    lever: LinearisedLever, stated: Array | None, limit_K: float
+) -> tuple[Array, Array, int]:
+    """Return rising biases (V) to compare, the tips (K) not exceeded there, and how many are safe.
 
     Raises
     ------
@@ -289,7 +264,7 @@ def _safe_biases(lever: LinearisedLever, stated: Array | None, limit_K: float) -
             reached = "something may melt"
         raise InputError(f"no bias is safe: at {bias[0]:.3g} V {reached}; expected a lower one")
     if stated is not None or safe == bias.size:
-        return _Biases(bias, highest, safe)
+        return bias, highest, safe
     low, high = bias[safe - 1 : safe + 1]
     for _ in range(_HALVED):
         middle = np.array([(low + high) / 2.0])
@@ -300,7 +275,7 @@ def _safe_biases(lever: LinearisedLever, stated: Array | None, limit_K: float) -
         (low,) = middle
         bias, highest = np.insert(bias, safe, middle), np.insert(highest, safe, tip)
         safe += 1
-    return _Biases(bias, highest, safe)
+    return bias, highest, safe
 
 
 def _highest(lever: LinearisedLever, bias: Array, information: Information) -> Array:

@@ -230,13 +230,10 @@ def errors_by_source(posterior: Posterior, slopes: Array) -> dict[str, Array]:
     """
     errors: dict[str, Array] = {}
     for name, share in posterior.shares.items():
-        source = name if name in ("measurement", "fit") else _source(name)
+        own = "material" if is_of_material(name) else "geometry"
+        source = name if name in ("measurement", "fit") else OF_THE_MEASUREMENT.get(name, own)
         errors[source] = np.hypot(errors.get(source, 0.0), standard_errors(slopes, share))
     return errors
-
-
-def _source(name: str) -> str:
-    return OF_THE_MEASUREMENT.get(name, "material" if is_of_material(name) else "geometry")
 
 
 def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, rise: Array) -> Array:
@@ -274,11 +271,7 @@ def _credible_interval(
         if sampled.enough:
             return *sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
         too_few = sampled.note
-    profile = (
-        profile_of_tip(posterior, estimate.predictor.experiment)
-        if estimate.objective.informed
-        else None
-    )
+    profile = profile_of_tip(posterior, estimate.predictor.experiment) if informed else None
     if profile is None or profile.linear:
         away = BAND * np.hypot(stderr, of_model)
         return tip - away, tip + away, too_few

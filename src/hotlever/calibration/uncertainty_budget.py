@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 import xarray as xr
-from pydantic import PlainSerializer
+from pydantic import PlainSerializer, ValidationInfo, model_validator
 
 from hotlever.calibration.table import BUDGETS, budget_of
 from hotlever.errors import ComputationError, InputError
@@ -341,29 +341,20 @@ class BudgetFields(Section):
             "gum_linear": stated.linear,
         }
 
-    def check_correlation(self, where: str) -> None:
-        """Raise an error if the correlation is not that of the rows."""
-        if self.gum is None or self.gum_correlation is None:
-            return
-        size = len(self.gum)
-        if self.gum_correlation.shape != (size, size):
+    @model_validator(mode="after")
+    def _correlation_is_of_the_rows(self, info: ValidationInfo) -> Self:
+        size, correlation = len(self.gum or []), self.gum_correlation
+        if size and correlation is not None and correlation.shape != (size, size):
             raise InputError(
-                f"{where}: gum_correlation: expected numbers in {size} × {size} places"
+                f"{info.context}: gum_correlation: expected numbers in {size} × {size} places"
             )
+        return self
 
     def temperature_budget(self, table: xr.Dataset) -> TemperatureBudget | None:
         """Return the budget of a row of a table, if there is one."""
         if self.gum is None:
             return None
-        row, told, interval = table.sel(bias=self.gum_bias_V), self.gum_monte_carlo, None
-        of = self.gum_of or "tip"
-        if told is not None:
-            interval = CoverageInterval(told.trials, told.low_K, told.high_K)
-        return TemperatureBudget(
-            Budget(tuple(self.gum), self.gum_correlation),
-            row.bias_V.item(),
-            row[f"{of}_K"].item(),
-            limits_of(row, of),
-            of,
-            interval,
-        )
+        row, told, of = table.sel(bias=self.gum_bias_V), self.gum_monte_carlo, self.gum_of or "tip"
+        interval = None if told is None else CoverageInterval(told.trials, told.low_K, told.high_K)
+        budget, value = Budget(tuple(self.gum), self.gum_correlation), row[f"{of}_K"].item()
+        return TemperatureBudget(budget, row.bias_V.item(), value, limits_of(row, of), of, interval)

@@ -1,9 +1,9 @@
 """Raman thermometry: from silicon's spectra to the tip temperature with its error.
 
 Section III of Spieser et al. 2017. A spectrum (`spectrum`) is read from a file (`reading`; `layout`
-knows text, `makers` their own formats) and fitted for its line (`lineshape`, `noise`, `fit`,
-`peak`), with what is said of it by hand (`correction`); a hot-plate series (`series`) gives a
-calibration (`calibration`); a thermometer (`thermometer`) turns line positions into temperatures.
+knows text, `makers` their own formats) and fitted for its line (`lineshape`, `noise`, `fit`), with
+what is said of it by hand (`tables`); a hot-plate series (`series`) gives a calibration
+(`calibration`); a thermometer (`thermometer`) turns line positions into temperatures.
 """
 # ruff: noqa: F401 (what is imported here is what the package offers)
 
@@ -14,10 +14,10 @@ from hotlever.raman.calibration import (
     published_raman_calibration,
     read_raman_calibration,
 )
-from hotlever.raman.correction import Correction, read_corrections
 from hotlever.raman.fit import fit_peak
-from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
+from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.reading import read_spectra, read_spectrum
 from hotlever.raman.series import calibrate_from, measure, read_lines
 from hotlever.raman.spectrum import Spectrum
+from hotlever.raman.tables import Correction, read_corrections
 from hotlever.raman.thermometer import Thermometer, laser_heating

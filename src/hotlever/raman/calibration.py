@@ -21,7 +21,7 @@ from hotlever.errors import InputError
 from hotlever.files import read_json, write_text
 from hotlever.materials.silicon import MELTING_POINT
 from hotlever.raman import anharmonic
-from hotlever.raman.peak import LineShape
+from hotlever.raman.lineshape import LineShape
 from hotlever.records import Record, explained
 from hotlever.spieser2017 import (
     BASE_TEMPERATURE_K,

@@ -15,17 +15,21 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 
-from hotlever.raman import lineshape, noise
-from hotlever.raman.lineshape import At, Problem, Solution, width_of
-from hotlever.raman.peak import (
+from hotlever.raman import noise
+from hotlever.raman.lineshape import (
     LINE_RANGE,
     MIN_SAMPLES,
+    SIGMA_PER_FWHM,
+    At,
     Band,
     NoSiliconLine,
     Peak,
     PeakOptions,
+    Problem,
+    Solution,
     in_window,
     observed_width,
+    width_of,
 )
 from hotlever.types import Array, Mask
 
@@ -81,7 +85,7 @@ def fit_peak(x: Array, y: Array, options: PeakOptions | None = None, where: str 
     >>> abs(peak.centre - 520.7) < 3 * peak.centre_stderr < 0.1
     True
     """
-    options = (options or PeakOptions()).validate()
+    options = options or PeakOptions()
     prefix = f"{where}: " if where else ""
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     inside = in_window(x, prefix, options.window)
@@ -188,9 +192,9 @@ def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | 
     if options.shape == "fano":
         free.append(At.FANO)
     if options.resolution is not None:
-        log_sigma = math.log(options.resolution * lineshape.SIGMA_PER_FWHM)
+        log_sigma = math.log(options.resolution * SIGMA_PER_FWHM)
     elif options.shape == "voigt":
-        log_sigma = math.log(max(step, 0.2 * fwhm) * 2.0 * lineshape.SIGMA_PER_FWHM)
+        log_sigma = math.log(max(step, 0.2 * fwhm) * 2.0 * SIGMA_PER_FWHM)
         # on a coarse axis the two widths are hard to tell apart: keep both near what they are
         priors = [(At.LOG_FWHM, *_NATURAL_WIDTH), (At.LOG_SIGMA, log_sigma, _SIGMA_SPREAD)]
         free.append(At.LOG_SIGMA)
@@ -239,11 +243,11 @@ def _refine(
 
 def _with_band(plain: Solution) -> Solution | None:
     """The fit with a broad band on the low side, or None if the residuals ask for none."""
-    problem, x = plain.problem, plain.problem.x
+    problem, x, y = plain.problem, plain.problem.x, plain.problem.y
     centre, fwhm = float(plain.p[At.CENTRE]), width_of(plain.p[At.LOG_FWHM])
-    residual = np.where(plain.use, problem.y - plain.value, 0.0) / np.sqrt(plain.variance)
+    residual = np.where(plain.use, y - plain.value, 0.0) / np.sqrt(plain.variance)
     width = max(0.5 * _BAND_FWHM, min(fwhm, _BAND_FWHM))
-    samples = width * lineshape.SIGMA_PER_FWHM / _step(x)
+    samples = width * SIGMA_PER_FWHM / _step(x)
     # a matched filter: white noise of unit variance comes out with unit variance
     matched = gaussian_filter1d(residual, samples, mode="constant")
     matched *= math.sqrt(2.0 * math.sqrt(math.pi) * max(samples, 0.3))
@@ -268,17 +272,12 @@ def _with_band(plain: Solution) -> Solution | None:
     best, best_gain = None, _BAND_GAIN
     for start in starts:
         fitted = _refine(richer, start, plain.use, plain.variance)
-        gain = _gain(plain, fitted)
+        # drop of chi-square on the samples that both use
+        both, drop = fitted.use & plain.use, (y - plain.value) ** 2 - (y - fitted.value) ** 2
+        gain = float(np.sum(drop[both] / fitted.variance[both]))
         if gain > best_gain and _sound(fitted):
             best, best_gain = fitted, gain
     return best
-
-
-def _gain(plain: Solution, fitted: Solution) -> float:
-    """Drop of chi-square from one fit to the other, on the samples both use."""
-    y, use = plain.problem.y, fitted.use & plain.use
-    drop = (y - plain.value) ** 2 - (y - fitted.value) ** 2
-    return float(np.sum(drop[use] / fitted.variance[use]))
 
 
 def _sound(fitted: Solution) -> bool:
@@ -299,7 +298,7 @@ def _peak(solution: Solution) -> Peak | None:
     if np.isnan(p).any():
         return None
     centre, log_fwhm, height, level, slope, fano, log_sigma, *low_band = p.tolist()
-    fwhm, resolution = width_of(log_fwhm), width_of(log_sigma) / lineshape.SIGMA_PER_FWHM
+    fwhm, resolution = width_of(log_fwhm), width_of(log_sigma) / SIGMA_PER_FWHM
     width, step = observed_width(fwhm, resolution), _step(x)
     covariance = solution.covariance
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -11,7 +11,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from hotlever.errors import InputError, shown
-from hotlever.raman.peak import MIN_SAMPLES, WINDOW, in_window
+from hotlever.raman.lineshape import MIN_SAMPLES, WINDOW, in_window
 from hotlever.raman.spectrum import (
     Spectrum,
     positions,

@@ -16,9 +16,9 @@ import numpy as np
 from hotlever.errors import InputError
 from hotlever.files import LARGEST_TEXT, read_bytes
 from hotlever.raman.layout import pick_spectra, require_line
+from hotlever.raman.lineshape import in_window
 from hotlever.raman.makers import MAKERS, WDF_SIGNATURE, read_makers
 from hotlever.raman.noise import zeros
-from hotlever.raman.peak import in_window
 from hotlever.raman.spectrum import (
     Spectrum,
     names_in_file,
@@ -132,10 +132,8 @@ def _in_text(file: Path, raw: bytes) -> list[Spectrum]:
 
 def _checked(x: Array, y: Array, where: str) -> tuple[Array, Array]:
     """Sort, merge repeated axis values, and make sure there is a silicon line to look for."""
-    if len(x) != len(y):
-        raise InputError(f"{where}: {len(x)} Raman shifts and {len(y)} intensities")
     good = np.isfinite(x) & np.isfinite(y)
-    x, y = np.asarray(x, dtype=float)[good], np.asarray(y, dtype=float)[good]
+    x, y = x[good], y[good]
     require_line(x, where)
     x, inverse, counts = np.unique(x, return_inverse=True, return_counts=True)
     y = np.bincount(inverse, weights=y) / counts

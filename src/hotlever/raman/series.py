@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,15 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.datasets import frame_text, labelled
-from hotlever.errors import InputError, shown, unknown_name
+from hotlever.errors import InputError, unknown_name
 from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
-from hotlever.raman.correction import NOTHING, Correction, of_spectrum
 from hotlever.raman.fit import fit_peak
-from hotlever.raman.peak import NoSiliconLine, Peak, PeakOptions
-from hotlever.raman.spectrum import Spectrum, aliases, sample_temperature
+from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
+from hotlever.raman.spectrum import Spectrum, aliases
+from hotlever.raman.tables import NOTHING, Correction, of_spectrum
 from hotlever.raman.thermometer import Thermometer
 from hotlever.steps import each
-from hotlever.tables import read_table
 from hotlever.types import Progress
 
 if TYPE_CHECKING:
@@ -214,34 +211,3 @@ def _temperature(spectrum: Spectrum, table: dict[str, float]) -> float:
     if called is None:
         raise unknown_name("spectrum in the temperature table", name, table)
     return table[called]
-
-
-def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
-    """Read a table of temperatures: file name and temperature, in a header's K or °C.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     table = Path(folder) / "plate.csv"
-    ...     _ = table.write_text("file,temperature (C)\\na.txt,25\\nb.txt,100\\n")
-    ...     read_temperatures(table)
-    {'a.txt': 298.15, 'b.txt': 373.15}
-    """
-    table = read_table(path, "rows of file name and temperature", header=False)
-    if len(table.names) < 2:
-        raise InputError(
-            f"{table.where(0)}: '{shown(table.rows[0][0])}', expected a file name and a temperature"
-        )
-    # a heading such as T_C has its unit without brackets
-    celsius = re.search(r"[\W_](C|celsius)\W*$", table.names[1], re.I)
-    kelvin = table.values(1, "K", "temperature", unit="C" if celsius else "K")
-    temperatures: dict[str, float] = {}
-    for row, (cells, value) in enumerate(zip(table.rows, kelvin, strict=True)):
-        temperature = sample_temperature(float(value))
-        if temperature is None:
-            raise InputError(f"{table.where(row)}: '{shown(cells[1])}' is no sample temperature")
-        name = Path(cells[0]).name
-        if temperatures.setdefault(name, temperature) != temperature:
-            raise InputError(f"{table.where(row)}: '{shown(name)}' has another temperature above")
-    return temperatures

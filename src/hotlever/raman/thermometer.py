@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman import anharmonic
 from hotlever.raman.calibration import RamanCalibration
-from hotlever.raman.peak import Peak
+from hotlever.raman.lineshape import Peak
 from hotlever.spieser2017 import ABSORBED_SHARE, STRESS_SHIFT
 from hotlever.types import Array
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from hotlever.errors import InputError
 from hotlever.files import json_text, write_text
-from hotlever.raman.bias_log import join, read_bias_log
 from hotlever.raman.series import to_csv
+from hotlever.raman.tables import join, read_bias_log
 from hotlever.tasks.files import draw
 from hotlever.tasks.measured_requests import JoinRequest, RamanCheckRequest, RamanRequest
 from hotlever.tasks.reporter import Reporter

@@ -15,11 +15,16 @@ from hotlever.raman.calibration import (
     published_raman_calibration,
     read_raman_calibration,
 )
-from hotlever.raman.correction import Correction, check_corrections, read_corrections
-from hotlever.raman.peak import LineShape, PeakOptions
+from hotlever.raman.lineshape import LineShape, PeakOptions
 from hotlever.raman.reading import read_spectra
 from hotlever.raman.series import Line, measure, read_lines
 from hotlever.raman.spectrum import Spectrum, file_and_label
+from hotlever.raman.tables import (
+    Correction,
+    check_corrections,
+    read_corrections,
+    read_temperatures,
+)
 from hotlever.raman.thermometer import Law, Thermometer, laser_heating
 from hotlever.tasks.measured_requests import ThermometerRequest
 from hotlever.tasks.reporter import Listener
@@ -150,7 +155,7 @@ def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
     hot_plate: list[Line] = []
     spectra: list[Spectrum] = []
     if calibrate_from:
-        table = series.read_temperatures(temperatures) if temperatures else None
+        table = read_temperatures(temperatures) if temperatures else None
         spectra = _read(listener, calibrate_from)
         source = ", ".join(path.name or str(path) for path in calibrate_from)
         with listener.progress("hot plate") as update:
@@ -199,7 +204,7 @@ def _options(
             shape = calibration.line_shape
             resolution = calibration.resolution_cm if resolution is None else resolution
     asked: Any = shape or "lorentzian"
-    return PeakOptions(asked, resolution).validate()
+    return PeakOptions(asked, resolution)
 
 
 def _describe(calibration: RamanCalibration, listener: Listener) -> None:

@@ -15,7 +15,7 @@ from hotlever.app.pages.plots import INK, axes, plotted, short
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
 from hotlever.raman import Correction, read_corrections
-from hotlever.raman.correction import corrections_text
+from hotlever.raman.tables import corrections_text
 
 #: The table of corrections, in the folder of the project.
 CORRECTIONS = "raman.corrections.csv"
