@@ -12,7 +12,7 @@ from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import shown, until, visit
 
-from hotlever.app.pages.following import slider
+from hotlever.app.pages.live_page import slider
 from hotlever.app.session import Session
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")

@@ -19,8 +19,8 @@ from test_app_pages import Here, shown, until, visit
 
 from hotlever.app import showing
 from hotlever.app.jobs import Job, Task
+from hotlever.app.pages.driven import Pulses
 from hotlever.app.pages.frame import ErrorBanner
-from hotlever.app.pages.pulses import Pulses
 from hotlever.app.project import EXAMPLES
 from hotlever.app.session import Session
 from hotlever.app.state import Simulate

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import ClassVar
 
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.frame import download_button, hand_over, small_button
+from hotlever.app.pages.frame import ErrorBanner, download_button, hand_over, small_button
 from hotlever.app.pages.measured import MeasuredPage
-from hotlever.app.pages.page import MEDIA, REFERENCE, several
-from hotlever.app.pages.proposals import Proposals
+from hotlever.app.pages.page import MEDIA, REFERENCE, DrawnPage, outputs, several
 from hotlever.app.project import CALIBRATIONS
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
@@ -21,13 +21,14 @@ from hotlever.text import value_with_error
 #: What a calibration rests on, and the option that says so.
 _RESTS = {"probe": "probe", "fit": "fit", "law": "power_law"}
 _ASKED = {"tip_K": ("tip temperature", "K"), "bias_V": ("bias", "V"), "power_mW": ("power", "mW")}
+#: What can be told: where the error counts, what the tip is to stay below, and what counts without.
+_TOLD = {"at": ("Sure at", "hottest measured"), "stay_below": ("Stay below", "what melts")}
 
 
 class CalibratePage(MeasuredPage):
     """One tab of the page."""
 
-    name, kind, ending = "calibrate", "calibration", CALIBRATION
-    button, icon = "Calibrate", "straighten"
+    name, kind, ending, folder = "calibrate", "calibration", CALIBRATION, CALIBRATIONS
 
     def options(self) -> None:
         """Show what the calibration rests on, and what is known beforehand."""
@@ -66,10 +67,6 @@ class CalibratePage(MeasuredPage):
             "table": self._table_file,
         }
         return Task("calibrate", (chosen["data"],), options)
-
-    def results(self) -> list[str]:
-        """Return where a calibration may lie: of this measurement alone, or among many."""
-        return [self.output, f"{CALIBRATIONS}/{self.stem}.json"]
 
     async def show(self, name: str) -> None:
         """Show what to set for a temperature, and what a bias or a power gives, or why not."""
@@ -143,3 +140,34 @@ def _answer(row: dict[str, float]) -> str:
         f"{value_with_error(row['tip_K'], row['tip_stderr_K'])} K "
         f"(95 %: {low:.0f} to {high:.0f} K){apex}"
     )
+
+
+class Proposals(DrawnPage):
+    """A card in the element that is open, of a calibration file; what it makes begins with a stem.
+
+    Each calibration has proposals of its own.
+    """
+
+    name = "next"
+    alt = "Error by temperature now and after more measurements; tip temperature by bias"
+    kinds: ClassVar = {kind: text for kind, text in DrawnPage.kinds.items() if kind != "NetCDF"}
+
+    def __init__(self, session: Session, banner: ErrorBanner, calibration: str, stem: str) -> None:
+        super().__init__(session, banner)
+        self.name, self._calibration, self._stem = f"next {calibration}", calibration, stem
+        with ui.card().classes("w-full").props("flat bordered data-proposals"):
+            ui.label("What do I measure next?").classes("text-bold")
+            with ui.row().classes("w-full items-center"):
+                for key, (title, empty) in _TOLD.items():
+                    self.number(key, title, "K", empty).classes("w-44", remove="w-36")
+                ui.space()
+                ui.button("Propose", icon="add_location_alt", on_click=self.start)
+            self.show_result()
+        self.show_command()
+
+    def task(self) -> Task:
+        """Return the task that writes the proposals as a table and a figure."""
+        told = {key: self.chosen[key] for key in _TOLD}
+        kelvins = {key: "" if T is None else f"{T:.12g}K" for key, T in told.items()}
+        files = outputs(f"{self._stem}.next", "SVG")
+        return Task("next", (self._calibration,), {**kelvins, **files})

@@ -3,18 +3,36 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
+import numpy as np
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.contact_plots import ContactPlots
-from hotlever.app.pages.drawn import probe_files
-from hotlever.app.pages.frame import ErrorBanner, flat_button
-from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage
+from hotlever.app.pages.chosen_lever import probe_files
+from hotlever.app.pages.frame import caption, flat_button
+from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage, slider
 from hotlever.app.pages.page import MEDIA
-from hotlever.app.pages.sample import SampleLayers
-from hotlever.app.session import Session
+from hotlever.app.pages.plots import (
+    BIAS,
+    INK,
+    SHADE,
+    axes,
+    dots,
+    filled,
+    line,
+    outlined,
+    plotted,
+    points,
+    side_by_side,
+)
+from hotlever.colours import BLUE, PURPLE, VERMILION
+from hotlever.contact.picture import ContactPicture
+from hotlever.errors import InputError
+from hotlever.materials.samples import sample_names
+from hotlever.probe.contact import parsed_layers
 
 #: Biases of a table that is written.
 _BIASES = 25
@@ -39,12 +57,180 @@ _MOVING = (
     "they are about to turn"
 )
 _AT_REST = "full lever: the numbers of hotlever contact"
+_ABOUT = (
+    "Heights and radii in proportion near the contact, by decades away from it. Under the contact "
+    "the temperature is that along its axis."
+)
+#: Heat (mW) that is none but for rounding.
+_NONE_MW = 1e-9
+#: Plots by bias: title, and for each line its column, factor, colour and name.
+_CURVES: tuple[tuple[str, tuple[tuple[str, float, str, str], ...]], ...] = (
+    (
+        "temperature (K)",
+        (("tip_K", 1.0, VERMILION, "tip at the lever"), ("apex_K", 1.0, PURPLE, "apex")),
+    ),
+    (
+        "heat into the sample (µW)",
+        (
+            ("sample_mW", 1e3, VERMILION, "through the contact"),
+            ("beside_mW", 1e3, BLUE, "through air"),
+        ),
+    ),
+    ("change of I<sub>h</sub> (µA)", (("current_change_mA", 1e3, BLUE, "change of I_h"),)),
+)
+#: Thicknesses of the slider of a layer (nm), and that of a layer that is added.
+_THINNEST, _THICKEST, _NEW = 1.0, 1e4, 100.0
+
+
+class ContactPlots:
+    """A tip in contact, with the temperature along its axis, and curves by bias.
+
+    `show` is given the answers of `hotlever.app.touching`.
+    """
+
+    def __init__(self) -> None:
+        layout = axes("", "", 420, normal="xy")
+        layout["margin"] = {"l": 62, "r": 8, "t": 24, "b": 42}
+        layout["yaxis"] |= {"showgrid": False, "ticks": "outside", "tickcolor": INK}
+        layout["xaxis"] |= {"domain": [0.0, 0.54], "showgrid": False, "showticklabels": False}
+        layout["xaxis2"] = axes("temperature (K)", "", 0, normal="x")["xaxis"]
+        layout["xaxis2"] |= {"domain": [0.58, 1.0], "anchor": "y", "nticks": 4}
+        along = [line(VERMILION) | {"xaxis": "x2"}, dots(VERMILION, 9) | {"xaxis": "x2"}]
+        alt = "Tip, contact and sample coloured by temperature, and the temperature along the axis"
+        # the axis of the picture is drawn for what has values on it
+        nothing = {"type": "scatter", "x": [None], "y": [None], "hoverinfo": "skip"}
+        self._picture = plotted([nothing, *along], layout, alt)
+        caption(_ABOUT)
+        self._by_bias: list[ui.plotly] = []
+        with side_by_side():
+            for title, lines in _CURVES:
+                layout = axes(BIAS, title, 240, normal="y")
+                if len(lines) > 1:
+                    above = {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom"}
+                    layout |= {"showlegend": True, "legend": above}
+                    layout["margin"]["t"] = 30
+                data = []
+                for _, _, colour, name in lines:
+                    data.append(line(colour) | {"name": name})
+                    data.append(dots(colour, 10) | {"name": name, "showlegend": False})
+                self._by_bias.append(plotted(data, layout, f"{title} by bias"))
+
+    def show(self, answer: dict[str, Any]) -> None:
+        """Draw an answer; one while sliders move has no curves, and those of before go."""
+        self._draw(answer["picture"], answer["colours"], answer["now"], answer["base_K"])
+        curves, now = answer["curves"] or {}, answer["now"]
+        for plot, (_, lines) in zip(self._by_bias, _CURVES, strict=True):
+            for number, (key, factor, _, _) in enumerate(lines):
+                shown = {"visible": key != "beside_mW" or now[key] > _NONE_MW}
+                for place, columns in enumerate((curves, now)):
+                    values = factor * np.asarray(columns.get(key, ()))
+                    drawn = points(columns.get("bias_V", ()), values)
+                    plot.figure["data"][2 * number + place] |= drawn | shown
+            plot.update()
+
+    def _draw(
+        self, drawn: ContactPicture, colours: Any, now: dict[str, float], base_K: float
+    ) -> None:
+        figure, width = self._picture.figure, drawn.half_width
+        shapes, names = [], []
+        words = {"x": -0.97 * width, "xanchor": "left", "showarrow": False, "align": "left"}
+        for number, (name, top, bottom) in enumerate(drawn.layers):
+            corners = [(-width, top), (width, top), (width, bottom), (-width, bottom)]
+            shapes.append(filled(corners, SHADE.format(0.12 + 0.16 * (number % 2))))
+            text = name.replace("\n", "<br>").replace(", ", "<br>")
+            names.append({"y": (top + bottom) / 2.0, "text": text, **words})
+        for (corners, _), colour in zip(drawn.pieces, colours, strict=True):
+            shapes.append(filled(corners, colour))
+        shapes += [outlined(outline, closed=False) for outline in drawn.outlines]
+        layout = figure["layout"]
+        layout |= {"shapes": shapes, "annotations": names}
+        layout["xaxis"]["range"] = [-1.02 * width, 1.02 * width]
+        heights, texts = zip(*drawn.ticks, strict=True)
+        layout["yaxis"] |= {"range": [drawn.bottom, drawn.top]}
+        layout["yaxis"] |= {"tickvals": list(heights), "ticktext": list(texts)}
+        span = max(now["tip_K"] - base_K, 1.0)
+        layout["xaxis2"]["range"] = [base_K - 0.06 * span, base_K + 1.06 * span]
+        figure["data"][1] |= points(drawn.temperature_K, drawn.height)
+        ends = [0, drawn.apex, drawn.apex + 1]
+        figure["data"][2] |= points(drawn.temperature_K[ends], drawn.height[ends])
+        under = "sample under the middle of the contact"
+        figure["data"][2]["hovertext"] = ["tip at the lever", "apex", under]
+        self._picture.update()
+
+
+class SampleLayers:
+    """Fields for the layers of a sample, from the top: materials, and thicknesses but for the last.
+
+    `changed` is called with what they say, as a command does. A text that is none is shown as it
+    is.
+    """
+
+    def __init__(self, changed: Callable[[str], None]) -> None:
+        self._changed = changed
+        #: Materials and thicknesses (nm); the last counts for nothing.
+        self._layers: list[tuple[str, float]] = []
+        self._column = ui.column().classes("w-full gap-1")
+
+    def show(self, text: str) -> None:
+        """Show the fields of a text such as ``polymer, 100nm, silicon``."""
+        try:
+            layers = parsed_layers(text, "")
+        except InputError:
+            layers = ()
+        self._layers = [(layer.material, 1e3 * (layer.thickness_um or 0.0)) for layer in layers]
+        self._column.clear()
+        with self._column:
+            if not layers:
+                field = ui.input("Sample", value=text).classes("w-full")
+                field.on_value_change(lambda event: self._changed(event.value))
+                return
+            for number, (material, thickness) in enumerate(self._layers):
+                self._layer(number, material, thickness)
+            flat_button("A layer on top", self._add, icon="add")
+
+    def _layer(self, number: int, material: str, thickness: float) -> None:
+        last = number == len(self._layers) - 1
+        where = "substrate" if last else f"layer {number + 1}"
+        names = list(dict.fromkeys((*sample_names(), material)))
+        with ui.row().classes("w-full items-center no-wrap gap-1"):
+            chosen = ui.select(names, label=where, value=material, with_input=True)
+            chosen.classes("col").props("new-value-mode=add-unique")
+            chosen.tooltip("A material, or its thermal conductivity in W/(m K)")
+            chosen.on_value_change(lambda event: self._set(number, material=event.value))
+            if not last:
+                remove = partial(self._remove, number)
+                flat_button("", remove, icon="close", label=f"Remove {where}")
+        if not last:
+            words = f"thickness of {where}"
+            field = slider(words, thickness, _THINNEST, _THICKEST, "nm", by_decades=True)
+            field.on_value_change(lambda event: self._set(number, thickness=event.value))
+
+    def _set(
+        self, number: int, material: str | None = None, thickness: float | None = None
+    ) -> None:
+        before = self._layers[number]
+        self._layers[number] = material or before[0], thickness or before[1]
+        self._changed(self._text())
+
+    def _add(self) -> None:
+        self._layers.insert(0, (self._layers[0][0], _NEW))
+        self._changed(self._text())
+        self.show(self._text())
+
+    def _remove(self, number: int) -> None:
+        del self._layers[number]
+        self._changed(self._text())
+        self.show(self._text())
+
+    def _text(self) -> str:
+        *films, (substrate, _) = self._layers
+        return ", ".join([*(f"{name}, {thickness:g}nm" for name, thickness in films), substrate])
 
 
 class ContactPage(LivePage):
     """One tab of the page."""
 
-    name, live = "contact", "touching"
+    name, live, plots_of = "contact", "touching", ContactPlots
     numbers: ClassVar = {
         "tip_K": ("tip at the lever", "{:.1f} K", 1.0),
         "apex_K": ("apex", "{:.1f} K", 1.0),
@@ -54,19 +240,10 @@ class ContactPage(LivePage):
     }
     state = ("bias", "most")
 
-    def __init__(self, session: Session, banner: ErrorBanner) -> None:
-        super().__init__(session, banner, ContactPlots)
-
     def controls(self) -> None:
         """Ask for what is around the lever."""
         media = {name: words for name, words in MEDIA.items() if name != "unknown"}
         self.choice("medium", "Around it", {**media, "": "as the probe file says"})
-
-    async def described(self) -> dict[str, Any]:
-        """Return radius, interface and sample of the probe's file."""
-        asked = "touching:described", self.chosen["probe"]
-        answer: dict[str, Any] = await self.session.ask("quick", *asked)
-        return answer
 
     def show_sliders(self) -> None:
         """Show bias, radius, interface, and the layers of the sample."""
@@ -75,7 +252,7 @@ class ContactPage(LivePage):
             zero = key == "interface"
             self.slider(key, words, *ends, unit, hint, by_decades=True, from_zero=zero)
         ui.label("Sample, from the top").classes("text-bold")
-        SampleLayers(lambda text: self.set_value("sample", text)).show(self.value("sample"))
+        SampleLayers(partial(self.set_value, "sample")).show(self.value("sample"))
         flat_button("All as in the probe file", self._reset, icon="restart_alt")
 
     async def _reset(self) -> None:

@@ -9,9 +9,9 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.drawn import DrawnPage, probe_files, stem
+from hotlever.app.pages.chosen_lever import probe_files, stem
 from hotlever.app.pages.frame import ErrorBanner, caption, two_columns
-from hotlever.app.pages.page import outputs
+from hotlever.app.pages.page import DrawnPage, outputs
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 from hotlever.materials.parameters import label

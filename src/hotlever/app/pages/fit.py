@@ -25,8 +25,7 @@ _PULSE = "Pulse of a file in time (10V,20us)"
 class FitPage(MeasuredPage):
     """One tab of the page."""
 
-    name, kind, ending = "fit", "fit", FIT
-    button, icon = "Fit", "query_stats"
+    name, kind, ending, folder = "fit", "fit", FIT, FITS
     tellable = ("columns", "waveform")
 
     def options(self) -> None:
@@ -90,10 +89,6 @@ class FitPage(MeasuredPage):
     @property
     def _report(self) -> str:
         return f"{self.stem}-report"
-
-    def results(self) -> list[str]:
-        """Return where a fit may lie: of this measurement alone, or one among many levers."""
-        return [self.output, f"{FITS}/{self.stem}.json"]
 
     async def show(self, name: str) -> None:
         """Show where to go on with the fit."""

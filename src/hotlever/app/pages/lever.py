@@ -13,15 +13,17 @@ from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
     FIGURE_FILES,
     ErrorBanner,
+    caption,
     drop_zone,
+    figure,
     flat_button,
     hand_over,
     small_button,
+    table,
     two_columns,
 )
 from hotlever.app.pages.page import Page, Work
-from hotlever.app.pages.probe_fields import ProbeFields
-from hotlever.app.pages.probe_files import Drawings, Picture, ProbeFile, new_probe
+from hotlever.app.pages.probe_file import ProbeFields, ProbeFile, new_probe
 from hotlever.app.project import DATA, DRAWINGS
 from hotlever.app.session import Session
 from hotlever.app.state import Lever, Simulate
@@ -33,6 +35,58 @@ _NEW = Lever().name
 #: Pages that go on with the probe.
 _ON = {"simulate": "tune", "calibrate": "straighten"}
 _DROP = "Drop a drawing here (GDSII, OASIS, DXF) or a probe file, and tables of materials"
+
+
+class Picture:
+    """The lever from above, and what there is to know of it."""
+
+    def __init__(self, page: LeverPage) -> None:
+        self._page, self._latest = page, 0
+        mesh = ui.switch("mesh", value=page.chosen["mesh"], on_change=self._switch)
+        mesh.tooltip("The triangles that the lever is solved on")
+        self._column = ui.column().classes("w-full gap-1")
+
+    async def _switch(self, event: Any) -> None:
+        self._page.chosen["mesh"] = event.value
+        await self._page.draw()
+
+    def clear(self) -> None:
+        """Show none, nor one that is being drawn."""
+        self._latest += 1
+        self._column.clear()
+
+    async def show(self, text: str, title: str) -> str | None:
+        """Show the picture of a probe by its file; return what is wrong with the probe.
+
+        None if another picture was asked for meanwhile. There is no picture of what cannot be
+        drawn: the last one is of another probe.
+        """
+        self._latest += 1
+        turn, mesh, drawn = self._latest, self._page.chosen["mesh"], None
+        try:
+            what = text, title, mesh
+            drawn = await self._page.session.ask("quick", "showing:probe_of_text", *what)
+            fault: str = drawn["fault"]
+        except HotleverError as error:
+            fault = str(error)
+        if turn != self._latest:
+            return None
+        self._column.clear()
+        if drawn is not None:
+            alt = "The lever from above: regions, terminals and tip"
+            with self._column:
+                figure(drawn["figure"], alt, wide=True)
+                if not fault:
+                    table(("region", "part", "area"), drawn["rows"])
+                    if mesh:
+                        caption(f"mesh: {drawn['triangles']} triangles")
+        return fault
+
+    def add(self, listing: str, outlines: str) -> None:
+        """Show below what a drawing holds, and the picture of all of it."""
+        with self._column, ui.expansion("What the drawing holds"):
+            ui.label(listing).classes("lines")
+            figure(outlines, "All outlines of the drawing, by layer")
 
 
 class LeverPage(Page):
@@ -56,13 +110,12 @@ class LeverPage(Page):
                 self._fields = ProbeFields(self, self._set)
             with right:
                 self._work = Work(session, self.name, self._ended)
-                self._drawings = Drawings(self, self._begin, self._show)
-                self._picture = Picture(self, self._draw)
+                self._kept = ui.row().classes("items-center w-full")
+                self._picture = Picture(self)
                 with ui.row().classes("items-center w-full"):
                     name = self.chosen["save_as"] or self.chosen["name"]
-                    self._name = ui.input(
-                        "Save as", value=name, on_change=self._keep("save_as", "")
-                    )
+                    keep = self._keep("save_as", "")
+                    self._name = ui.input("Save as", value=name, on_change=keep)
                     ui.button("Save", icon="save", on_click=self._write)
                     for page, icon in _ON.items():
                         go = ui.button(page.capitalize(), icon=icon)
@@ -87,7 +140,7 @@ class LeverPage(Page):
         if self.chosen["text"] is None:
             self.chosen["text"] = new_probe(next(iter(_SHAPES)))
         self._quietly(self.chosen["text"])
-        await self._draw()
+        await self.draw()
         await self._open(self.chosen["drawing"])
 
     async def _take_shape(self, shape: str) -> None:
@@ -99,23 +152,18 @@ class LeverPage(Page):
         self._pick.set_value(None)
         await self._set(new_probe(shape))
 
-    async def _draw(self) -> None:
+    async def draw(self) -> None:
         """Draw what is open, and show its fields."""
         text = self.chosen["text"]
         if not text:
             self._picture.clear()
             await self._fields.show("", "")
             return
-        try:
-            drawn = await self._picture.of(text, self._name.value)
-            if drawn is None:
-                return
-            fault = drawn["fault"]
-        except HotleverError as error:
-            fault = str(error)
-        self.banner.say(fault)
-        await self._fields.show(text, fault)
-        self.show_command()
+        fault = await self._picture.show(text, self._name.value)
+        if fault is not None:
+            self.banner.say(fault)
+            await self._fields.show(text, fault)
+            self.show_command()
 
     # --- a file -----------------------------------------------------------------------------------
 
@@ -127,32 +175,52 @@ class LeverPage(Page):
         elif opened:
             self._pick.set_value(opened[-1])
         elif names[-1].lower().endswith(DATA):
-            await self._draw()
+            await self.draw()
             self.banner.say(f"{names[-1]}: kept in the folder; a material's property may name it")
         else:
             raise InputError(f"{names[-1]}: unknown type of file, expected {_FILE}")
 
     async def _open(self, name: str | None) -> None:
-        """Show a probe file, or the probe of a drawing."""
+        """Show a probe file, or the probe of a drawing; if there is none, have one proposed."""
         if name is None:
             return
         if not await self._file.may_go():
-            self._drawings.clear()
+            self.chosen["drawing"] = None
+            self._kept.clear()
             self._pick.set_value(None)
             return
         self.banner.clear()
         self._work.hide()
-        if name.lower().endswith(DRAWINGS):
-            await self._drawings.open(name)
-        else:
+        if not name.lower().endswith(DRAWINGS):
             await self._show(name)
+            return
+        job = self.session.jobs.by_page.get(self.name)
+        if job is not None and job.standing == "running" and job.task.files == (name,):
+            self._begin(drawing=name)  # it is being proposed since before the page was opened
+            return
+        probe, is_there = self.session.project.probe_of_drawing(name)
+        if not is_there:
+            self._propose(name, probe)
+            return
+        await self._show(probe)
+        with self._kept:
+            ui.label(f"{probe} is there already, and was kept as it is.").classes("remark")
+            again = small_button("Propose anew", partial(self._propose, name, probe))
+            again.tooltip(f"Writes what the drawing proposes over {probe}")
 
-    def _begin(self, name: str = "") -> None:
+    def _propose(self, drawing: str, name: str) -> None:
+        """Have a probe file proposed for a drawing."""
+        files = {"output": name, "plot": f"{Path(name).stem}.svg"}
+        if self.run(Task("probe import", (drawing,), files)):
+            self._begin(drawing=drawing)
+
+    def _begin(self, name: str = "", drawing: str | None = None) -> None:
         """Show no lever until another one is there: none may stand under the other's name."""
-        self.chosen |= {"name": name, "text": "", "saved": ""}
+        # whoever leaves before the probe file of a drawing is there, and comes back, is shown it
+        self.chosen |= {"name": name, "text": "", "saved": "", "drawing": drawing}
         self._name.set_value(name)
         self._picture.clear()
-        self._drawings.clear()
+        self._kept.clear()
         self._quietly("")
         self.show_command()
 
@@ -161,28 +229,35 @@ class LeverPage(Page):
         self._begin(name)
         with self.banner.caught():
             self._quietly(self._file.open(name))
-            await self._draw()
+            await self.draw()
             if plot:
                 outlines = self.session.project.path(plot).read_text(encoding="utf-8")
                 self._picture.add(listing, outlines)
 
     async def _ended(self, job: Job) -> None:
+        """Show what was proposed for the drawing that is waited for, if nothing else is open."""
         self._pick.set_options(self._files)
-        await self._drawings.done(job)
+        if job.task.files != (self.chosen["drawing"],):
+            return
+        if job.standing == "done":
+            files = job.task.options
+            await self._show(files["output"], job.shown["result"], files["plot"])
+        else:
+            self._begin()
 
     def _edited(self, event: Any) -> Awaitable[None] | None:
         """Take what was typed, at once: later the text may be another one, which nobody typed."""
         if event.value == self._shown_text:
             return None
         self.chosen["text"] = self._shown_text = event.value
-        return self._draw()
+        return self.draw()
 
     async def _set(self, text: str) -> None:
         """Take a text in which a field was set."""
         self.chosen["text"] = text
         self._work.hide()
         self._quietly(text)
-        await self._draw()
+        await self.draw()
 
     def _quietly(self, text: str) -> None:
         """Show a probe file that nobody typed."""

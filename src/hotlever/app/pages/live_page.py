@@ -2,26 +2,82 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from nicegui import ui
+from nicegui import background_tasks, ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.drawn import DrawnPage, stem
-from hotlever.app.pages.following import Follower, slider
+from hotlever.app.pages.chosen_lever import stem
 from hotlever.app.pages.frame import ErrorBanner, caption, number_shown, two_columns
-from hotlever.app.pages.page import Page, Work, outputs
+from hotlever.app.pages.page import DrawnPage, Page, Work, outputs
 from hotlever.app.session import Session
-from hotlever.app.workers import Heard
 from hotlever.errors import HotleverError
 
 #: The least bias (V) of pages that show what is of a current.
 LEAST_BIAS_V = 0.1
+#: Seconds that sliders rest before what follows is asked in full.
+_REST_S = 0.35
+#: Steps of a slider.
+_STEPS = 400
 # Title of a number, its form, and a factor; a form may name others of the same answer.
 Numbers = Mapping[str, tuple[str, str, float]]
+
+
+def slider(
+    words: str,
+    value: float,
+    low: float,
+    high: float,
+    unit: str = "",
+    hint: str = "",
+    *,
+    by_decades: bool = False,
+    from_zero: bool = False,
+) -> ui.number:
+    """Show a slider with its number, which is returned, and may be beyond the slider's ends.
+
+    `by_decades` it is even in the logarithm; `from_zero` its lowest position is then 0.
+    """
+    ends = (math.log10(low), math.log10(high)) if by_decades else (low, high)
+
+    def position(value: float | None) -> float:
+        if not by_decades:
+            return ends[0] if value is None else value
+        return math.log10(max(value or low, low))
+
+    def number_at(position: float) -> float:
+        if not by_decades:
+            return position
+        return 0.0 if from_zero and position <= ends[0] else float(f"{10.0**position:.3g}")
+
+    with ui.column().classes("w-full gap-0"):
+        with ui.row().classes("w-full items-center no-wrap justify-between"):
+            name = ui.label(words).classes("text-sm remark")
+            if hint:
+                name.tooltip(hint)
+            number = ui.number(value=value, format="%.4g").classes("w-36 shrink-0")
+            number.props(remove="outlined").props(f'aria-label="{words}"')
+            number.props(f'borderless suffix="{unit}" input-class=text-right')
+        step = (ends[1] - ends[0]) / _STEPS
+        bar = ui.slider(min=ends[0], max=ends[1], step=step, value=position(value))
+        bar.props(f'dense aria-label="{words}"')
+
+    # each follows the other unless it is there already: what is typed has more digits than places
+    def typed() -> None:
+        if number.value != number_at(bar.value):
+            bar.set_value(position(number.value))
+
+    def slid() -> None:
+        if bar.value != position(number.value):
+            number.set_value(number_at(bar.value))
+
+    number.on_value_change(typed)
+    bar.on_value_change(slid)
+    return number
 
 
 class LivePage(Page):
@@ -33,15 +89,16 @@ class LivePage(Page):
         What the probe's file says, or what is usual, of what can be chosen.
     """
 
-    #: The module that answers, and what is shown of ``now`` in an answer, by its name there.
+    #: The module that answers, what draws the answers, and what is shown of ``now`` in them.
     live: ClassVar[str]
+    plots_of: ClassVar[type[Any]]
     numbers: ClassVar[Numbers]
     #: What is chosen of a state, beside the task, in the order in which it is asked for.
     state: ClassVar[tuple[str, ...]]
     #: What the table may be asked for as, and the processes that answer in full, and quickly.
     kinds, workers = DrawnPage.kinds, ("full", "quick")
 
-    def __init__(self, session: Session, banner: ErrorBanner, plots: Callable[[], Any]) -> None:
+    def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
         self.of_file: dict[str, Any] = {}
         with two_columns("live") as (left, right):
@@ -50,16 +107,18 @@ class LivePage(Page):
                 self.controls()
                 self._sliders = ui.column().classes("w-full gap-1")
             with right, ui.column().classes("w-full gap-3 parts"):
-                self.results(plots)
+                self.results()
 
     # --- for the page to say ----------------------------------------------------------------------
 
     def controls(self) -> None:
         """Show what is chosen beside sliders."""
 
-    @abstractmethod
     async def described(self) -> dict[str, Any]:
         """Return what the probe's file says."""
+        described = f"{self.live}:described"
+        answer: dict[str, Any] = await self.session.ask("quick", described, self.chosen["probe"])
+        return answer
 
     @abstractmethod
     def show_sliders(self) -> None:
@@ -69,12 +128,16 @@ class LivePage(Page):
     def of_lever(self) -> Task:
         """Return the task, whatever the state; its probe and options are the lever's."""
 
+    def also_asked(self) -> tuple[Any, ...]:
+        """Return what the module that answers is told beside the task and the state."""
+        return ()
+
     def about_table(self) -> None:
         """Ask what is chosen of the table."""
 
-    @abstractmethod
     def of_table(self, kind: str) -> dict[str, Any]:
         """Return the options that a table, or what else is asked for, has more than the task."""
+        return {}
 
     @abstractmethod
     def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
@@ -148,7 +211,7 @@ class LivePage(Page):
 
     # --- what is shown ----------------------------------------------------------------------------
 
-    def results(self, plots: Callable[[], Any]) -> None:
+    def results(self) -> None:
         """Show numbers and plots here, and what can be taken of them."""
         with ui.row().classes("w-full items-end gap-6 numbers"):
             titles = {key: title for key, (title, *_) in self.numbers.items()}
@@ -156,10 +219,10 @@ class LivePage(Page):
         self._model = caption("starting").props("aria-live=polite")
         self._remarks = ui.label().classes("text-sm remark")
         with ui.column().classes("w-full gap-1") as self._drawn:
-            self.plots = plots()
+            self.plots = self.plots_of()
         # plots without data would be of nothing
         self._drawn.set_visibility(False)
-        self._follower = Follower(self._model, self._show, self.rested)
+        self._follower = _Follower(self)
         with ui.card().classes("w-full last").props("flat bordered"):
             ui.label("Take it with you").classes("text-bold")
             self.about_table()
@@ -167,34 +230,34 @@ class LivePage(Page):
             Work(self.session, self.name, self.give)
             self.command()
 
-    async def ask(
-        self, lever: Task, at: list[Any], quick: bool, heard: Heard, *more: Any
-    ) -> dict[str, Any]:
-        """Return what a lever shows in a state, quickly or in full; `heard` is told meanwhile."""
-        asked = self.workers[quick], f"{self.live}:answer", lever, *at, quick, *more
-        answer: dict[str, Any] = await self.session.ask(*asked, heard=heard)
-        return answer
+    @property
+    def is_gone(self) -> bool:
+        """Whether the tab was closed."""
+        return self._model.is_deleted
 
-    async def _show(self, lever: Task, at: list[Any], quick: bool) -> bool:
+    async def show(self, lever: Task, at: list[Any], quick: bool) -> bool:
+        """Show a lever in a state, quickly or in full; return whether it did."""
         notes = dict[str, None]()
 
         def heard(kind: str, content: Any) -> None:
             if kind == "note" and content:
                 notes[content] = None
-            elif kind == "progress" and not self._model.is_deleted:
+            elif kind == "progress" and not self.is_gone:
                 if quick:
                     self.blank()
                 label, done, total = content
                 self._model.set_text(f"{label}: {done} of {total}")
 
+        asked = lever, *at, quick, *self.also_asked()
         try:
-            answer = await self.ask(lever, at, quick, heard)
+            worker, function = self.workers[quick], f"{self.live}:answer"
+            answer = await self.session.ask(worker, function, *asked, heard=heard)
         except HotleverError as error:
-            if not self._model.is_deleted:
+            if not self.is_gone:
                 self.blank()
                 self.banner.say(str(error))
             return False
-        if self._model.is_deleted or (not quick and not self._follower.is_wanted(lever)):
+        if self.is_gone or (not quick and not self._follower.is_wanted(lever)):
             return False  # the tab was closed meanwhile, or sliders have moved on
         self.banner.clear()
         for key, text in texts_of(answer["now"], self.numbers).items():
@@ -235,3 +298,49 @@ def texts_of(now: Mapping[str, Any], numbers: Numbers) -> dict[str, str]:
         key: "none" if math.isnan(now[key]) else form.format(factor * now[key], **now)
         for key, (_, form, factor) in numbers.items()
     }
+
+
+class _Follower:
+    """Has a page follow its sliders: quickly while they move, in full when they rest."""
+
+    def __init__(self, page: LivePage) -> None:
+        self._page = page
+        self._wanted: tuple[Task, list[Any]] | None = None
+        self._last: tuple[Task, list[Any]] | None = None
+        self._settled: Task | None = None
+        self._rests = 0
+        self._busy = False
+
+    def follow(self, lever: Task, at: list[Any]) -> None:
+        """Have a state of a lever shown; only what is wanted last counts."""
+        self._wanted = self._last = lever, at
+        if not self._busy:
+            self._busy = True
+            background_tasks.create(self._follow(), name="live lever")
+
+    def is_wanted(self, lever: Task) -> bool:
+        """Return whether this is still the lever that is wanted."""
+        return self._last is not None and self._last[0] == lever
+
+    async def _follow(self) -> None:
+        try:
+            while self._wanted is not None and not self._page.is_gone:
+                (lever, at), self._wanted = self._wanted, None
+                settled = lever == self._settled
+                await self._page.show(lever, at, not settled)
+                if not settled and self._wanted is None:
+                    self._rests += 1
+                    background_tasks.create(self._settle(lever, at, self._rests), name="full lever")
+        finally:
+            self._busy = False
+
+    async def _settle(self, lever: Task, at: list[Any], turn: int) -> None:
+        """Ask for all once sliders have rested; they may move on meanwhile."""
+        await asyncio.sleep(_REST_S)
+        if turn != self._rests or self._wanted is not None or self._page.is_gone:
+            return
+        if await self._page.show(lever, at, False):
+            self._settled = lever
+            background_tasks.create(self._page.rested(), name="reduced lever")
+            if self._last is not None and self._last != (lever, at):
+                self.follow(*self._last)

@@ -7,7 +7,7 @@ from collections.abc import Awaitable
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.drawn import probe_files
+from hotlever.app.pages.chosen_lever import probe_files
 from hotlever.app.pages.frame import ErrorBanner, caption, figure, text_shown
 from hotlever.app.pages.page import Page
 from hotlever.app.session import Session

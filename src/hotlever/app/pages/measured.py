@@ -5,18 +5,18 @@ A measurement is dropped or chosen; a file is made of it, whose page is shown.
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from nicegui import ui
 
 from hotlever.app.jobs import Job
-from hotlever.app.pages.columns import ColumnPicker
 from hotlever.app.pages.frame import (
     FIGURE_FILES,
+    PAGES,
     ErrorBanner,
     caption,
     drop_zone,
@@ -33,21 +33,30 @@ from hotlever.app.pages.plots import MeasuredPlots
 from hotlever.app.project import DATA, EXAMPLES
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
+from hotlever.measurands import MEASURANDS
 from hotlever.measurement import FileColumn
+from hotlever.measurement.columns import UNUSED, quantity_of
 
 #: What is shown where there is no measurement.
 _EXAMPLE = "lever-a.csv"
 _UNDERSTOOD, _OF_EXAMPLE = "What was understood", f"An example, {_EXAMPLE}, and what it holds"
+#: Units that are offered for a column whose heading has none.
+_UNITS = {
+    "V": ("V", "mV", "uV"),
+    "mA": ("A", "mA", "uA", "nA"),
+    "K": ("K", "degC"),
+    "us": ("s", "ms", "us", "ns"),
+}
 _DROP = "Drop a measurement here (bias, current and what else there is), or press +"
 
 
 class MeasuredPage(Page):
     """A page that begins with a measurement, makes a file of it, and shows that."""
 
-    #: What is made: its kind, and what its name ends with.
-    kind, ending = "", ""
-    #: Of the button that makes it.
-    button, icon = "", ""
+    #: What is made: its kind, what its name ends with, and the folder of those of many levers.
+    kind: ClassVar[str]
+    ending: ClassVar[str]
+    folder: ClassVar[str]
     #: What its task takes of what can be told of a file, see `Session.told_of`.
     tellable: tuple[str, ...] = ("columns",)
 
@@ -61,7 +70,8 @@ class MeasuredPage(Page):
             with left:
                 self._data_controls()
                 self.options()
-                self._button = ui.button(self.button, icon=self.icon, on_click=self.start)
+                title, icon = PAGES[self.name]
+                self._button = ui.button(title, icon=icon, on_click=self.start)
                 # until there is something understood
                 self._button.classes("w-full").disable()
             with right:
@@ -93,10 +103,6 @@ class MeasuredPage(Page):
 
     def understood(self) -> None:
         """Follow what was understood of a measurement."""
-
-    def results(self) -> list[str]:
-        """Return the files that show what was made of this measurement, the first best."""
-        return [self.output]
 
     async def show(self, name: str) -> None:
         """Show a result above its page."""
@@ -226,7 +232,9 @@ class MeasuredPage(Page):
         self._result.clear()
         if not self.chosen["data"] or self.session.jobs.running(self.name):
             return
-        name = next((name for name in self.results() if project.stamp(name)), None)
+        # of this measurement alone, or one among many levers
+        names = self.output, f"{self.folder}/{self.stem}.json"
+        name = next((name for name in names if project.stamp(name)), None)
         if name is None:
             return
         with self._result:
@@ -279,3 +287,98 @@ class _ResultBlocks:
             asked = self._kind, self._name, shown, suffix
             drawn = self._page.session.ask("full", "showing:drawn", *asked)
             await hand_over(drawn, f"{Path(self._name).name.split('.')[0]}-{shown}{suffix}")
+
+
+class ColumnPicker:
+    """Which column is which; `tell` is told the words of ``--column`` for those that are picked.
+
+    Fields stay while the file is read anew: the next one may be open meanwhile.
+    """
+
+    def __init__(self, tell: Callable[[list[str]], Any]) -> None:
+        self._tell = tell
+        self._told: list[str] = []
+        self._columns: dict[str, FileColumn] = {}
+        self._fields: dict[str, tuple[ui.select, ui.select]] = {}
+        opened = ui.expansion("Columns of the file").props("header-class=text-bold")
+        with opened as self._opened:
+            caption("The first values of each, and what it is used as.")
+            self._rows = ui.column().classes("w-full gap-1")
+
+    def show(self, columns: list[FileColumn], told: list[str], is_understood: bool) -> None:
+        """Show the columns of a file; they are open where the file is not understood."""
+        self._told = told
+        self._opened.set_visibility(bool(columns))
+        if not is_understood:
+            self._opened.set_value(True)
+        before = [(column.name, column.heading, column.cells) for column in self._columns.values()]
+        self._columns = {column.name: column for column in columns}
+        if before != [(column.name, column.heading, column.cells) for column in columns]:
+            self._rows.clear()
+            with self._rows:
+                self._fields = {column.name: self._row(column) for column in columns}
+        for column in columns:
+            picked, unit = self._fields[column.name]
+            picked.set_value(column.symbol)
+            has_unit = bool(column.symbol and not column.unit)
+            unit.set_visibility(has_unit)
+            if has_unit:
+                units = list(_UNITS[MEASURANDS[column.symbol].unit])
+                unit.set_options(units, value=self._unit_of(column, units))
+
+    def _row(self, column: FileColumn) -> tuple[ui.select, ui.select]:
+        """Show a column; return the fields of what it is, and of its unit."""
+        name = column.name
+        head = column.heading or f"column {name}"
+        with ui.row().classes("w-full items-center gap-2"):
+            with ui.column().classes("gap-0 col min-w-40"):
+                ui.label(head).classes("text-sm text-bold remark")
+                caption(", ".join(cell or "–" for cell in column.cells)).classes("remark")
+            options = {"": "not used"} | {
+                symbol: f"{symbol}: {'time' if symbol == 't' else measurand.meaning}"
+                for symbol, measurand in MEASURANDS.items()
+            }
+            picked = ui.select(options, value=column.symbol).classes("w-64")
+            picked.props(f'aria-label="Column {name} is"')
+            picked.on_value_change(lambda event: self._pick(name, event.value))
+            unit = ui.select([], label="in").classes("w-24")
+            unit.props(f'aria-label="Unit of column {name}"')
+            unit.on_value_change(lambda event: self._pick_unit(name, event.value))
+        return picked, unit
+
+    def _unit_of(self, column: FileColumn, units: list[str]) -> str | None:
+        """Return the unit that was told of a column, which is offered then."""
+        for text in self._told:
+            quantity, _, name = text.partition("=")
+            if name.strip() == column.name and "(" in quantity:
+                told = quantity.partition("(")[2].rstrip(") ")
+                units += [told] if told not in units else []
+                return told
+        return None
+
+    def _pick(self, name: str, symbol: str, unit: str | None = None) -> Any:
+        """Tell what a column is, and nothing else of it, nor of that quantity."""
+        column = self._columns[name]
+        if symbol == column.symbol and unit is None:
+            return None  # nobody picked it
+        others = [text for text in self._told if not self._is_of(text, name, symbol)]
+        inside = f" ({unit})" if unit else ""  # a unit is not guessed: the reader asks for one
+        own = [f"{symbol}{inside}={name}"]
+        if not symbol:
+            # what was only told to be used is taken back; what the file itself says is not
+            was_told = len(others) < len(self._told)
+            by_itself = quantity_of(column.heading) is not None or not was_told
+            own = [f"{UNUSED}={name}"] if by_itself else []
+        # at once: the next may be picked before the file is read with this
+        self._told = [*others, *own]
+        return self._tell(self._told)
+
+    def _pick_unit(self, name: str, unit: str | None) -> Any:
+        column = self._columns[name]
+        is_new = unit is not None and unit != self._unit_of(column, [])
+        return self._pick(name, column.symbol, unit) if is_new else None
+
+    @staticmethod
+    def _is_of(text: str, name: str, symbol: str) -> bool:
+        quantity, _, heading = text.partition("=")
+        return heading.strip() == name or quantity_of(quantity, assigned=True) == symbol

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
-from typing import Any
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
 
 from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
     ErrorBanner,
+    caption,
+    figure,
     framed,
     hand_over,
     lines_shown,
+    number_shown,
     small_button,
+    text_shown,
 )
 from hotlever.app.session import Session
+from hotlever.app.state import Result
 from hotlever.errors import InputError
 
 REFERENCE = "reference probe"
@@ -307,3 +314,70 @@ class Work:
                 ui.label(f"• {text}")
         if self._during is not None:
             self._during(job)
+
+
+class DrawnPage(Page):
+    """A page, or a part of one, that shows the figure of its task and gives what it computed."""
+
+    #: What the figure shows, and what it may be asked for as.
+    alt = ""
+    kinds: ClassVar[Mapping[str, str]] = {
+        kind: meaning for kind, meaning in KINDS.items() if kind != "VTU"
+    }
+
+    def show_result(self) -> None:
+        """Show the work here, what it drew last, and the command line."""
+        Work(self.session, self.name, self._ended)
+        self._result = ui.column().classes("w-full gap-3")
+        self.command()
+        self._keep_result(self.session.jobs.by_page.get(self.name))
+        self._show()
+
+    async def _ended(self, job: Job) -> None:
+        if self._keep_result(job):
+            self._show()
+        else:
+            await self.give(job)
+
+    def _keep_result(self, job: Job | None) -> bool:
+        """Keep what is to be shown of a job, if it drew that; return whether it did."""
+        if job is None or not job.task.written.endswith(".svg"):
+            return False
+        if self.written(job):
+            stamp = self.session.project.stamp(job.task.written)
+            told = {"numbers": job.shown.get("table", []), "text": job.shown.get("result", "")}
+            self.session.results[self.name] = Result(**vars(job.task), **told, stamp=stamp)
+        return True
+
+    def _show(self) -> None:
+        """Show what was computed last, with the figure that was drawn, and give it."""
+        self._result.clear()
+        result = self.session.results.get(self.name)
+        if result is None:
+            return
+        task = Task(result.command, tuple(result.files), result.options)
+        path, stamp = self.session.project.path(task.written), self.session.project.stamp
+        latest = max(map(stamp, task.files), default=0.0)
+        if stamp(task.written) != result.stamp or latest > result.stamp:
+            return  # it is gone, or another one by now, or of files that have changed since
+        with self._result:
+            if result.numbers:
+                with ui.row().classes("w-full items-end gap-6"):
+                    for title, value in result.numbers:
+                        number_shown(title, title, value)
+            text_shown(result.text)
+            self.show_figure(path)
+            with ui.row().classes("w-full items-center"):
+                caption(task.writing({}).line).classes("remark col min-w-60")
+                self.kind_buttons(partial(self._ask, task, path), self.kinds)
+
+    def show_figure(self, path: Path) -> None:
+        """Show the figure that was drawn."""
+        figure(path.read_text(encoding="utf-8"), self.alt, wide=True)
+
+    def _ask(self, task: Task, path: Path, kind: str) -> None:
+        """Give a file that there is, or have it written."""
+        if kind in ("CSV", "SVG"):
+            ui.download.file(path.with_suffix(f".{kind.lower()}"))
+        else:
+            self.run(task.writing(outputs(path.stem, kind)))

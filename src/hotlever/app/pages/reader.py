@@ -4,14 +4,26 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import numpy as np
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.drawn import probe_files
-from hotlever.app.pages.frame import ErrorBanner
+from hotlever.app.pages.chosen_lever import probe_files
+from hotlever.app.pages.frame import caption
 from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage
-from hotlever.app.pages.reader_plots import ReaderPlots
-from hotlever.app.session import Session
+from hotlever.app.pages.plots import (
+    INK,
+    SHADE,
+    axes,
+    dots,
+    filled,
+    line,
+    outlined,
+    plotted,
+    points,
+    side_by_side,
+)
+from hotlever.colours import BLUE, VERMILION
 
 #: Distances of a table that is written.
 _DISTANCES = 10
@@ -29,11 +41,90 @@ _AT_REST = (
     "the voltage turns with the distance; the files below are of the full lever"
 )
 
+_ABOUT = (
+    "From the side, heights to a scale of their own; each piece of the lever in the colour of its "
+    "hottest place. The dashed line is the distance."
+)
+#: Plots by distance: title, column, factor, and whether the axis is logarithmic.
+_CURVES = (
+    ("voltage (V)", "reader_V", 1.0, False),
+    ("|d ln R/dz| (10<sup>−4</sup>/nm)", "dlnR_dz_per_um", 10.0, True),
+    ("resolution (pm/√Hz)", "resolution_nm_per_rtHz", 1e3, True),
+)
+#: Values that are named on logarithmic axes.
+_TICKS = [float(f"{digit}e{power}") for power in range(-6, 7) for digit in (1, 2, 5)]
+#: Share of the lever's length, and of the height, that is shown around it.
+_AROUND, _ABOVE = 0.04, 0.25
+
+
+class ReaderPlots:
+    """A lever over a surface from the side, and what it reads by the distance.
+
+    `show` is given the answers of `hotlever.app.approaching`.
+    """
+
+    def __init__(self) -> None:
+        layout = axes("along the lever (µm)", "height (µm)", 260, normal="xy")
+        layout["xaxis"]["showgrid"] = layout["yaxis"]["showgrid"] = False
+        alt = "The lever from the side, coloured by temperature, over the surface"
+        self._picture = plotted([line(INK), line(VERMILION, dash="dash")], layout, alt)
+        caption(_ABOUT)
+        self._curves: list[ui.plotly] = []
+        ticks = {"tickvals": _TICKS, "ticktext": [f"{value:g}" for value in _TICKS]}
+        with side_by_side():
+            for title, _, _, by_decades in _CURVES:
+                layout = axes("distance to the surface (µm)", title, 250, normal="xy")
+                for axis in ("xaxis", "yaxis")[: 1 + by_decades]:
+                    layout[axis] |= {"type": "log", **ticks}
+                traces = [line(BLUE), dots(VERMILION, 10)]
+                self._curves.append(plotted(traces, layout, f"{title} by distance"))
+
+    def show(self, answer: dict[str, Any]) -> None:
+        """Draw an answer."""
+        self._draw(answer)
+        for plot, (_, key, factor, by_decades) in zip(self._curves, _CURVES, strict=True):
+            for number, columns in enumerate((answer["curves"], answer["now"])):
+                values = factor * np.asarray(columns[key])
+                values = np.abs(values) if by_decades else values
+                plot.figure["data"][number] |= points(columns["surface_gap_um"], values)
+            plot.update()
+
+    def _draw(self, answer: dict[str, Any]) -> None:
+        """Draw lever, tip and surface from the side."""
+        start, at_tip, end = answer["ends"]
+        thick, gap = answer["thickness_um"], answer["now"]["surface_gap_um"]
+        shapes = []
+        edges = np.linspace(start, end, len(answer["colours"]) + 1)
+        for left, colour in zip(edges.tolist(), answer["colours"], strict=False):
+            # the next one is drawn over what is beyond, so that no gap shows between them
+            box = [(left, 0.0), (end, 0.0), (end, thick), (left, thick)]
+            shapes.append(filled(box, colour))
+        outline = [(start, 0.0), (end, 0.0), (end, thick), (start, thick)]
+        if answer["tip"] is not None:
+            height, radius = answer["tip"]
+            cone = [(at_tip - radius, 0.0), (at_tip + radius, 0.0), (at_tip, -height)]
+            shapes.append(filled(cone, INK))
+        margin = _AROUND * (end - start)
+        sides = np.array([start - margin, end + margin])
+        surface = -gap + answer["slope"] * (sides - at_tip)
+        low = float(surface.min())
+        bottom = low - _ABOVE * (thick - low)
+        corners = [*zip(sides.tolist(), surface.tolist(), strict=True)]
+        below = [*corners, (sides[1], bottom), (sides[0], bottom)]
+        shapes += [filled(below, SHADE.format(0.35)), outlined(outline)]
+        figure = self._picture.figure
+        figure["layout"]["shapes"] = shapes
+        figure["layout"]["xaxis"]["range"] = sides.tolist()
+        figure["layout"]["yaxis"]["range"] = [bottom, thick + _ABOVE * (thick - low)]
+        figure["data"][0] |= points(sides, surface)
+        figure["data"][1] |= points([at_tip, at_tip], [0.0, -gap])
+        self._picture.update()
+
 
 class ReaderPage(LivePage):
     """One tab of the page."""
 
-    name, live = "reader", "approaching"
+    name, live, plots_of = "reader", "approaching", ReaderPlots
     # levers at some distances are kept in one process, which answers from them
     workers = "quick", "quick"
     numbers: ClassVar = {
@@ -46,9 +137,6 @@ class ReaderPage(LivePage):
         "tip_K": ("tip", "{:.1f} K", 1.0),
     }
     state = ("distance_um",)
-
-    def __init__(self, session: Session, banner: ErrorBanner) -> None:
-        super().__init__(session, banner, ReaderPlots)
 
     def controls(self) -> None:
         """Ask for tilt and accommodation, of which each value needs other levers."""
@@ -80,22 +168,18 @@ class ReaderPage(LivePage):
         """Return the command of the reader at the bias, whatever the distance."""
         nearest, farthest = self.of_file["nearest_um"], self.of_file["farthest_um"]
         tilt, accommodation = self.chosen["tilt_deg"], self.chosen["accommodation"]
-        changes = [f"surface_gap_um={nearest:.12g}"] if tilt is not None else []
-        changes += [] if tilt is None else [f"surface_tilt_deg={tilt:.12g}"]
-        changes += [] if accommodation is None else [f"accommodation={accommodation:.12g}"]
+        changes = {} if tilt is None else {"surface_gap_um": nearest, "surface_tilt_deg": tilt}
+        if accommodation is not None:
+            changes["accommodation"] = accommodation
         options = {
             "distance": f"{nearest:.12g}um:{farthest:.12g}um:{_DISTANCES}",
             "medium": "air",
-            "set": changes,
+            "set": [f"{name}={value:.12g}" for name, value in changes.items()],
             "amplifier": f"{self.chosen['amplifier_nV']:.12g}nV",
             "hooge": self.chosen["hooge"] or None,
             "bias": f"{self.chosen['bias']:.12g}V",
         }
         return Task("reader", probe_files(self.chosen), options)
-
-    def of_table(self, kind: str) -> dict[str, Any]:
-        """Return nothing more: the table is of all distances."""
-        return {}
 
     def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return whose numbers these are, and where they are read."""

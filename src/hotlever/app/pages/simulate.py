@@ -2,28 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.beside import NOW, NUMBERS, PlotsWithBeside, options_beside
-from hotlever.app.pages.drawn import in_python, sweep_of
-from hotlever.app.pages.frame import ErrorBanner, flat_button
-from hotlever.app.pages.live_page import LivePage
+from hotlever.app.pages.chosen_lever import (
+    NOW,
+    beside_in_words,
+    in_python,
+    lever_beside,
+    options_beside,
+    sweep_of,
+)
+from hotlever.app.pages.driven import Pulses, SmallSignals
+from hotlever.app.pages.frame import flat_button
+from hotlever.app.pages.live_page import LivePage, texts_of
 from hotlever.app.pages.page import KINDS
-from hotlever.app.pages.pulses import Pulses
-from hotlever.app.pages.small_signals import SmallSignals
-from hotlever.app.session import Session
-from hotlever.app.workers import Heard
+from hotlever.app.pages.plots import LivePlots
 from hotlever.errors import HotleverError, InputError
 from hotlever.lever.set_points import HELD
 from hotlever.materials.parameters import label
 from hotlever.probe.physics import Physics
 from hotlever.tasks.ranges import parse_set_points
 
+#: Numbers of a state, those of the lever beside too.
+_NUMBERS = {
+    "tip_K": ("tip", "{:.1f} K", 1.0),
+    "current_mA": ("current I_h", "{:.4f} mA", 1.0),
+    "lever_V": ("lever voltage V_l", "{:.4f} V", 1.0),
+    "power_mW": ("power P_l", "{:.4f} mW", 1.0),
+    "reader_V": ("reader V_r", "{:.4f} V", 1.0),
+}
 #: Biases of a sweep that is written.
 _BIASES = 49
 #: What surrounds a lever: each combination gets a reduced lever of its own.
@@ -44,15 +55,10 @@ _GROUPS = {"material": "Material", "dimensions": "Dimensions", "circuit": "Circu
 class SimulatePage(LivePage):
     """One tab of the page."""
 
-    name, live = "simulate", "live"
-    numbers = NUMBERS | {"knee": ("knee of the I-V curve", "{:.0f} K, {knee_V:.3f} V", 1.0)}
+    name, live, plots_of = "simulate", "live", LivePlots
+    numbers = _NUMBERS | {"knee": ("knee of the I-V curve", "{:.0f} K, {knee_V:.3f} V", 1.0)}
     state = ("bias", "most")
     kinds = KINDS
-
-    def __init__(self, session: Session, banner: ErrorBanner) -> None:
-        #: What may change without another reduced lever.
-        self._free = set[str]()
-        super().__init__(session, banner, lambda: PlotsWithBeside(self))
 
     # --- what is shown ----------------------------------------------------------------------------
 
@@ -61,12 +67,12 @@ class SimulatePage(LivePage):
         self._shown_of = self.chosen["probe"], self.chosen["beside"]
         self.choice("beside", "Compare with", options_beside(self.session.project.probes))
 
-    def results(self, plots: Callable[[], PlotsWithBeside]) -> None:
+    def results(self) -> None:
         """Show the lever at a bias, in time, or under small signals."""
         self._view = ui.toggle(_VIEWS, value=self.chosen["view"])
         self._view.props('aria-label="What is shown"').on_value_change(self._viewed)
         with ui.column().classes("w-full gap-3 parts") as rest:
-            super().results(plots)
+            super().results()
         with ui.column().classes("w-full gap-3 last") as time:
             self._pulses = Pulses(self.session, self.banner, self.chosen)
         with ui.column().classes("w-full gap-3") as signals:
@@ -107,7 +113,8 @@ class SimulatePage(LivePage):
         self._of_probe = probe
         values = {name: value for group in _GROUPS for name, value, *_ in probe["sliders"][group]}
         of_material = {name for name, *_ in probe["sliders"]["material"]}
-        self._free = of_material | {"series_resistance_ohm"} if probe["reduced"] else set()
+        #: What may change without another reduced lever; nothing if there can be none.
+        self._free = of_material | {"series_resistance_ohm"} if probe["reduced"] else set[str]()
         return {**values, **probe["around"]}
 
     def show_sliders(self) -> None:
@@ -160,18 +167,29 @@ class SimulatePage(LivePage):
         """Return the command of a sweep, whatever the biases."""
         return sweep_of(self.chosen)
 
-    async def ask(self, lever: Task, at: list[float], quick: bool, heard: Heard) -> dict[str, Any]:
-        """Return what a lever shows at a bias, by the reduced lever of its geometry if need be."""
-        reduced = self.session.reduced.get(self._geometry(), False)
-        return await super().ask(lever, at, quick, heard, reduced)
+    def also_asked(self) -> tuple[bool]:
+        """Return whether the reduced lever of the geometry has been made."""
+        return (self.session.reduced.get(self._geometry(), False),)
 
     def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return of which lever the numbers are."""
         return _MODELS[answer["model"]], ""
 
     async def shown(self, at: list[float], quick: bool) -> None:
-        """Show the lever beside."""
-        await self.plots.show_beside(at, quick)
+        """Show the lever beside, once the other rests."""
+        lever, answer, text = lever_beside(self.chosen), None, ""
+        if lever is not None and not quick:
+            text = f"Dashed: {beside_in_words(self.chosen)}"
+            try:
+                asked = sweep_of(lever), *at, False
+                answer = await self.session.ask("beside", "live:answer", *asked)
+                texts = texts_of(answer["now"], _NUMBERS)
+                text += ": " + ", ".join(f"{_NUMBERS[key][0]} {texts[key]}" for key in texts)
+            except HotleverError as error:
+                text = f"{text}: {error}"
+            if self.is_gone or lever != lever_beside(self.chosen):
+                return
+        self.plots.beside(answer, text)
 
     def _geometry(self) -> Any:
         """Return what a reduced lever belongs to."""

@@ -1,10 +1,11 @@
-"""Layers and materials of a probe file as fields, each with what is wrong with it."""
+"""The probe file that is open: its text, its file, and what can be set in it as fields."""
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Awaitable, Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from nicegui import ui
@@ -21,8 +22,13 @@ from hotlever.app.edits import (
     with_material_renamed,
     with_value,
 )
-from hotlever.app.pages.frame import caption, flat_button
+from hotlever.app.pages.frame import asked, caption, flat_button
 from hotlever.app.pages.page import Page
+from hotlever.app.project import LARGEST_PROBE, safe_name
+from hotlever.errors import InputError
+from hotlever.files import read_text
+from hotlever.probe import Probe
+from hotlever.tasks.design_requests import NEW_PROBES
 
 _ROLES = {"": "not used", "body": "outline of the lever", FILM: "film or part"}
 _ROLES |= {name: f"terminal: {name}" for name in TERMINALS}
@@ -31,6 +37,94 @@ _LAWS = (
     "A property is a number, a formula of T in K such as 0.032*(T/300)**-1.2, or the name of a "
     "table (CSV) in the folder; drop tables above. Grey: what counts where nothing is said."
 )
+
+
+class ProbeFile:
+    """The text of a probe file that is edited, and the file of its name: no edits are lost.
+
+    What is chosen of it on the page is told by `hotlever.app.state.Lever`.
+    """
+
+    def __init__(self, page: Page) -> None:
+        self._session, self._chosen = page.session, page.chosen
+
+    @property
+    def _is_saved(self) -> bool:
+        return _digest(self._chosen["text"]) == self._chosen["saved"]
+
+    def open(self, name: str) -> str:
+        """Read a file of the project; return its text.
+
+        Raises
+        ------
+        InputError
+            If it is no text file, or too large for a probe file.
+        """
+        text = read_text(self._session.project.path(name), largest=LARGEST_PROBE)
+        self._chosen |= {"name": name, "text": text, "saved": _digest(text)}
+        return text
+
+    def take_up(self) -> None:
+        """Take the file as it is now, unless it was edited here: others may have changed it.
+
+        Raises
+        ------
+        InputError
+            As `open`.
+        """
+        name = self._chosen["name"]
+        if self._chosen["text"] and self._is_saved and self._session.project.stamp(name):
+            self.open(name)
+
+    async def may_go(self) -> bool:
+        """Ask whether edits that are not saved may go, if there are any."""
+        text = self._chosen["text"]
+        if not text or self._is_saved or text in map(new_probe, NEW_PROBES):
+            return True
+        question = "The probe file that is open here has edits that are not saved."
+        return await asked(question, "Drop them", "Go on with it")
+
+    async def save(self, name: str, text: str) -> str | None:
+        """Write a text; ask before another file of its name is replaced.
+
+        Returns
+        -------
+        str or None
+            The name that it has now; None if it was not to be written.
+
+        Raises
+        ------
+        InputError
+            If there is nothing to be written, or what is there is no probe file.
+        """
+        if not text.strip():
+            raise InputError("there is no probe here yet: drop a drawing, or choose a shape")
+        project = self._session.project
+        name = safe_name(name)
+        name = name if name.endswith(".toml") else f"{name}.toml"
+        path = project.path(name)
+        there = read_text(path, largest=LARGEST_PROBE) if path.exists() else None
+        if there not in (None, text):
+            is_own = name == self._chosen["name"] and _digest(there) == self._chosen["saved"]
+            question = f"{name} is there already, and holds something else than was opened here."
+            if not is_own and not await asked(question, "Replace it", "Keep it"):
+                return None
+        if there != text:
+            project.write(name, text, f"saved {name}")
+        self._chosen |= {"name": name, "saved": _digest(text)}
+        return name
+
+
+@cache
+def new_probe(shape: str) -> str:
+    """Return the probe file that a parametric shape begins with."""
+    probe: Probe = getattr(Probe, NEW_PROBES[shape])()
+    return probe.to_toml()
+
+
+def _digest(text: str | None) -> str:
+    """Return what tells whether a text is as it was."""
+    return "" if text is None else hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()
 
 
 class ProbeFields:

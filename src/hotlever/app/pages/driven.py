@@ -1,20 +1,29 @@
-"""The lever of the page Simulate in time: a pulse, a train of pulses or a step, simulated."""
+"""The lever of the page Simulate in time, under a wave form, and under small signals."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
+from operator import contains
 from pathlib import Path
 from typing import Any, ClassVar
 
 from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
-from hotlever.app.pages.beside import beside_in_words, lever_beside
-from hotlever.app.pages.drawn import DrawnPage, in_python, probe_files, result_of, settings, stem
+from hotlever.app.pages.chosen_lever import (
+    beside_in_words,
+    in_python,
+    lever_beside,
+    probe_files,
+    settings,
+    stem,
+)
 from hotlever.app.pages.frame import ErrorBanner, caption, figure
-from hotlever.app.pages.page import KINDS, Work, outputs
+from hotlever.app.pages.page import KINDS, DrawnPage, Work, outputs
 from hotlever.app.pages.plots import compare_histories
 from hotlever.app.session import Session
+from hotlever.app.state import Result
 from hotlever.errors import InputError
 
 _KINDS = {"pulse": "one pulse", "train": "several pulses", "step": "a step that stays"}
@@ -29,6 +38,10 @@ _FIELDS: dict[str, tuple[str, str, tuple[str, ...], str]] = {
 #: Options of a task that say how a lever is driven, and the name of the work on the lever beside.
 _WAVE = ("pulse", "step", "period", "count", "until")
 _BESIDE = "pulse-beside"
+_ABOUT_SIGNALS = (
+    "Impedance at the bias of the lever, and how its tip follows power and bias; with an amplitude "
+    "the harmonics of the lever voltage (3ω method)."
+)
 
 
 class Pulses(DrawnPage):
@@ -48,24 +61,11 @@ class Pulses(DrawnPage):
                 ui.space()
                 ui.button("Follow", icon="timeline", on_click=self.start)
             with ui.row().classes("w-full items-center"):
-                self._fields = {key: self._field(key) for key in _FIELDS}
+                for key, (label, unit, kinds, empty) in _FIELDS.items():
+                    field = self.number(key, label, unit, empty)
+                    field.bind_visibility_from(kind, "value", backward=partial(contains, kinds))
         Work(session, _BESIDE, self._beside_ended)
         self.show_result()
-        self._offer()
-
-    def _field(self, key: str) -> ui.number:
-        label, unit, _, empty = _FIELDS[key]
-        return self.number(key, label, unit, empty)
-
-    def changed(self) -> None:
-        """Follow what was chosen of the wave form."""
-        self._offer()
-        self.show_command()
-
-    def _offer(self) -> None:
-        """Show the fields that the wave form has."""
-        for key, field in self._fields.items():
-            field.set_visibility(self.chosen["kind"] in _FIELDS[key][2])
 
     def _values(self) -> dict[str, str]:
         """Return what is set of the wave form.
@@ -108,8 +108,8 @@ class Pulses(DrawnPage):
             task = self._task(other, outputs(f"{stem(self._lever)}.beside.pulse", "CSV"))
             with self.banner.caught():
                 self.session.jobs.start(_BESIDE, task)
-                words = beside_in_words(self._lever)
-                self.session.results[_BESIDE] = result_of(task, [("Dashed", words)], 0.0)
+                numbers = [("Dashed", beside_in_words(self._lever))]
+                self.session.results[_BESIDE] = Result(**vars(task), numbers=numbers, stamp=0.0)
         return started
 
     def python(self) -> str:
@@ -117,9 +117,8 @@ class Pulses(DrawnPage):
         values, form = self._values(), "step" if self.chosen["kind"] == "step" else "pulse"
         until = f", until={values.pop('until')}" if "until" in values else ""
         last = f"history = simulate(lever, {form}({', '.join(values.values())}){until})"
-        return in_python(
-            self._lever, last, f"from hotlever.lever.transient import {form}, simulate"
-        )
+        imported = f"from hotlever.lever.transient import {form}, simulate"
+        return in_python(self._lever, last, imported)
 
     def show_figure(self, path: Path) -> None:
         """Show the figure that was drawn, and the film of it if there is one."""
@@ -159,3 +158,56 @@ class Pulses(DrawnPage):
             self._show()
         else:
             await super()._ended(job)
+
+
+class SmallSignals(DrawnPage):
+    """What the lever shows under small signals, or its harmonics, as `hotlever spectrum` does."""
+
+    name = "signals"
+    alt = "Impedance, and how the tip follows, against the frequency"
+
+    def __init__(self, session: Session, banner: ErrorBanner, lever: dict[str, Any]) -> None:
+        super().__init__(session, banner)
+        self._lever = lever
+        with ui.card().classes("w-full").props("flat bordered"):
+            caption(_ABOUT_SIGNALS)
+            with ui.row().classes("w-full items-center"):
+                self.number("lowest_Hz", "From", "Hz")
+                self.number("highest_Hz", "to", "Hz")
+                self.number("count", "Frequencies")
+                self.number("amplitude_V", "Amplitude", "V", "small")
+                ui.space()
+                ui.button("Respond", icon="graphic_eq", on_click=self.start)
+        self.show_result()
+
+    def _range(self) -> list[str]:
+        values = [self.chosen[key] for key in ("lowest_Hz", "highest_Hz", "count")]
+        if None in values:
+            raise InputError("frequencies: expected lowest, highest and their count")
+        return [f"{value:.12g}" for value in values]
+
+    def task(self) -> Task:
+        """Return the task that writes table and figure."""
+        low, high, count = self._range()
+        amplitude = self.chosen["amplitude_V"]
+        options = {
+            "bias": f"{self._lever['bias']:.12g}",
+            "frequency": f"{low}Hz:{high}Hz:{count}",
+            "amplitude": "" if amplitude is None else f"{amplitude:.12g}",
+        }
+        files = outputs(f"{stem(self._lever)}.spectrum", "SVG")
+        probe = probe_files(self._lever)
+        return Task("spectrum", probe, {**options, **settings(self._lever), **files})
+
+    def python(self) -> str:
+        """Return the lines of Python that do the same."""
+        low, high, count = self._range()
+        bias, swing = self._lever["bias"], self.chosen["amplitude_V"]
+        frequencies = f"np.geomspace({low}, {high}, {count})"
+        function, call = "spectrum", f"spectrum(lever.solve([{bias:.12g}])[0], {frequencies})"
+        if swing is not None:
+            function = "harmonics"
+            call = f"harmonics(lever, {bias:.12g}, {swing:.12g}, {frequencies})"
+        module = "hotlever.lever.transient.frequency_domain"
+        imports = "import numpy as np", f"from {module} import {function}"
+        return in_python(self._lever, f"response = {call}", *imports)
