@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from hotlever.app import access
-from hotlever.app.access import Access
+from hotlever.app import server
+from hotlever.app.server import Access
 
 TOKEN, LARGEST = "t0ken", 1000
 
@@ -108,7 +108,7 @@ def test_a_request_that_says_it_is_too_large_is_refused(length: str) -> None:
 
 
 def test_a_request_that_grows_too_large_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(access, "_FORM", 0)
+    monkeypatch.setattr(server, "_FORM", 0)
     same = gate()
     cookie = ask("/", f"token={TOKEN}", gate=same)[1]["set-cookie"].split(";")[0]
     assert ask(gate=same, cookie=cookie, body=bytes(LARGEST))[0] == 200
@@ -116,7 +116,7 @@ def test_a_request_that_grows_too_large_is_cut_off(monkeypatch: pytest.MonkeyPat
 
 
 def test_others_need_the_password(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(access, "_WRONG_S", 0.0)
+    monkeypatch.setattr(server, "_WRONG_S", 0.0)
     same = gate("long enough")
     status, _, page = ask("/", f"token={TOKEN}", gate=same)
     assert status == 401

@@ -14,10 +14,9 @@ from nicegui.testing import User
 from test_app_pages import drop, shown, until, visit
 
 from hotlever.app import live
-from hotlever.app.history import CHOICES, SCHEMA
 from hotlever.app.pages.page import MEDIA
 from hotlever.app.project import EXAMPLES, Project
-from hotlever.app.session import Session
+from hotlever.app.session import CHOICES, SCHEMA, Session
 from hotlever.probe import Probe
 
 

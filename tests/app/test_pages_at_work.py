@@ -18,13 +18,12 @@ from nicegui.testing import User
 from test_app_pages import Here, shown, until, visit
 
 from hotlever.app import showing
-from hotlever.app.jobs import Job, Task
+from hotlever.app.jobs import Job, Task, run
 from hotlever.app.pages.driven import Pulses
 from hotlever.app.pages.frame import ErrorBanner
 from hotlever.app.project import EXAMPLES
 from hotlever.app.session import Session
 from hotlever.app.state import Simulate
-from hotlever.app.work import run
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.calibration.power_law import EQ12
 from hotlever.calibration.procedure import calibrate

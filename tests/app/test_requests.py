@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 import typer
 
-from hotlever.app.jobs import Task
-from hotlever.app.work import request_of
+from hotlever.app.jobs import Task, request_of
 from hotlever.cli.commands import command_line
 from hotlever.errors import HotleverError
 from hotlever.tasks.commands import Command

@@ -13,9 +13,8 @@ from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import LENGTH, shown, until, visit
 
-from hotlever.app import history as history_module
-from hotlever.app.history import CHOICES, History
-from hotlever.app.session import Session
+from hotlever.app import session as session_module
+from hotlever.app.session import CHOICES, History, Session
 from hotlever.app.state import Result
 
 
@@ -50,7 +49,7 @@ def test_steps_are_undone_and_redone_in_the_dictionaries_that_pages_hold(tmp_pat
 
 def test_a_slider_that_moves_is_one_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr(history_module.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(session_module.time, "monotonic", lambda: now[0])
     state = History(tmp_path)
     for bias in (6.0, 6.1, 6.2, 6.3):
         now[0] += 1.0
@@ -128,7 +127,7 @@ def test_results_are_there_after_a_restart_and_are_not_undone(tmp_path: Path) ->
 
 
 def test_the_oldest_steps_are_forgotten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(history_module, "_MOST", 4)
+    monkeypatch.setattr(session_module, "_MOST", 4)
     state = History(tmp_path)
     for step in range(10):
         moved(state, "fit", priors=f"{step}", robust=bool(step % 2), drift=step % 4 > 1)
@@ -137,7 +136,7 @@ def test_the_oldest_steps_are_forgotten(tmp_path: Path, monkeypatch: pytest.Monk
     while state.step(-1):
         steps += 1
     assert steps == 3
-    monkeypatch.setattr(history_module, "_MOST_TEXT", 1000)
+    monkeypatch.setattr(session_module, "_MOST_TEXT", 1000)
     moved(state, "lever", text="x" * 2000)  # longer than all may be: it is kept alone
     assert len(json.loads((tmp_path / CHOICES).read_text())["history"]) == 1
 

@@ -2,5 +2,5 @@
 
 Nothing is computed here. Commands run in processes of their own, exactly as the command line runs
 them; what a slider moves is read from a lever in another process (`live`). `project` is the folder
-that both share with the command line, `rooms` are the pages.
+that both share with the command line, `pages` what is shown.
 """

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from hotlever.air.chip import BaseLine
-from hotlever.app.jobs import Task
+from hotlever.app.jobs import Task, probe_of, request_of
 from hotlever.app.live import coloured
-from hotlever.app.work import probe_of, request_of
 from hotlever.app.workers import Report
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever import Branch, Lever

@@ -1,4 +1,8 @@
-"""What pages have done: tasks, one at a time for each page, each in a process of its own."""
+"""What pages have done: tasks, one at a time for each page, each in a process of its own.
+
+The options of a task have the names and texts that the command line has. What is done in the
+process is said here too: `run`, and what else takes a task there.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +14,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from hotlever.app.workers import Worker
-from hotlever.errors import HotleverError
+from pydantic import TypeAdapter, ValidationError
+
+from hotlever.app.changes import Changes
+from hotlever.app.workers import Report, Worker
+from hotlever.errors import HotleverError, InputError
+from hotlever.probe import Probe
 from hotlever.tasks.commands import COMMANDS
 
 Standing = Literal["running", "done", "failed", "cancelled"]
@@ -184,7 +192,7 @@ class Jobs:
 
     async def _run(self, page: str, job: Job, worker: Worker) -> None:
         try:
-            await worker.call("hotlever.app.work:run", job.task, heard=job.hear)
+            await worker.call("hotlever.app.jobs:run", job.task, heard=job.hear)
             job.end("failed" if job.message else "done")
         except HotleverError as error:
             # what was reached may be written; the message says where it stopped
@@ -202,3 +210,47 @@ class Jobs:
         if self.running(page):
             self.by_page[page].end("cancelled")
             await self._workers[page].end()
+
+
+# --- in the process -------------------------------------------------------------------------------
+
+
+def run(report: Report, task: Task) -> None:
+    """Do a task; what it writes can be undone.
+
+    Raises
+    ------
+    HotleverError
+        If it cannot be done, or only in part.
+    """
+    request = request_of(task)
+    with Changes(Path()).recorded(task.line):
+        COMMANDS[task.command].do(report, request)
+
+
+def request_of(task: Task) -> Any:
+    """Return the request of a task.
+
+    Raises
+    ------
+    InputError
+        As the command line says, if a value is not of its option's type.
+    """
+    command, options = COMMANDS[task.command], task.given
+    switched_off = [name for name in options if name.startswith("no_")]
+    options |= {name.removeprefix("no_"): not options.pop(name) for name in switched_off}
+    if task.files:
+        (argument,) = command.arguments
+        several = "list" in str(argument.type)
+        options[argument.name] = list(task.files) if several else task.files[0]
+    try:
+        return TypeAdapter(command.request).validate_python(options)
+    except ValidationError as error:
+        (first, *_) = error.errors()
+        name = str(first["loc"][0]).replace("_", "-")
+        raise InputError(f"Invalid value for '--{name}': {first['msg']}") from None
+
+
+def probe_of(name: str | None) -> Probe:
+    """Return the probe of a file, the reference probe where none is named."""
+    return Probe.reference() if name is None else Probe.from_file(name)

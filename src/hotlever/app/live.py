@@ -19,8 +19,7 @@ from matplotlib import colormaps
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from hotlever.app.jobs import Task
-from hotlever.app.work import probe_of, request_of
+from hotlever.app.jobs import Task, probe_of, request_of
 from hotlever.app.workers import Report
 from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError

@@ -19,8 +19,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hotlever import figures
+from hotlever.app.jobs import probe_of
 from hotlever.app.project import CALIBRATIONS, file_stamp
-from hotlever.app.work import probe_of
 from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.levers import calibration_rows, compare_calibrations

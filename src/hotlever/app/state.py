@@ -1,6 +1,6 @@
 """The state of a project: the record of all that is chosen on its pages, and of results.
 
-`Choices` is a step of its history (`hotlever.app.history`). What pages have chosen as at first is
+`Choices` is a step of its history (`hotlever.app.session`). What pages have chosen as at first is
 its defaults.
 """
 

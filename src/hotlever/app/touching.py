@@ -13,9 +13,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from hotlever.app.jobs import Task
+from hotlever.app.jobs import Task, probe_of, request_of
 from hotlever.app.live import coloured
-from hotlever.app.work import probe_of, request_of
 from hotlever.app.workers import Report
 from hotlever.contact.law import INTERFACE
 from hotlever.contact.picture import contact_picture
