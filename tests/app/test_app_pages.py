@@ -19,7 +19,7 @@ from nicegui import ui
 from nicegui.testing import User, user_simulation
 from PIL import Image
 
-from hotlever.app import approaching, fields, live, showing, spectra, touching
+from hotlever.app import approaching, live, probe_files, showing, touching
 from hotlever.app.jobs import Jobs, Task
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.server import add_pages
@@ -47,7 +47,7 @@ class Here(Report):
         self.sent.append((kind, content))
 
     async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
-        modules = {"fields": fields, "live": live, "showing": showing, "spectra": spectra}
+        modules = {"live": live, "probe_files": probe_files, "showing": showing}
         modules |= {"touching": touching, "approaching": approaching}
         module = modules[function.split(":")[0].split(".")[-1]]
         self.sent = []

@@ -17,7 +17,7 @@ from nicegui.testing.user_interaction import UserInteraction
 from test_app_pages import LENGTH, drop, shown, until, visit
 from test_pages_at_work import at_once
 
-from hotlever.app import showing
+from hotlever.app import probe_files
 from hotlever.app.project import EXAMPLES
 from hotlever.app.session import Session
 
@@ -174,13 +174,13 @@ def test_what_nobody_typed_is_drawn_once(tmp_path: Path, monkeypatch: pytest.Mon
     # the picture would be drawn again, without what the drawing holds
     monkeypatch.chdir(tmp_path)
     drawn: list[str] = []
-    draw = showing.probe_of_text
+    draw = probe_files.drawn_text
 
     def counted(*arguments: Any) -> Any:
         drawn.append(arguments[2])
         return draw(*arguments)
 
-    monkeypatch.setattr(showing, "probe_of_text", counted)
+    monkeypatch.setattr(probe_files, "drawn_text", counted)
 
     async def story(user: User, session: Session) -> None:
         at_once(session)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from hotlever.app.edits import LayerRow, with_layer, with_material_renamed, with_value
-from hotlever.app.fields import settable
+from hotlever.app.probe_files import settable
 from hotlever.app.project import EXAMPLES
 from hotlever.app.workers import Report
 from hotlever.errors import InputError

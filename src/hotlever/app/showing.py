@@ -6,29 +6,28 @@ The figures are those of `hotlever.figures`, the pages those of `hotlever.report
 from __future__ import annotations
 
 import io
-import re
-import tempfile
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hotlever import figures
-from hotlever.app.jobs import probe_of
+from hotlever.app.jobs import Task, probe_of, request_of
+from hotlever.app.probe_files import figure_file, svg
 from hotlever.app.project import CALIBRATIONS, file_stamp
 from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.levers import calibration_rows, compare_calibrations
 from hotlever.calibration.table import interpolated
-from hotlever.errors import InputError
+from hotlever.errors import HotleverError, InputError
 from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
-from hotlever.lever.meshing import chosen_space
 from hotlever.lever.transient.waveform_texts import waveform_from_text
 from hotlever.measurands import FITTED
 from hotlever.measurement import (
@@ -38,21 +37,23 @@ from hotlever.measurement import (
     read_measurement,
     read_measurement_of,
 )
-from hotlever.probe import Layout, Probe
-from hotlever.probe.file_sections import read_sections
-from hotlever.probe.shapes import PARAMETRIC
-from hotlever.raman import read_spectra
+from hotlever.raman import measure, read_lines, read_spectra
+from hotlever.raman.lineshape import WINDOW, in_window
+from hotlever.raman.reading import read_file, spectrum_files
+from hotlever.raman.series import Line
+from hotlever.raman.spectrum import Spectrum
 from hotlever.report.budget_pages import budget_page
 from hotlever.report.calibration_pages import calibration_page
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.page import Block, Page
+from hotlever.tasks.reporter import Silence
+from hotlever.tasks.thermometry import set_up
+from hotlever.types import Array
 
 #: Results kept, whose figures may be asked for as files.
 _KEPT = 4
-#: No part of a drawing of a probe lies beyond (µm).
-_DRAWABLE_UM = 1e5
-#: Points of a measurement that are shown.
-_POINTS = 1000
+#: Points of a measurement that are shown, and of the curve that is fitted to a spectrum.
+_POINTS, _FINE = 1000, 800
 #: Names of columns that all tables have which hotlever writes of levers.
 _OF_RESULTS = {"bias_V", "current_mA", "lever_V", "tip_K", "power_mW"}
 
@@ -118,7 +119,7 @@ def page(report: Report, kind: str, name: str) -> None:
     """Send the blocks of the page of a result, a fit or a calibration, as they are drawn."""
 
     def send(block: Block) -> None:
-        drawing = {"figure": _svg(block["figure"])} if block["kind"] == "figure" else {}
+        drawing = {"figure": svg(block["figure"])} if block["kind"] == "figure" else {}
         report.send("block", {**block, **drawing})
 
     _page(kind, Path(name), send)
@@ -128,7 +129,7 @@ def drawn(report: Report, kind: str, name: str, figure: str, suffix: str) -> byt
     """Return a figure of a result as the content of a file."""
     blocks = _page(kind, Path(name)).blocks
     made = next(block["figure"] for block in blocks if block.get("name") == figure)
-    return _file(made, suffix)
+    return figure_file(made, suffix)
 
 
 def budget(report: Report, name: str) -> bytes:
@@ -176,26 +177,6 @@ def settings(report: Report, name: str, along: str, value: float) -> dict[str, f
     return {**row, "bias_V": bias, **({along: value} if along != "bias_V" else {})}
 
 
-def probe_of_text(report: Report, text: str, title: str, mesh: bool = False) -> dict[str, Any]:
-    """Return the drawing of a probe file that is being written."""
-    with tempfile.NamedTemporaryFile("w", suffix=".toml", dir=".", prefix=".hotlever-") as file:
-        file.write(text)
-        file.flush()
-        try:
-            probe = Probe.from_file(file.name)
-        except InputError as error:
-            fault = str(error).replace(file.name, title)
-            return _at_fault(error, fault, lambda: read_sections(file.name)["probe"])
-    return _described(probe, title, mesh)
-
-
-def probe_file(report: Report, name: str, suffix: str, mesh: bool = False) -> bytes:
-    """Return the drawing of a probe as the content of a file."""
-    probe = probe_of(name)
-    triangles = chosen_space(probe).mesh if mesh else None
-    return _file(figures.probe_drawing(probe.layout(), name, mesh=triangles), suffix)
-
-
 def refused(report: Report, names: list[str], spectra: bool) -> list[str]:
     """Return a line for each file that is no measurement, or no spectrum."""
     lines = []
@@ -208,6 +189,61 @@ def refused(report: Report, names: list[str], spectra: bool) -> list[str]:
         except InputError as error:
             lines.append(str(error))
     return lines
+
+
+def spectra(report: Report, folders: Sequence[str]) -> list[str]:
+    """Return the names of the spectra in some folders of a project, each with its folder."""
+    names: list[str] = []
+    for name in folders:
+        # there may be none yet, and other files among them, of which the command says so
+        with suppress(InputError):
+            for file, _ in spectrum_files([Path(name)]):
+                with suppress(InputError, OSError):
+                    names += (
+                        f"{name}/{spectrum}" for spectrum in _names(file, file.stat().st_mtime)
+                    )
+    return names
+
+
+def spectrum(report: Report, name: str, task: Task) -> dict[str, Any]:
+    """Return the counts of a spectrum, its fit, and what is read from it, in words.
+
+    Parameters
+    ----------
+    report : Report
+    name : str
+        As `spectra` has it.
+    task : Task
+        That of ``hotlever raman``, by whose thermometer it is read.
+    """
+    counted, request, doubt = _spectrum(name), request_of(task), ""
+    try:
+        setup = set_up(Silence(), request)
+    except HotleverError as error:
+        doubt = f"no temperature: {error}"
+        setup = set_up(Silence(), replace(request, calibration=None, calibrate_from=None))
+    (line,) = measure([counted], setup.options, corrections=setup.corrections)
+    table = read_lines([line], setup.thermometer)
+    inside = in_window(counted.x, "")
+    x, y = counted.x[inside], counted.y[inside]
+    low, high = line.window
+    curves, heights = [(x, y), *[(x[:0], y[:0])] * 3], _with_room(y)
+    if line.peak is not None:
+        fine = np.linspace(max(low, x[0]), min(high, x[-1]), _FINE)
+        model = line.peak.model(fine)
+        # a cosmic ray may be many times higher than the line
+        heights = _with_room(np.append(model, np.percentile(y, (1, 99))))
+        hit = np.isin(x, line.peak.spikes)
+        marks = x[hit], np.minimum(y[hit], heights[1])
+        curves[1:] = [(fine, model), (fine, line.peak.baseline(fine)), marks]
+    return {
+        "curves": curves,
+        "heights": heights,
+        "ends": WINDOW,
+        "window": line.window,
+        "centre": None if line.peak is None else line.peak.centre,
+        "text": "; ".join(filter(None, (_summary(line, table), doubt))),
+    }
 
 
 def levers(report: Report, names: list[str]) -> dict[str, Any]:
@@ -252,7 +288,7 @@ def materials(report: Report, name: str | None) -> dict[str, Any]:
         probe = probe_of(name)
         made_of = probe.made_of
         curves = catalogue.curves(made_of, probe.layout().thickness_um)
-    return {"kinds": catalogue.sections(made_of), "figure": _svg(figures.material_curves(curves))}
+    return {"kinds": catalogue.sections(made_of), "figure": svg(figures.material_curves(curves))}
 
 
 def packed(report: Report, paths: list[Path]) -> bytes:
@@ -262,63 +298,6 @@ def packed(report: Report, paths: list[Path]) -> bytes:
         for path in paths:
             archive.write(path, path.name)
     return content.getvalue()
-
-
-def _described(probe: Probe, title: str, with_mesh: bool) -> dict[str, Any]:
-    layout, mesh = probe.layout(), chosen_space(probe).mesh if with_mesh else None
-    return {
-        "figure": _svg(figures.probe_drawing(layout, title, mesh=mesh)),
-        "fault": "",
-        "rows": _regions(layout),
-        "triangles": 0 if mesh is None else mesh.elements.nelements,
-    }
-
-
-def _regions(layout: Layout) -> list[tuple[str, str, str]]:
-    return [(region.name, region.part, f"{region.area:.4g} µm²") for region in layout.regions]
-
-
-def _at_fault(
-    error: InputError, fault: str, section: Callable[[], Mapping[str, Any]]
-) -> dict[str, Any]:
-    """Return the picture of what is wrong with a drawing, or with the dimensions of a section.
-
-    Raises
-    ------
-    InputError
-        If neither has a place in a picture.
-    """
-    from hotlever.probe.drawing.outlines import DrawingError
-
-    if isinstance(error, DrawingError):
-        made = figures.outlines_drawing(error.outlines, fault=fault, fault_at=error.place)
-        return {"figure": _svg(made), "fault": fault}
-    try:
-        # a section may hold anything
-        return {"figure": _svg(_impossible(section(), fault)), "fault": fault}
-    except (InputError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-        raise InputError(fault) from None
-
-
-def _impossible(values: Mapping[str, Any], fault: str) -> Figure:
-    """Draw dimensions that do not go together, and mark the part that a line about them names.
-
-    Raises
-    ------
-    ValueError
-        If it names none of them, or no picture has room for them.
-    """
-    shape, words = PARAMETRIC[values["shape"]], set(re.findall(r"\w+", fault))
-    if not words & set(shape.model_fields):
-        raise ValueError(fault)
-    regions = shape.model_construct(**values).layout().regions
-    if not np.abs([region.rings[0] for region in regions]).max() < _DRAWABLE_UM:
-        raise ValueError(fault)
-    parts = {word.partition("_")[0] for word in words}
-    wrong = next((region for region in regions if region.name.partition(" ")[0] in parts), None)
-    fault_at = None if wrong is None else np.mean(wrong.rings[0], axis=0).tolist()
-    outlines = {region.name: region.rings for region in regions}
-    return figures.outlines_drawing(outlines, fault=fault, fault_at=fault_at)
 
 
 #: Pages of results, whose figures may be asked for as files; the latest last.
@@ -346,17 +325,41 @@ def _calibration(path: Path, stamp: float) -> Calibration:
     return read_calibration(path)
 
 
-def _svg(made: Figure) -> str:
-    return _file(made, ".svg").decode("utf-8")
-
-
-def _file(made: Figure, suffix: str) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, f"figure{suffix}")
-        figures.save_figure(made, path)
-        return path.read_bytes()
-
-
 @lru_cache(maxsize=2000)
 def _fit(path: Path, stamp: float) -> Fit:
     return read_fit(path)
+
+
+def _with_room(values: Array) -> list[float]:
+    """Return the ends of an axis that shows some values."""
+    low, high = float(values.min()), float(values.max())
+    room = 0.08 * (high - low) or 1.0
+    return [low - room, high + room]
+
+
+def _summary(line: Line, table: Any) -> str:
+    """Say what was read from a line, with the digits of the command's table."""
+    flags = ", ".join(line.flags)
+    if line.peak is None:
+        return flags
+    peak, T = line.peak, float(table.temperature_K.values[0])
+    error = float(table.temperature_error_K.values[0])
+    text = f"{peak.centre:.4f} ± {peak.centre_stderr:.4f} cm⁻¹, width {peak.fwhm:.3f} cm⁻¹"
+    if np.isfinite(T):
+        text += f", {T:.2f} ± {error:.2f} K"
+    return f"{text} ({flags})" if flags else text
+
+
+def _spectrum(name: str) -> Spectrum:
+    where, _, last = name.rpartition("/")
+    for file, _ in spectrum_files([Path(where)]):
+        if last == file.name or last.startswith(f"{file.name}["):
+            for spectrum in read_file(file):
+                if spectrum.name == last:
+                    return spectrum
+    raise InputError(f"{name}: no such spectrum any more")
+
+
+@lru_cache(maxsize=5000)
+def _names(file: Path, stamp: float) -> list[str]:
+    return [spectrum.name for spectrum in read_file(file)]

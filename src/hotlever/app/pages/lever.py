@@ -65,7 +65,7 @@ class Picture:
         turn, mesh, drawn = self._latest, self._page.chosen["mesh"], None
         try:
             what = text, title, mesh
-            drawn = await self._page.session.ask("quick", "showing:probe_of_text", *what)
+            drawn = await self._page.session.ask("quick", "probe_files:drawn_text", *what)
             fault: str = drawn["fault"]
         except HotleverError as error:
             fault = str(error)
@@ -98,6 +98,7 @@ class LeverPage(Page):
         super().__init__(session, banner)
         self._file = ProbeFile(self)
         self._shown_text = ""
+        self._awaited: str | None = None
         with two_columns() as (left, right):
             with left:
                 drop_zone(session, banner, _DROP, self._dropped)
@@ -185,7 +186,7 @@ class LeverPage(Page):
         if name is None:
             return
         if not await self._file.may_go():
-            self.chosen["drawing"] = None
+            self._awaited = self.chosen["drawing"] = None
             self._kept.clear()
             self._pick.set_value(None)
             return
@@ -216,8 +217,9 @@ class LeverPage(Page):
 
     def _begin(self, name: str = "", drawing: str | None = None) -> None:
         """Show no lever until another one is there: none may stand under the other's name."""
+        self.chosen |= {"name": name, "text": "", "saved": ""}
         # whoever leaves before the probe file of a drawing is there, and comes back, is shown it
-        self.chosen |= {"name": name, "text": "", "saved": "", "drawing": drawing}
+        self._awaited = self.chosen["drawing"] = drawing
         self._name.set_value(name)
         self._picture.clear()
         self._kept.clear()
@@ -237,7 +239,7 @@ class LeverPage(Page):
     async def _ended(self, job: Job) -> None:
         """Show what was proposed for the drawing that is waited for, if nothing else is open."""
         self._pick.set_options(self._files)
-        if job.task.files != (self.chosen["drawing"],):
+        if job.task.files != (self._awaited,):
             return
         if job.standing == "done":
             files = job.task.options
@@ -298,5 +300,5 @@ class LeverPage(Page):
         if await self._write():
             with self.banner.caught():
                 name, mesh = self._name.value, self.chosen["mesh"]
-                drawn = self.session.ask("quick", "showing:probe_file", name, suffix, mesh)
+                drawn = self.session.ask("quick", "probe_files:drawn_file", name, suffix, mesh)
                 await hand_over(drawn, f"{Path(name).stem}{suffix}")

@@ -143,7 +143,7 @@ class ProbeFields:
         """Show what can be set in a text, and what is wrong; nothing if nothing is open."""
         self._turn += 1
         turn, self._text = self._turn, text
-        settable = await self._session.ask("quick", "fields:settable", text) if text else {}
+        settable = await self._session.ask("quick", "probe_files:settable", text) if text else {}
         if turn != self._turn:
             return
         rows = settable.get("layers", [])

@@ -116,25 +116,20 @@ class RamanPage(Page):
         self.show_command()
         return self._spectrum.show_chosen()
 
-    def thermometer(self) -> dict[str, str]:
-        """Return the options of the thermometer."""
-        project, calibration = self.session.project, self.chosen["calibration"]
-        return {
-            "calibration": calibration,
-            "calibrate_from": _PLATE if not calibration and project.spectra(_PLATE) else "",
-            "law": self.chosen["law"],
-            "corrections": _CORRECTIONS if project.stamp(_CORRECTIONS) else "",
-        }
-
     def task(self, suffix: str = ".svg") -> Task:
         """Return the task that measures the spectra, and draws them."""
-        asked = self.thermometer()
+        project, calibration, law = (
+            self.session.project,
+            self.chosen["calibration"],
+            self.chosen["law"],
+        )
+        with_plate = not calibration and bool(project.spectra(_PLATE))
         options = {
-            "calibration": asked["calibration"],
-            "calibrate_from": [asked["calibrate_from"]] if asked["calibrate_from"] else [],
-            "save_calibration": _SAVED if asked["calibrate_from"] else "",
-            "law": asked["law"] if asked["law"] != "anharmonic" else "",
-            "corrections": asked["corrections"],
+            "calibration": calibration,
+            "calibrate_from": [_PLATE] if with_plate else [],
+            "save_calibration": _SAVED if with_plate else "",
+            "law": "" if law == "anharmonic" else law,
+            "corrections": _CORRECTIONS if project.stamp(_CORRECTIONS) else "",
             "output": _TABLE,
             "plot": f"{_FIGURE}{suffix}",
         }
@@ -227,7 +222,7 @@ class OneSpectrum:
 
     async def look(self, folders: list[str]) -> None:
         """Offer the spectra of some folders, and show the one that was chosen last."""
-        names = await self._page.session.ask("full", "spectra:names", folders)
+        names = await self._page.session.ask("full", "showing:spectra", folders)
         if self._all.is_deleted:
             return
         self._all.set_visibility(bool(names))
@@ -303,8 +298,8 @@ class OneSpectrum:
             return
         try:
             correction = self._corrections().get(name, Correction())
-            asked = name, self._page.thermometer()
-            spectrum = await self._page.session.ask("full", "spectra:measured", *asked)
+            asked = name, self._page.task()
+            spectrum = await self._page.session.ask("full", "showing:spectrum", *asked)
         except HotleverError as error:
             if not self._all.is_deleted:
                 self._text.set_text(str(error).replace(f"{self._page.session.project.folder}/", ""))

@@ -1,16 +1,25 @@
-"""What can be set in a probe file: layers, materials, numbers. Runs in a worker process."""
+"""What a probe file says, as a picture and as what can be set. Runs in a worker process."""
 
 from __future__ import annotations
 
+import re
+import tempfile
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.figure import Figure
+
+from hotlever import figures
 from hotlever.app.edits import LayerRow, Section, drawn_in
+from hotlever.app.jobs import probe_of
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.errors import InputError
+from hotlever.lever.meshing import chosen_space
+from hotlever.probe import Probe
 from hotlever.probe.file_sections import sections_of
 from hotlever.probe.shapes import DRAWING, PARAMETRIC
 
@@ -21,6 +30,47 @@ _TITLES = {"probe": "The lever", "circuit": "Circuit"}
 _LAST = ("heat_capacity", "heat_capacity_scale", "emissivity", "melting_point_K")
 #: Layers of a drawing that are listed.
 _MOST_LAYERS = 40
+#: No part of a drawing of a probe lies beyond (µm).
+_DRAWABLE_UM = 1e5
+
+
+def svg(made: Figure) -> str:
+    """Return a figure as SVG."""
+    return figure_file(made, ".svg").decode("utf-8")
+
+
+def figure_file(made: Figure, suffix: str) -> bytes:
+    """Return a figure as the content of a file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f"figure{suffix}")
+        figures.save_figure(made, path)
+        return path.read_bytes()
+
+
+def drawn_text(report: Report, text: str, title: str, mesh: bool = False) -> dict[str, Any]:
+    """Return the drawing of a probe file that is being written, or of what is wrong with it."""
+    with tempfile.NamedTemporaryFile("w", suffix=".toml", dir=".", prefix=".hotlever-") as file:
+        file.write(text)
+        file.flush()
+        try:
+            probe = Probe.from_file(file.name)
+        except InputError as error:
+            fault = str(error).replace(file.name, title)
+            return {"figure": svg(_wrong(error, text, fault)), "fault": fault}
+    layout, triangles = probe.layout(), chosen_space(probe).mesh if mesh else None
+    return {
+        "figure": svg(figures.probe_drawing(layout, title, mesh=triangles)),
+        "fault": "",
+        "rows": [(part.name, part.part, f"{part.area:.4g} µm²") for part in layout.regions],
+        "triangles": 0 if triangles is None else triangles.elements.nelements,
+    }
+
+
+def drawn_file(report: Report, name: str, suffix: str, mesh: bool = False) -> bytes:
+    """Return the drawing of a probe as the content of a file."""
+    probe = probe_of(name)
+    triangles = chosen_space(probe).mesh if mesh else None
+    return figure_file(figures.probe_drawing(probe.layout(), name, mesh=triangles), suffix)
 
 
 def settable(report: Report, text: str) -> dict[str, Any]:
@@ -44,6 +94,46 @@ def settable(report: Report, text: str) -> dict[str, Any]:
         "cards": [_other(name, values.get(name, {}), own) for name, own in _others(shape)] + cards,
         "new": _new_materials(),
     }
+
+
+def _wrong(error: InputError, text: str, fault: str) -> Figure:
+    """Draw what is wrong with the drawing of a probe file, or with the dimensions of its shape.
+
+    Raises
+    ------
+    InputError
+        If neither has a place in a picture.
+    """
+    from hotlever.probe.drawing.outlines import DrawingError
+
+    if isinstance(error, DrawingError):
+        return figures.outlines_drawing(error.outlines, fault=fault, fault_at=error.place)
+    try:
+        return _impossible(sections_of(text, "")["probe"], fault)
+    # a section may hold anything
+    except (InputError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+        raise InputError(fault) from None
+
+
+def _impossible(values: Mapping[str, Any], fault: str) -> Figure:
+    """Draw dimensions that do not go together, and mark the part that a line about them names.
+
+    Raises
+    ------
+    ValueError
+        If it names none of them, or no picture has room for them.
+    """
+    shape, words = PARAMETRIC[values["shape"]], set(re.findall(r"\w+", fault))
+    if not words & set(shape.model_fields):
+        raise ValueError(fault)
+    regions = shape.model_construct(**values).layout().regions
+    if not np.abs([region.rings[0] for region in regions]).max() < _DRAWABLE_UM:
+        raise ValueError(fault)
+    parts = {word.partition("_")[0] for word in words}
+    wrong = next((region for region in regions if region.name.partition(" ")[0] in parts), None)
+    fault_at = None if wrong is None else np.mean(wrong.rings[0], axis=0).tolist()
+    outlines = {region.name: region.rings for region in regions}
+    return figures.outlines_drawing(outlines, fault=fault, fault_at=fault_at)
 
 
 def _rows(sections: Mapping[str, Any]) -> list[LayerRow]:
