@@ -32,7 +32,6 @@ def test_every_medium_of_the_pages_is_kept(tmp_path: Path, page: str, medium: st
 
 
 CHOSEN: dict[str, Any] = {
-    "dark": True,
     "lever": {"text": "[probe]", "name": "own.toml", "mesh": True},
     "simulate": {
         "probe": "own.toml",
@@ -64,15 +63,15 @@ def test_what_was_chosen_is_there_after_a_restart(tmp_path: Path) -> None:
     session = Session(Project(tmp_path))
     session.keep()
     assert not (tmp_path / ".hotlever").exists()  # nothing was chosen
+    session.dark = True
     session.chosen.update(deepcopy(CHOSEN))
     session.chosen["calibrate"]["run"] = True  # of this very moment
     session.keep()
     again = Session(Project(tmp_path))
     assert again.remark == ""
-    assert again.chosen.pop("dark")
+    assert again.dark
     for page, chosen in CHOSEN.items():
-        if page != "dark":
-            assert chosen.items() <= again.choices(page).items()
+        assert chosen.items() <= again.choices(page).items()
     assert "run" not in again.chosen["calibrate"]
 
 
@@ -169,7 +168,8 @@ def test_what_is_unknown_in_a_file_of_choices_is_left_out(tmp_path: Path) -> Non
     chosen = {"dark": True, "fit": {"robust": True, "later": 1}, "another": 2}
     (hidden / CHOICES).write_text(json.dumps({"schema": 1, "chosen": chosen}))  # of version 1
     session = Session(Project(tmp_path))
-    assert (session.chosen, session.remark) == ({"dark": True, "fit": {"robust": True}}, "")
+    assert (session.dark, session.chosen) == (True, {"fit": {"robust": True}})
+    assert session.remark == ""
 
 
 def test_a_chosen_file_that_is_gone_gives_no_other_numbers(tmp_path: Path) -> None:

@@ -33,8 +33,6 @@ _MOST, _MOST_TEXT = 100, 2**21
 _MOVING_S = 3.0
 #: Seconds after which a process is made ready for the first task: the page comes first.
 _LATER_S = 1.5
-#: How pages look: kept, but no step of the history.
-_LOOKS = "dark"
 #: What files were when they were opened or saved: undoing a choice undoes no saving.
 _OF_FILES = ("saved",)
 
@@ -68,15 +66,17 @@ class History:
     chosen : dict
         What was chosen last on each page, by the names of `Choices`, be it before the app was
         started. Pages hold its dictionaries, which are therefore changed and not replaced.
+    dark : bool
+        How pages look: kept, but no step of the history.
     remark : str
         What a page is to say once: what was undone, or why a history cannot be read.
     """
 
     def __init__(self, hidden: Path) -> None:
         self._path = hidden / CHOICES
-        self.chosen: dict[str, Any] = {}
+        self.chosen: Record = {}
         self.results: dict[str, Result] = {}
-        self.remark = ""
+        self.dark, self.remark = False, ""
         self._history: list[Record] = [{}]
         self._shown = 0
         #: What moved last, and when.
@@ -86,15 +86,15 @@ class History:
 
     def choices(self, page: str) -> dict[str, Any]:
         """Return what was chosen last on a page; what never was is as at first."""
-        chosen: dict[str, Any] = self.chosen.setdefault(page, {})
+        chosen = self.chosen.setdefault(page, {})
         first = deepcopy(_AT_FIRST[page])
         chosen.update({name: value for name, value in first.items() if name not in chosen})
         return chosen
 
     def told_of(self, file: str | None) -> dict[str, Any]:
         """Return what was told of a measurement file: its columns, the pulse that was measured."""
-        told: dict[str, Any] = self.chosen.setdefault("files", {})
-        return told.setdefault(file, Told().model_dump()) if file else Told().model_dump()
+        first = Told().model_dump()
+        return self.chosen.setdefault("files", {}).setdefault(file, first) if file else first
 
     # --- history ----------------------------------------------------------------------------------
 
@@ -139,7 +139,7 @@ class History:
             return set()
         what = _differing(self._history[self._shown], self._history[to])
         self._shown, self._moved = to, (set(), 0.0)
-        for page in {*self.chosen, *self._history[to]} - {_LOOKS}:
+        for page in {*self.chosen, *self._history[to]}:
             values = self.chosen.setdefault(page, {})
             of_files = {key: values[key] for key in _OF_FILES if key in values}
             values.clear()
@@ -166,7 +166,7 @@ class History:
     def _beside(self) -> dict[str, Any]:
         """Return what is kept and is no step of the history."""
         results = {page: result.model_dump() for page, result in self.results.items()}
-        return {_LOOKS: self.chosen.get(_LOOKS, False), "results": results}
+        return {"dark": self.dark, "results": results}
 
     def _read(self) -> None:
         """Read the history when the app starts; a file that cannot be read is put aside."""
@@ -176,17 +176,16 @@ class History:
             content = read_json(self._path)
             if content.get("schema") == 1:  # of a former version, which had the last record alone
                 chosen = content.get("chosen")
-                dark = isinstance(chosen, dict) and chosen.pop(_LOOKS, False)
-                content = {"schema": SCHEMA, _LOOKS: dark, "history": [chosen]}
+                dark = isinstance(chosen, dict) and chosen.pop("dark", False)
+                content = {"schema": SCHEMA, "dark": dark, "history": [chosen]}
             if content.get("schema") != SCHEMA:
                 schema = str(content.get("schema"))[:20]
                 raise InputError(f"{self._path}: found schema {schema}, expected {SCHEMA}")
             read = _File.model_validate(content)
             self._history = [_record(record.model_dump()) for record in read.history]
             self._shown = min(read.shown, len(self._history) - 1)
-            self.chosen, self.results = deepcopy(self._history[self._shown]), read.results
-            if read.dark:
-                self.chosen[_LOOKS] = True
+            self.chosen = deepcopy(self._history[self._shown])
+            self.dark, self.results = read.dark, read.results
             return
         except ValidationError as error:
             reason = str(explained(error, _File, str(self._path)))
@@ -201,14 +200,15 @@ class History:
 def _record(chosen: Mapping[str, Any]) -> Record:
     """Return what is chosen, without what is as at first."""
     record = {}
-    for page, first in _AT_FIRST.items():
-        values = chosen.get(page)
-        if isinstance(values, Mapping):
-            if page == "files":
-                first = dict.fromkeys(values, Told().model_dump())
-            others = {key: value for key, value in values.items() if value != first.get(key)}
-            record[page] = deepcopy({key: others[key] for key in others if key in first})
-    return {page: others for page, others in record.items() if others}
+    for page, values in chosen.items():
+        first = _AT_FIRST.get(page, {})
+        if page == "files":
+            first = dict.fromkeys(values, Told().model_dump())
+        others = {key: value for key, value in values.items() if key in first}
+        others = {key: deepcopy(value) for key, value in others.items() if value != first[key]}
+        if others:
+            record[page] = others
+    return record
 
 
 def _differing(first: Record, second: Record) -> set[str]:

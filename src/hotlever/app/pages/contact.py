@@ -11,23 +11,11 @@ import numpy as np
 from nicegui import ui
 
 from hotlever.app.jobs import Task
+from hotlever.app.pages import plots
 from hotlever.app.pages.chosen_lever import probe_files
 from hotlever.app.pages.frame import caption, flat_button
 from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage, slider
 from hotlever.app.pages.page import MEDIA
-from hotlever.app.pages.plots import (
-    BIAS,
-    INK,
-    SHADE,
-    axes,
-    dots,
-    filled,
-    line,
-    outlined,
-    plotted,
-    points,
-    side_by_side,
-)
 from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 from hotlever.errors import InputError
@@ -89,31 +77,34 @@ class ContactPlots:
     """
 
     def __init__(self) -> None:
-        layout = axes("", "", 420, normal="xy")
+        layout = plots.axes("", "", 420, normal="xy")
         layout["margin"] = {"l": 62, "r": 8, "t": 24, "b": 42}
-        layout["yaxis"] |= {"showgrid": False, "ticks": "outside", "tickcolor": INK}
+        layout["yaxis"] |= {"showgrid": False, "ticks": "outside", "tickcolor": plots.INK}
         layout["xaxis"] |= {"domain": [0.0, 0.54], "showgrid": False, "showticklabels": False}
-        layout["xaxis2"] = axes("temperature (K)", "", 0, normal="x")["xaxis"]
+        layout["xaxis2"] = plots.axes("temperature (K)", "", 0, normal="x")["xaxis"]
         layout["xaxis2"] |= {"domain": [0.58, 1.0], "anchor": "y", "nticks": 4}
-        along = [line(VERMILION) | {"xaxis": "x2"}, dots(VERMILION, 9) | {"xaxis": "x2"}]
+        along = [
+            plots.line(VERMILION) | {"xaxis": "x2"},
+            plots.dots(VERMILION, 9) | {"xaxis": "x2"},
+        ]
         alt = "Tip, contact and sample coloured by temperature, and the temperature along the axis"
         # the axis of the picture is drawn for what has values on it
         nothing = {"type": "scatter", "x": [None], "y": [None], "hoverinfo": "skip"}
-        self._picture = plotted([nothing, *along], layout, alt)
+        self._picture = plots.plotted([nothing, *along], layout, alt)
         caption(_ABOUT)
         self._by_bias: list[ui.plotly] = []
-        with side_by_side():
+        with plots.side_by_side():
             for title, lines in _CURVES:
-                layout = axes(BIAS, title, 240, normal="y")
+                layout = plots.axes(plots.BIAS, title, 240, normal="y")
                 if len(lines) > 1:
                     above = {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom"}
                     layout |= {"showlegend": True, "legend": above}
                     layout["margin"]["t"] = 30
                 data = []
                 for _, _, colour, name in lines:
-                    data.append(line(colour) | {"name": name})
-                    data.append(dots(colour, 10) | {"name": name, "showlegend": False})
-                self._by_bias.append(plotted(data, layout, f"{title} by bias"))
+                    data.append(plots.line(colour) | {"name": name})
+                    data.append(plots.dots(colour, 10) | {"name": name, "showlegend": False})
+                self._by_bias.append(plots.plotted(data, layout, f"{title} by bias"))
 
     def show(self, answer: dict[str, Any]) -> None:
         """Draw an answer; one while sliders move has no curves, and those of before go."""
@@ -124,7 +115,7 @@ class ContactPlots:
                 shown = {"visible": key != "beside_mW" or now[key] > _NONE_MW}
                 for place, columns in enumerate((curves, now)):
                     values = factor * np.asarray(columns.get(key, ()))
-                    drawn = points(columns.get("bias_V", ()), values)
+                    drawn = plots.points(columns.get("bias_V", ()), values)
                     plot.figure["data"][2 * number + place] |= drawn | shown
             plot.update()
 
@@ -136,12 +127,12 @@ class ContactPlots:
         words = {"x": -0.97 * width, "xanchor": "left", "showarrow": False, "align": "left"}
         for number, (name, top, bottom) in enumerate(drawn.layers):
             corners = [(-width, top), (width, top), (width, bottom), (-width, bottom)]
-            shapes.append(filled(corners, SHADE.format(0.12 + 0.16 * (number % 2))))
+            shapes.append(plots.filled(corners, plots.SHADE.format(0.12 + 0.16 * (number % 2))))
             text = name.replace("\n", "<br>").replace(", ", "<br>")
             names.append({"y": (top + bottom) / 2.0, "text": text, **words})
         for (corners, _), colour in zip(drawn.pieces, colours, strict=True):
-            shapes.append(filled(corners, colour))
-        shapes += [outlined(outline, closed=False) for outline in drawn.outlines]
+            shapes.append(plots.filled(corners, colour))
+        shapes += [plots.outlined(outline, closed=False) for outline in drawn.outlines]
         layout = figure["layout"]
         layout |= {"shapes": shapes, "annotations": names}
         layout["xaxis"]["range"] = [-1.02 * width, 1.02 * width]
@@ -150,9 +141,9 @@ class ContactPlots:
         layout["yaxis"] |= {"tickvals": list(heights), "ticktext": list(texts)}
         span = max(now["tip_K"] - base_K, 1.0)
         layout["xaxis2"]["range"] = [base_K - 0.06 * span, base_K + 1.06 * span]
-        figure["data"][1] |= points(drawn.temperature_K, drawn.height)
+        figure["data"][1] |= plots.points(drawn.temperature_K, drawn.height)
         ends = [0, drawn.apex, drawn.apex + 1]
-        figure["data"][2] |= points(drawn.temperature_K[ends], drawn.height[ends])
+        figure["data"][2] |= plots.points(drawn.temperature_K[ends], drawn.height[ends])
         under = "sample under the middle of the contact"
         figure["data"][2]["hovertext"] = ["tip at the lever", "apex", under]
         self._picture.update()

@@ -67,10 +67,10 @@ def framed(session: Session, page: str) -> Iterator[ErrorBanner]:
     ui.page_title(f"{title} · hotlever")
     ui.add_css(_STYLE)
     ui.colors(primary="#0072B2")
-    dark = ui.dark_mode(session.chosen.get("dark", False))
+    dark = ui.dark_mode(session.dark)
 
     def switch() -> None:
-        dark.value = session.chosen["dark"] = not dark.value
+        dark.value = session.dark = not dark.value
 
     with ui.header().classes("items-center q-py-xs no-wrap").props("role=banner"):
         with flat_button(title, None, icon="menu", label=f"Pages: {title}") as menu, ui.menu():

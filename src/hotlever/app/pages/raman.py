@@ -12,6 +12,7 @@ from typing import Any
 from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
+from hotlever.app.pages import plots
 from hotlever.app.pages.frame import (
     FIGURE_FILES,
     ErrorBanner,
@@ -26,7 +27,6 @@ from hotlever.app.pages.frame import (
     two_columns,
 )
 from hotlever.app.pages.page import Page, Work
-from hotlever.app.pages.plots import INK, SHADE, axes, dots, line, plotted, points
 from hotlever.app.session import Session
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
@@ -45,14 +45,14 @@ _FIELDS = {"start": "Line near", "low": "Fit from", "high": "Fit to"}
 #: Counts, fitted line, background, and cosmic rays.
 _QUIET = {"hoverinfo": "skip"}
 _TRACES = [
-    dots(INK, 4),
-    line(BLUE) | _QUIET,
-    line(GREEN, width=1, dash="dot") | _QUIET,
-    dots(VERMILION, 8, symbol="x-thin-open") | _QUIET,
+    plots.dots(plots.INK, 4),
+    plots.line(BLUE) | _QUIET,
+    plots.line(GREEN, width=1, dash="dot") | _QUIET,
+    plots.dots(VERMILION, 8, symbol="x-thin-open") | _QUIET,
 ]
 #: Over the whole height: what is not fitted, and the place of the line.
 _HIGH = {"yref": "paper", "y0": 0, "y1": 1}
-_SHADE = {"type": "rect", **_HIGH, "line": {"width": 0}, "fillcolor": SHADE.format(0.25)}
+_SHADE = {"type": "rect", **_HIGH, "line": {"width": 0}, "fillcolor": plots.SHADE.format(0.25)}
 _PLACE = {"type": "line", **_HIGH, "line": {"color": VERMILION, "width": 1, "dash": "dash"}}
 
 
@@ -194,9 +194,9 @@ class OneSpectrum:
                 before, after = partial(self._move, -1), partial(self._move, 1)
                 flat_button("", before, icon="chevron_left", label="Spectrum before")
                 flat_button("", after, icon="chevron_right", label="Next spectrum")
-            layout = axes("Raman shift (cm⁻¹)", "counts", 300, normal="xy")
+            layout = plots.axes("Raman shift (cm⁻¹)", "counts", 300, normal="xy")
             layout |= {"hovermode": "x", "dragmode": "select", "selectdirection": "h"}
-            self._plot = plotted(_TRACES, layout, _SPECTRUM_ALT)
+            self._plot = plots.plotted(_TRACES, layout, _SPECTRUM_ALT)
             self._plot.on("plotly_click", self._click, ["points"])
             self._plot.on("plotly_selected", self._drag, ["range"])
             self._text = ui.label().classes("remark").props("aria-live=polite data-spectrum=1")
@@ -317,7 +317,7 @@ class OneSpectrum:
     def _draw(self, spectrum: dict[str, Any]) -> None:
         figure: Any = self._plot.figure
         for trace, (x, y) in zip(figure["data"], spectrum["curves"], strict=True):
-            trace |= points(x, y)
+            trace |= plots.points(x, y)
         low, high = spectrum["ends"]
         first, last = spectrum["window"]
         shapes: list[dict[str, Any]] = [

@@ -8,21 +8,10 @@ import numpy as np
 from nicegui import ui
 
 from hotlever.app.jobs import Task
+from hotlever.app.pages import plots
 from hotlever.app.pages.chosen_lever import probe_files
 from hotlever.app.pages.frame import caption
 from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage
-from hotlever.app.pages.plots import (
-    INK,
-    SHADE,
-    axes,
-    dots,
-    filled,
-    line,
-    outlined,
-    plotted,
-    points,
-    side_by_side,
-)
 from hotlever.colours import BLUE, VERMILION
 
 #: Distances of a table that is written.
@@ -64,20 +53,21 @@ class ReaderPlots:
     """
 
     def __init__(self) -> None:
-        layout = axes("along the lever (µm)", "height (µm)", 260, normal="xy")
+        layout = plots.axes("along the lever (µm)", "height (µm)", 260, normal="xy")
         layout["xaxis"]["showgrid"] = layout["yaxis"]["showgrid"] = False
         alt = "The lever from the side, coloured by temperature, over the surface"
-        self._picture = plotted([line(INK), line(VERMILION, dash="dash")], layout, alt)
+        traces = [plots.line(plots.INK), plots.line(VERMILION, dash="dash")]
+        self._picture = plots.plotted(traces, layout, alt)
         caption(_ABOUT)
         self._curves: list[ui.plotly] = []
         ticks = {"tickvals": _TICKS, "ticktext": [f"{value:g}" for value in _TICKS]}
-        with side_by_side():
+        with plots.side_by_side():
             for title, _, _, by_decades in _CURVES:
-                layout = axes("distance to the surface (µm)", title, 250, normal="xy")
+                layout = plots.axes("distance to the surface (µm)", title, 250, normal="xy")
                 for axis in ("xaxis", "yaxis")[: 1 + by_decades]:
                     layout[axis] |= {"type": "log", **ticks}
-                traces = [line(BLUE), dots(VERMILION, 10)]
-                self._curves.append(plotted(traces, layout, f"{title} by distance"))
+                traces = [plots.line(BLUE), plots.dots(VERMILION, 10)]
+                self._curves.append(plots.plotted(traces, layout, f"{title} by distance"))
 
     def show(self, answer: dict[str, Any]) -> None:
         """Draw an answer."""
@@ -86,7 +76,7 @@ class ReaderPlots:
             for number, columns in enumerate((answer["curves"], answer["now"])):
                 values = factor * np.asarray(columns[key])
                 values = np.abs(values) if by_decades else values
-                plot.figure["data"][number] |= points(columns["surface_gap_um"], values)
+                plot.figure["data"][number] |= plots.points(columns["surface_gap_um"], values)
             plot.update()
 
     def _draw(self, answer: dict[str, Any]) -> None:
@@ -98,12 +88,12 @@ class ReaderPlots:
         for left, colour in zip(edges.tolist(), answer["colours"], strict=False):
             # the next one is drawn over what is beyond, so that no gap shows between them
             box = [(left, 0.0), (end, 0.0), (end, thick), (left, thick)]
-            shapes.append(filled(box, colour))
+            shapes.append(plots.filled(box, colour))
         outline = [(start, 0.0), (end, 0.0), (end, thick), (start, thick)]
         if answer["tip"] is not None:
             height, radius = answer["tip"]
             cone = [(at_tip - radius, 0.0), (at_tip + radius, 0.0), (at_tip, -height)]
-            shapes.append(filled(cone, INK))
+            shapes.append(plots.filled(cone, plots.INK))
         margin = _AROUND * (end - start)
         sides = np.array([start - margin, end + margin])
         surface = -gap + answer["slope"] * (sides - at_tip)
@@ -111,13 +101,13 @@ class ReaderPlots:
         bottom = low - _ABOVE * (thick - low)
         corners = [*zip(sides.tolist(), surface.tolist(), strict=True)]
         below = [*corners, (sides[1], bottom), (sides[0], bottom)]
-        shapes += [filled(below, SHADE.format(0.35)), outlined(outline)]
+        shapes += [plots.filled(below, plots.SHADE.format(0.35)), plots.outlined(outline)]
         figure = self._picture.figure
         figure["layout"]["shapes"] = shapes
         figure["layout"]["xaxis"]["range"] = sides.tolist()
         figure["layout"]["yaxis"]["range"] = [bottom, thick + _ABOVE * (thick - low)]
-        figure["data"][0] |= points(sides, surface)
-        figure["data"][1] |= points([at_tip, at_tip], [0.0, -gap])
+        figure["data"][0] |= plots.points(sides, surface)
+        figure["data"][1] |= plots.points([at_tip, at_tip], [0.0, -gap])
         self._picture.update()
 
 
