@@ -30,6 +30,9 @@ from hotlever.lever import Lever
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.probe import Probe
 
+#: What is asked here is so on any mesh.
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 Run = Callable[..., tuple[int, str, str]]
 #: The field of a dimension.
 LENGTH = "length (µm)"

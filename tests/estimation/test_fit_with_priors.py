@@ -25,6 +25,9 @@ from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, default_priors, priors_of
 
+#: What is asked here is so on any mesh.
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 NOMINAL = Probe.reference()
 TRUE = NOMINAL.with_(n_d=5.2e17, delta=0.68, heater_length_um=4.12, thickness_um=0.39)
 

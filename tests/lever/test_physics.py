@@ -15,6 +15,9 @@ from hotlever.lever3d import SolidLever
 from hotlever.probe.solid import SolidMeshOptions
 from of_materials import p_type_probe
 
+#: What is asked here is so on any mesh.
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 THERMOELECTRIC = Probe.reference().with_physics(("thermoelectric",))
 
 
