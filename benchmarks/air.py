@@ -20,7 +20,7 @@ import numpy as np
 from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import PanelOptions
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.estimation.experiment_at_rest import experiment_of
+from hotlever.estimation.experiment import experiment_of
 from hotlever.lever import Lever
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.probe import Probe

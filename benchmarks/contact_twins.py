@@ -29,7 +29,7 @@ import numpy as np
 from hotlever import Measurement, Probe, fit
 from hotlever.contact.cone import cold_resistance
 from hotlever.contact.law import INTERFACE, ContactLaw
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest
+from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.estimation.noise import METERS
 from hotlever.estimation.over_a_sample import with_distances
 from hotlever.lever import Lever

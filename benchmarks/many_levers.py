@@ -28,7 +28,7 @@ import numpy as np
 import psutil
 
 from hotlever.estimation.batch import fit_many
-from hotlever.estimation.experiment_at_rest import experiment_of
+from hotlever.estimation.experiment import experiment_of
 from hotlever.materials import PUBLISHED
 from hotlever.probe import Probe
 from problems import BIAS, processor_time, table

@@ -14,8 +14,8 @@ import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation import fit, read_measurement
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest, experiment_of
-from hotlever.estimation.load_lines import Rows
+from hotlever.estimation.experiment import ExperimentAtRest, experiment_of
+from hotlever.estimation.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.reduced.error_estimate import estimated_error

@@ -12,7 +12,7 @@ import numpy as np
 
 from hotlever.errors import ComputationError
 from hotlever.estimation import Measurement, fit, read_measurement
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest, experiment_of
+from hotlever.estimation.experiment import ExperimentAtRest, experiment_of
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain

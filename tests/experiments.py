@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from hotlever.estimation import Fit, fit
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest
+from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever

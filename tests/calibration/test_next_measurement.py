@@ -14,7 +14,7 @@ from hotlever.calibration import calibrate, plan_next, read_calibration
 from hotlever.calibration.linearised_lever import LinearisedLever
 from hotlever.errors import InputError
 from hotlever.estimation.experiment import TIP
-from hotlever.estimation.load_lines import Rows
+from hotlever.estimation.surrogate import Rows
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 

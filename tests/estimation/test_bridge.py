@@ -12,7 +12,7 @@ from experiments import full_experiment
 from hotlever.calibration import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit, read_measurement
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest
+from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient import simulate, spectrum, step
 from hotlever.measurands import OBSERVABLES

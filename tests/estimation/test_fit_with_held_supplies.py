@@ -10,7 +10,7 @@ import pytest
 from hotlever import Lever, Probe, fit
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, read_fit, read_measurement
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest
+from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurands import observables_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.estimation.experiment_at_rest import experiment_of
-from hotlever.estimation.load_lines import Rows
+from hotlever.estimation.experiment import experiment_of
+from hotlever.estimation.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.measurands import OBSERVABLES

@@ -16,7 +16,7 @@ from hotlever.contact.law import INTERFACE
 from hotlever.errors import InputError
 from hotlever.estimation import FitOptions
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest
+from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.over_a_sample import with_distances
 from hotlever.lever import Lever

@@ -11,7 +11,7 @@ from experiments import reduced_experiment
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Measurement, fit, uncertainty
 from hotlever.estimation.chains import Gaussian, effective_sample_size, sample, split_rhat
-from hotlever.estimation.experiment_at_rest import experiment_of
+from hotlever.estimation.experiment import experiment_of
 from hotlever.estimation.objective import inverse_or_nan
 from hotlever.estimation.profile import profile_likelihood
 from hotlever.estimation.sampling import SampledLever, predictive_band, sample_posterior

@@ -15,7 +15,7 @@ from hotlever.calibration import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest
+from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser

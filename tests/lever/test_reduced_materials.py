@@ -7,8 +7,8 @@ import pytest
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation import FitOptions, Measurement, batch, fit
-from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.result import FitFile
+from hotlever.estimation.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE

@@ -18,13 +18,12 @@ from hotlever.calibration.calibration import Calibration
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import FitOptions, Measurement
 from hotlever.estimation.experiment import TIP
-from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.noise import METERS
 from hotlever.estimation.optimal_design import Information, NoiseLaw
 from hotlever.estimation.options import SearchOptions
 from hotlever.estimation.posterior import standard_errors
 from hotlever.estimation.prior_density import Coordinates, PriorDensity
-from hotlever.estimation.surrogate import CurveSurrogate
+from hotlever.estimation.surrogate import CurveSurrogate, Rows
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers

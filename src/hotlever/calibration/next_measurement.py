@@ -20,8 +20,8 @@ from hotlever.calibration.table import budget_of
 from hotlever.calibration.tip_temperature import error_of_model
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, unknown_name
-from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.optimal_design import Candidate, Information, best_first
+from hotlever.estimation.surrogate import Rows
 from hotlever.measurands import FITTED
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior

@@ -18,8 +18,7 @@ import xarray as xr
 from hotlever.calibration.table import TOTAL_POWER, table_by_bias, total_error, with_steep_rows
 from hotlever.datasets import quantity
 from hotlever.errors import InputError
-from hotlever.estimation.experiment import TIP
-from hotlever.estimation.experiment_at_rest import PredictionAtRest
+from hotlever.estimation.experiment import TIP, PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.posterior import Posterior, standard_errors
 from hotlever.estimation.profile import profile_of_tip

@@ -22,9 +22,9 @@ from hotlever.estimation.curvature import CurvedQuantity
 from hotlever.estimation.experiment import TIP
 from hotlever.estimation.gum import Budget, CoverageInterval, InputQuantity, propagate
 from hotlever.estimation.inverse_problem import Estimate
-from hotlever.estimation.load_lines import Rows
 from hotlever.estimation.outcome import IF_ANY, Correlations, Section
 from hotlever.estimation.prior_density import PriorDensity
+from hotlever.estimation.surrogate import Rows
 from hotlever.measurands import FITTED, OBSERVABLES
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import SCALES, PriorUse

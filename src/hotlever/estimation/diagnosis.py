@@ -17,8 +17,7 @@ from scipy.optimize import least_squares
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.hypotheses import Hypothesis, MeasuredRows, hypotheses_of
-from hotlever.estimation.load_lines import Rows
-from hotlever.estimation.surrogate import CurveSurrogate
+from hotlever.estimation.surrogate import CurveSurrogate, Rows
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers

@@ -1,22 +1,39 @@
 """An experiment: the forward map from a lever's parameters to what is measured, with derivatives.
 
-A lever is measured at rest (`hotlever.estimation.experiment_at_rest`) or in time
-(`hotlever.estimation.experiment_in_time`). Either solves a lever that is fast, and can be corrected
-by the full one at the probe of a prediction.
+A lever is measured at rest or in time (`hotlever.estimation.experiment_in_time`). Either solves a
+lever that is fast, and can be corrected by the full one at the probe of a prediction.
+
+At rest the fast lever is a reduced one where the geometry has been reduced before, or else the same
+lever on a coarse mesh. Where the full lever is solved too, the difference of the two branches is
+added to the fast one's from then on. Parameters are what `hotlever.probe.parameters` names: of the
+material, dimensions, the series resistance.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, Self
 
-from hotlever.estimation.surrogate import Surrogate
+import numpy as np
+from scipy.interpolate import BSpline
+
+from hotlever.estimation.surrogate import CurveSurrogate, Rows, Surrogate
+from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
+from hotlever.lever.curve import spline_through
+from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
+from hotlever.lever.sensitivities import Linearised, by_parameter
+from hotlever.lever.similar import BranchSolver, SimilarLevers
 from hotlever.measurands import FITTED
 from hotlever.probe import Probe
+from hotlever.probe.parameters import usual_parameters
+from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
 #: Where predictions have the tip temperature.
 TIP = list(FITTED).index("tip")
+#: How far beyond zero bias the branch of a lever goes that does not start cold: share of the range.
+_BEYOND_ZERO = 0.05
 
 
 @dataclass(frozen=True)
@@ -80,3 +97,179 @@ class Experiment(Protocol):
             If the full lever cannot be solved there.
         """
         ...
+
+
+@dataclass(frozen=True)
+class PredictionAtRest(Prediction):
+    """What an instrument and a thermometer would show at some biases.
+
+    Attributes
+    ----------
+    surrogate : CurveSurrogate
+    linearised : Linearised
+        What it was read from, not corrected.
+    """
+
+    surrogate: CurveSurrogate
+    linearised: Linearised
+
+
+@dataclass(frozen=True)
+class Correction:
+    """What a fast lever lacks, exact to first order at one place among the parameters.
+
+    `values` are those of V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) by u; `slopes` of
+    their derivatives by the parameters.
+    """
+
+    at: Array
+    values: BSpline
+    slopes: BSpline
+
+    def added(self, branch: Branch, at: Array) -> Branch:
+        """Return a branch of the fast lever with what it lacks, for some values of parameters."""
+        moved, u = at - self.at, branch.u
+        changes, slopes = (self.values(u, n) + self.slopes(u, n) @ moved for n in (0, 1))
+        return shifted(branch, changes, slopes)
+
+
+@dataclass(frozen=True)
+class ExperimentAtRest:
+    """Predicts a measurement at some biases (V, in any order) with a lever that is solved fast.
+
+    The full lever corrects the fast one, unless it is None. What is predicted depends on the
+    probe alone: correcting the model makes another one. Derivatives are by ``names``, and
+    are corrected too if ``first_order``. Where it is known what was measured, as ``shown``, each
+    bias stands for the state nearest to that (`hotlever.estimation.surrogate`), otherwise for that
+    of a slow ramp.
+    """
+
+    fast: BranchSolver
+    full: SimilarLevers | None
+    bias: Array
+    names: tuple[str, ...]
+    first_order: bool = True
+    correction: Correction | None = None
+    shown: Array | None = None
+
+    def measuring(
+        self, bias: Array, shown: Array | None, distance_um: Array | None = None
+    ) -> ExperimentAtRest:
+        """Return the model at other biases (V), with what was measured there, if that is known.
+
+        Distances count over a sample, see `hotlever.estimation.over_a_sample`.
+        """
+        return replace(self, bias=bias, shown=shown)
+
+    def coarse(self) -> Self:
+        """Return the model with a lever that is solved for any parameters, not corrected."""
+        fast = self.fast.for_any_parameters()
+        return self if fast is self.fast else replace(self, fast=fast, correction=None)
+
+    def drawn_anew(self, probe: Probe) -> Self:
+        """Return the model on meshes of a probe's own drawing, not corrected."""
+        full = None if self.full is None else SimilarLevers(Lever(probe))
+        return replace(self, fast=SimilarLevers(Lever(probe, COARSE)), full=full, correction=None)
+
+    def reach(self, probe: Probe) -> Reach:
+        """Return how far the branch of a probe must go: beyond zero if it does not start cold.
+
+        Similar levers have no bias elsewhere.
+        """
+        lowest, highest = min(float(self.bias.min()), 0.0), max(float(self.bias.max()), 0.0)
+        if not probe.circuit.starts_cold:
+            lowest -= _BEYOND_ZERO * (highest - lowest)
+        return Reach(probe.circuit, highest, lowest or None)
+
+    @one_blas_thread
+    def predict(self, probe: Probe, near: PredictionAtRest | None = None) -> PredictionAtRest:
+        """Predict the measurement of a probe, starting from a similar one's.
+
+        Raises
+        ------
+        ComputationError
+            If the lever has no state below the melting point at one of the biases.
+        """
+        linearised = None if near is None else near.linearised
+        if linearised is None or linearised.probe != probe:
+            linearised = self.fast.linearised(probe, self.reach(probe), linearised, self.names)
+        branch, by_parameter = linearised.branch, linearised.shown
+        if self.correction:
+            branch = self.correction.added(branch, probe.values(self.names))
+            by_parameter = by_parameter + self.correction.slopes(branch.u)
+        rows = Rows(self.bias, self.shown)
+        shown = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
+        surrogate = CurveSurrogate(probe, self.names, branch, by_parameter, rows)
+        values, slopes = surrogate.contact.differentiated(*shown, probe.values(self.names))
+        lever = probe.circuit.lever_voltage(self.bias, values[0])
+        columns = {"bias_V": self.bias, "lever_V": lever, **named(values)}
+        return PredictionAtRest(probe, values, slopes, surrogate, columns, slopes[TIP], linearised)
+
+    @one_blas_thread
+    def confirmed(self, at: PredictionAtRest) -> Self:
+        """Return a model that is exact at the probe of a prediction, if so wanted to first order.
+
+        Raises
+        ------
+        ComputationError
+            If the full lever cannot be solved there.
+        """
+        if self.full is None:
+            return self
+        fast, probe = at.linearised.branch, at.probe
+        equations = self.full.equations(probe, self.names)
+        u, x = self.fast.full_states(fast, equations, self.reach(probe))
+        by_fast, parametrisation = at.linearised.shown_at(u), fast.parametrisation
+        values = np.zeros(by_fast.shape[:2])
+        values[:, :TIP_RISE] = equations.observed(x).T - fast.curve(u)[:, :TIP_RISE]
+        values[:, TIP_RISE] = equations.space.tip_rise(x) - fast.rise(u)
+        slopes = np.zeros(by_fast.shape)
+        if self.first_order:
+            constraint = parametrisation.constraint(u)
+            slopes = by_parameter(equations, x, self.names, constraint=constraint) - by_fast
+        if fast.starts_cold:
+            # without power nothing is lacking
+            cold = int(np.searchsorted(u, 0.0))
+            u, values, slopes = (np.insert(each, cold, 0.0, axis=0) for each in (u, values, slopes))
+        lacking = spline_through(u, values), spline_through(u, slopes)
+        return replace(self, correction=Correction(probe.values(self.names), *lacking))
+
+    def exact_at(self, probe: Probe) -> tuple[Self, PredictionAtRest]:
+        """Return a model that is exact at a probe, and its prediction there.
+
+        Raises
+        ------
+        ComputationError
+            If the lever cannot be solved.
+        """
+        uncorrected = self.predict(probe)
+        exact = self.confirmed(uncorrected)
+        return exact, exact.predict(probe, uncorrected)
+
+
+def experiment_of(
+    probe: Probe,
+    bias: Array,
+    *,
+    names: tuple[str, ...] | None = None,
+    reduce: bool = False,
+) -> ExperimentAtRest:
+    """Return the fastest forward model of a probe.
+
+    Parameters
+    ----------
+    probe : Probe
+    bias : ndarray, shape (n,)
+    names : tuple of str
+        Parameters of the derivatives; by default what a fit usually varies. A reduced lever does
+        not serve all, see `hotlever.lever.reduced.training.can_be_reduced`.
+    reduce : bool
+        Make and keep a reduced lever (some seconds) if the geometry has none yet: it pays where
+        more than one fit is to come.
+    """
+    lever, reduced = Lever(probe), None
+    names = usual_parameters(probe) if names is None else names
+    if can_be_reduced(probe, names):
+        reduced = cached_reduction(lever, names=names) if reduce else known_reduction(lever, names)
+    fast = reduced or SimilarLevers(Lever(probe, COARSE))
+    return ExperimentAtRest(fast, SimilarLevers(lever), bias, names)

@@ -1,6 +1,6 @@
 """An experiment in time: histories of a lever, corrected by the full one.
 
-As at rest (`hotlever.estimation.experiment_at_rest`) the lever on a coarse mesh tells how its
+As at rest (`hotlever.estimation.experiment`) the lever on a coarse mesh tells how its
 history changes with the parameters; at the optimum the full one is followed, and the difference
 added from then on.
 """
@@ -14,9 +14,8 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from hotlever.errors import InputError
-from hotlever.estimation.contact_temperatures import ContactTemperatures
 from hotlever.estimation.experiment import TIP, Prediction, named
-from hotlever.estimation.surrogate import LinearSurrogate
+from hotlever.estimation.surrogate import ContactTemperatures, LinearSurrogate
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient.history import integrate

@@ -15,9 +15,10 @@ import numpy as np
 
 from hotlever import memory
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.experiment_at_rest import (
+from hotlever.estimation.experiment import (
+    Experiment,
     ExperimentAtRest,
+    Prediction,
     PredictionAtRest,
     experiment_of,
 )

@@ -15,8 +15,7 @@ from typing import Any, Self
 import numpy as np
 
 from hotlever.contact.law import INTERFACE
-from hotlever.estimation.experiment import TIP, named
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest, PredictionAtRest
+from hotlever.estimation.experiment import TIP, ExperimentAtRest, PredictionAtRest, named
 from hotlever.estimation.surrogate import CurveSurrogate
 from hotlever.lever.equations import GAP
 from hotlever.probe import Probe
@@ -141,7 +140,7 @@ class PredictionOverSample(PredictionAtRest):
 
 @dataclass(frozen=True)
 class ExperimentOverSample(ExperimentAtRest):
-    """Predicts a measurement over a sample; see `hotlever.estimation.experiment_at_rest`.
+    """Predicts a measurement over a sample; see `hotlever.estimation.experiment`.
 
     Attributes
     ----------

@@ -16,8 +16,7 @@ from scipy.special import chdtri
 
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimation.experiment import TIP, Experiment, Prediction
-from hotlever.estimation.experiment_at_rest import experiment_of
+from hotlever.estimation.experiment import TIP, Experiment, Prediction, experiment_of
 from hotlever.estimation.objective import Objective, ParameterValue, Penalty, TipTemperature
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.over_a_sample import with_distances

@@ -23,7 +23,7 @@ from pydantic import (
 
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.estimation.experiment_at_rest import experiment_of
+from hotlever.estimation.experiment import experiment_of
 from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.options import FitOptions

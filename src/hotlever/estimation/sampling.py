@@ -25,10 +25,11 @@ from hotlever.estimation.chains import (
     rhat_of_ensembles,
     sample,
 )
-from hotlever.estimation.experiment import TIP, named
-from hotlever.estimation.experiment_at_rest import (
+from hotlever.estimation.experiment import (
+    TIP,
     ExperimentAtRest,
     experiment_of,
+    named,
 )
 from hotlever.estimation.objective import TipTemperature
 from hotlever.estimation.optimiser import Predictor

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.errors import ComputationError
-from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest
+from hotlever.estimation.experiment import Experiment, ExperimentAtRest, Prediction
 from hotlever.estimation.objective import Objective
 from hotlever.estimation.optimiser import Optimiser, Optimum
 from hotlever.estimation.options import SearchOptions
@@ -129,7 +128,7 @@ class Search:
             residuals = Residuals(
                 part, [name for name in self.residuals.observables if name in with_data], "errors"
             )
-            if _has_moved(experiment.drawn, start):
+            if _has_moved(experiment.fast.drawn, start):
                 experiment = experiment.drawn_anew(start)
             of_part = experiment.measuring(*residuals.at_rest)
             objective = Objective(residuals, start, of_part.names, self.varied, prior)
@@ -141,7 +140,7 @@ class Search:
                 if portion == 1:
                     raise
                 break
-        moved = _has_moved(experiment.drawn, start)
+        moved = _has_moved(experiment.fast.drawn, start)
         return (experiment.drawn_anew(start) if moved else experiment), start
 
 

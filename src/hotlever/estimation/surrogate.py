@@ -1,44 +1,209 @@
 """The surrogate of a lever: what it would show for parameters near some, at next to no cost.
 
 Search, profile, posterior and diagnosis all take the levers that they do not solve from here.
+
+What a lever shows is what is read off its branch at the rows of a measurement, each on its load
+line: a row says that V_l + R_s I_h was the bias. A branch that folds has several such states, or
+none; a slow ramp takes the first. A search must not jump with its candidates from one part of a
+branch to another, so it compares each row with the state nearest to what was measured, and where a
+candidate ends before the bias of a row, with that end as if it went on with the resistance it has
+there. Of a tip in contact, temperatures of the contact follow from that of the tip.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
-from hotlever.estimation.contact_temperatures import ContactTemperatures
-from hotlever.estimation.load_lines import Rows
-from hotlever.estimation.prior_density import Coordinates
+from hotlever.contact.law import contact_of
 from hotlever.lever.branch import TIP_RISE, Branch, shifted
-from hotlever.lever.curve import spline_through
+from hotlever.lever.curve import crossing, spline_through
+from hotlever.lever.laws import BASE
+from hotlever.lever.observables import at_fixed_bias, observed, observed_by
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.sensitivities import Linearised
+from hotlever.measurands import OBSERVABLES
+from hotlever.piecewise import Piecewise
 from hotlever.probe import Circuit, Probe
+from hotlever.probe.parameters import parameters_of
 from hotlever.threads import one_blas_thread
-from hotlever.types import Array
+from hotlever.types import Array, Index
+
+#: Near a fold the states at a bias move without limit as parameters change; their derivatives
+#: count as if the bias rose along the branch by at least this share of its mean slope up to there.
+_LEAST_SLOPE = 0.03
+#: Where the observables have the tip temperature.
+_TIP = list(OBSERVABLES).index("tip")
 
 
-class Surrogate(Protocol):
-    """A local model of what a lever shows, exact at the parameters of one that was solved."""
+@dataclass(frozen=True)
+class Rows:
+    """Rows of a measurement as what candidates are compared with.
 
-    def predict(self, parameters: Array) -> tuple[Array, Array]:
-        """Return the observables (m, n), and their derivatives (m, n, k), by parameters (k,).
+    Attributes
+    ----------
+    bias_V : ndarray, shape (n,)
+    shown : ndarray, shape (observables, n), optional
+        What was measured, `hotlever.measurands.OBSERVABLES`; NaN where nothing was. Without it the
+        states are those of a slow ramp.
+    """
+
+    bias_V: Array
+    shown: Array | None = None
+
+    def states(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
+        """Return u of the states that the rows are compared with, and how far these fall short.
+
+        By so much, at least one, the values of a state are to be multiplied to reach the bias.
 
         Raises
         ------
-        ComputationError
-            If such a lever has no such states.
+        BranchEndError
+            If a slow ramp finds no state at one of the biases.
         """
-        ...
+        if self.shown is not None:
+            return self._nearest(branch, circuit)
+        reading = branch.read(circuit, self.bias_V)
+        if np.isnan(reading.u).any():
+            raise branch.ended(reading)
+        return reading.u, np.ones(reading.u.shape)
 
-    def shown(self, parameters: Array) -> Array:
-        """Return the values of `predict` alone."""
-        ...
+    def values(self, branch: Branch, circuit: Circuit) -> Array:
+        """Return the observables of the states, (observables, n); see `states`."""
+        u, short = self.states(branch, circuit)
+        return observed(circuit, _reaching(branch, u, short))
+
+    def differentiated(
+        self, branch: Branch, by_parameter: Array, circuit: Circuit, names: Sequence[str]
+    ) -> tuple[Array, Array]:
+        """Return the same, and derivatives (observables, n, p) by parameters; see `states`.
+
+        Parameters
+        ----------
+        branch : Branch
+        by_parameter : ndarray, shape (k, 4, p)
+            How its states change, see `hotlever.lever.sensitivities.by_parameter`.
+        circuit : Circuit
+        names : sequence of str
+            The parameters.
+        """
+        u, short = self.states(branch, circuit)
+        shown = _reaching(branch, u, short)
+        by_state = spline_through(branch.u, by_parameter)(u)
+        of_circuit = np.stack([circuit.bias_by(name, shown[1] / short) for name in names], axis=1)
+        along = branch.curve(u, 1)
+        if self.shown is not None:
+            self._steepen(along, circuit, u)
+        slopes = at_fixed_bias(along, circuit, by_state, of_circuit)
+        ends = np.flatnonzero(short > 1.0)
+        if ends.size:
+            # the end of a branch stays where it is, to first order; what it lacks in bias changes
+            bias_by = circuit.bias(by_state[ends, 0], by_state[ends, 1]) + of_circuit[ends]
+            more = (short[ends] / self.bias_V[ends])[:, None] * bias_by
+            slopes[:, ends] = np.moveaxis(by_state[ends], 1, 0)
+            slopes[:TIP_RISE, ends] *= short[ends, None]
+            slopes[:TIP_RISE, ends] -= shown[:TIP_RISE, ends, None] * more
+        return observed(circuit, shown), observed_by(circuit, shown, slopes, names)
+
+    def _nearest(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
+        """Return the states nearest to what was measured; see `states`."""
+        curve = branch.bias_by_u(circuit)
+        cold = branch.begins_cold
+        start = float(branch.u[0])
+        level = np.sort(curve.derivative().roots())
+        ends = [start, *level[(level > start) & (level < branch.end_u)].tolist(), branch.end_u]
+        # a cold lever is told apart from itself by the size of the bias only, and has none without
+        bias = np.abs(self.bias_V) if cold else self.bias_V
+        heated = np.flatnonzero((bias > 0) | (not cold))
+        u, distance = np.zeros(bias.shape), np.full(bias.shape, np.inf)
+        u[heated] = np.nan
+        short = np.ones(bias.shape)
+        for low, high in pairwise(ends):
+            first, last = float(curve(low)), float(curve(high))
+            here = heated[(bias[heated] >= min(first, last)) & (bias[heated] <= max(first, last))]
+            if not here.size:
+                continue
+            sign = 1.0 if last >= first else -1.0
+            at = crossing(Piecewise(sign * curve.c, curve.x), low, high, sign * bias[here])
+            away = self._distance(observed(circuit, branch.curve(at).T), here)
+            nearer = away < distance[here]
+            u[here[nearer]], distance[here[nearer]] = at[nearer], away[nearer]
+        height = curve(np.array(ends))
+        for row in np.flatnonzero(np.isnan(u)).tolist():
+            end = int(np.argmax(height) if bias[row] >= height.max() else np.argmin(height))
+            u[row] = ends[end]
+            short[row] = bias[row] / height[end] if height[end] * bias[row] > 0 else 1.0
+        if cold:
+            u = np.where(self.bias_V < 0, -np.abs(u), u)
+        return u, short
+
+    def _distance(self, values: Array, rows: Index) -> Array:
+        """Return how far values (observables, m) are from some rows, as squares of shares."""
+        assert self.shown is not None
+        shown = self.shown[: len(values)]
+        largest = np.nanmax(np.abs(shown), axis=1, keepdims=True, initial=1e-300)
+        return np.asarray(np.nansum(((values - shown[:, rows]) / largest) ** 2, axis=0))
+
+    def _steepen(self, along: Array, circuit: Circuit, u: Array) -> None:
+        """Let the bias rise where it hardly does, in derivatives by u (n, 5) of what is shown."""
+        slope = circuit.bias(along[:, 0], along[:, 1])
+        least = _LEAST_SLOPE * np.abs(self.bias_V) / np.maximum(np.abs(u), 1e-9)
+        flat = np.abs(slope) < least
+        along[flat, 0] += (np.where(slope < 0, -least, least) - slope)[flat]
+
+
+def _reaching(branch: Branch, u: Array, short: Array) -> Array:
+    """Return V_l, I_h, V_r and the rise of the tip at some u, (4, n), as far as the bias goes."""
+    shown = branch.curve(u).T.copy()
+    shown[:TIP_RISE] *= short
+    return shown
+
+
+class ContactTemperatures:
+    """Adds `hotlever.measurands.OF_A_CONTACT` to what levers like one show, if it is in contact.
+
+    Parameters
+    ----------
+    probe : Probe
+    names : sequence of str
+        The parameters, (p,).
+    """
+
+    def __init__(self, probe: Probe, names: Sequence[str]) -> None:
+        self._law = contact_of(probe)
+        of_law = () if self._law is None else self._law.names
+        self._own = [number for number, name in enumerate(names) if name in of_law]
+        self._names = [names[number] for number in self._own]
+        self._origin = probe.values(self._names)
+        self._of_base = np.array([float(name == BASE) for name in self._names])
+
+    def shown(self, shown: Array, parameters: Array) -> Array:
+        """Return the observables of levers, and behind them what contacts show, (all, n)."""
+        return self.differentiated(shown, np.zeros((*shown.shape, parameters.size)), parameters)[0]
+
+    def differentiated(self, shown: Array, slopes: Array, parameters: Array) -> tuple[Array, Array]:
+        """Return the same and its derivatives, (all, n, p), by those of what levers show."""
+        if self._law is None:
+            return shown, slopes
+        ratio = parameters[self._own] / self._origin
+        base_K = self._law.base_temperature_K + float(self._of_base @ (self._origin * (ratio - 1)))
+        rise = shown[_TIP] - base_K
+        odds, by = self._law.log_odds(rise, self._names)
+        powers = np.zeros((*odds.shape, len(self._names)))
+        for number, name in enumerate(self._names):
+            powers[..., number] = self._origin[number] * by[name]
+        share = 1.0 / (1.0 + np.exp(-odds - powers @ np.log(ratio)))
+        bent = rise * share * (1.0 - share)
+        by_tip = share + bent * by["T"]
+        added = by_tip[..., None] * slopes[_TIP]
+        added[..., self._own] += bent[..., None] * powers / (ratio * self._origin)
+        added[..., self._own] += (1.0 - by_tip)[..., None] * self._of_base
+        return np.concatenate([shown, base_K + rise * share]), np.concatenate([slopes, added])
 
 
 @dataclass(frozen=True)
@@ -57,11 +222,11 @@ class LinearSurrogate:
     slopes: Array
 
     def predict(self, parameters: Array) -> tuple[Array, Array]:
-        """See `Surrogate`."""
+        """See `CurveSurrogate.predict`."""
         return self.shown(parameters), self.slopes.copy()
 
     def shown(self, parameters: Array) -> Array:
-        """See `Surrogate`."""
+        """Return the values of `predict` alone."""
         return self.values + self.slopes @ (parameters - self.parameters)
 
 
@@ -90,7 +255,8 @@ class CurveSurrogate:
         self.probe, self.names, self.branch, self.rows = probe, names, branch, rows
         self.by_parameter, self.contact = by_parameter, ContactTemperatures(probe, names)
         self._origin = probe.values(names)
-        scale = Coordinates.of(probe, names).scale
+        every = parameters_of(probe, anywhere=True)
+        scale = np.array([every[name].scale for name in names])
         self._unit = np.maximum(np.abs(self._origin), 0.1 * scale)
         self._rates = by_parameter * self._unit
         self._straight = not branch.begins_cold
@@ -121,7 +287,13 @@ class CurveSurrogate:
         return np.asarray(spline_through(self.branch.u, self._rates)(u) * self._origin / self._unit)
 
     def predict(self, parameters: Array) -> tuple[Array, Array]:
-        """See `Surrogate`."""
+        """Return the observables (m, n), and their derivatives (m, n, k), by parameters (k,).
+
+        Raises
+        ------
+        ComputationError
+            If such a lever has no such states.
+        """
         branch = self.branch_at(parameters)
         by_parameter = self._rates
         if not self._straight:
@@ -131,7 +303,7 @@ class CurveSurrogate:
         return self.contact.differentiated(*shown, parameters)
 
     def shown(self, parameters: Array) -> Array:
-        """See `Surrogate`."""
+        """Return the values of `predict` alone."""
         shown = self.rows.values(self.branch_at(parameters), self.circuit(parameters))
         return self.contact.shown(shown, parameters)
 
@@ -188,6 +360,10 @@ class ReducedSurrogate(CurveSurrogate):
         ratio[0] = ratio[1]
         growth = spline_through(self.branch.u, ratio)(self.branch.u, 1) / ratio
         return multiplied(self.branch, ratio, growth)
+
+
+#: A local model of what a lever shows, exact at the parameters of one that was solved.
+Surrogate = CurveSurrogate | LinearSurrogate
 
 
 def multiplied(branch: Branch, factor: Array, growth: Array) -> Branch:

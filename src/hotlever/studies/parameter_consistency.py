@@ -17,7 +17,7 @@ import xarray as xr
 
 from hotlever.datasets import labelled
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment_at_rest import ExperimentAtRest
+from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
