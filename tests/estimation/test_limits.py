@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.tip_temperature import error_of_model
-from hotlever.estimation.objective import Objective, Penalty, TipTemperature
+from hotlever.estimation.objective import Objective, Penalty, Quantity, Subproblem
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import Coordinates, PriorDensity
 from hotlever.estimation.profile import ErrorProfile, profile_of_tip
 from hotlever.estimation.sampling import SampledTip, sample_tip
-from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe.priors import Prior
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND
@@ -88,7 +87,7 @@ def profile(bend):
 
 def test_a_quantity_is_known_as_well_as_what_it_follows_from():
     for row, slope in enumerate(SLOPES):
-        value, stderr = posterior(0.1).of(TipTemperature(row))
+        value, stderr = posterior(0.1).of(Quantity("tip", row))
         assert value == pytest.approx(TIPS[row])
         assert stderr == pytest.approx(slope)
 
@@ -101,7 +100,7 @@ def test_changes_along_the_axes_add_up_to_the_variance():
 def test_a_pulled_quantity_is_on_its_profile():
     """Of all levers with this tip it is the one nearest to what was known: x² tells how far."""
     known = posterior(0.0)
-    tip = TipTemperature(2)
+    tip = Quantity("tip", 2)
     for target in (TIPS[2] + 30.0, TIPS[2] - 50.0):
         penalised = known.objective.penalised(Penalty(tip, target, 1e-3))
         there, squares = Subproblem(penalised, known.at).minimum()

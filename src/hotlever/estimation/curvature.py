@@ -12,8 +12,8 @@ import numpy as np
 from scipy import optimize
 from scipy.interpolate import PchipInterpolator
 
+from hotlever.estimation.objective import Subproblem
 from hotlever.estimation.posterior import Posterior
-from hotlever.estimation.subproblem import Subproblem
 from hotlever.estimation.surrogate import Surrogate
 from hotlever.types import Array
 

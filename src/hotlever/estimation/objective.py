@@ -1,64 +1,63 @@
-"""What an estimate makes small: data, priors and a penalty, as residuals of what is varied."""
+"""What an estimate makes small: data, priors and a penalty, as residuals of what is varied.
+
+Near a lever that was solved they follow from its surrogate, and a search steps by them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal
 
 import numpy as np
+from scipy import optimize
 
-from hotlever.errors import InputError
+from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.experiment import TIP, Prediction
 from hotlever.estimation.prior_density import FLAT, Coordinates, PriorDensity
 from hotlever.estimation.residuals import Residuals
 from hotlever.probe import Probe
 from hotlever.types import Array
 
+#: Relative change of the sum of squares at which a minimum is found; without priors squares count
+#: no standard deviations, so that next to nothing may be left.
+_GAIN, _PRECISE_GAIN = 1e-5, 1e-10
+#: Share of the range between its bounds by which a search must begin inside of them.
+_INSIDE = 1e-6
 #: Share of the range between its bounds within which a parameter is at one of them.
 _AT_BOUND = 1e-5
-
-
-class Quantity(Protocol):
-    """A number that follows from a lever."""
-
-    def value(self, values: Array, parameters: Array) -> float:
-        """Return it for predicted values (m, n) and the varied parameters (p,)."""
-        ...
-
-    def gradient(self, slopes: Array) -> Array:
-        """Return its derivatives by the parameters, (p,), for those of the values (m, n, p)."""
-        ...
+#: Scaled residual given to trial parameters for which the lever has no state, so that a search
+#: turns back.
+_UNSOLVED = 10.0
+#: A symmetric matrix of unit diagonal with a smaller eigenvalue is singular but for rounding.
+_SINGULAR = 1e-12
 
 
 @dataclass(frozen=True)
-class TipTemperature:
-    """The tip temperature (K) at a row of the data."""
+class Quantity:
+    """A number that follows from a lever.
 
-    row: int
+    Attributes
+    ----------
+    kind : {"tip", "parameter"}
+        The tip temperature (K) at a row of the data, or a varied parameter in its own unit.
+    number : int
+        Of the row, or of the parameter.
+    """
 
-    def value(self, values: Array, parameters: Array) -> float:
-        """See `Quantity`."""
-        return float(values[TIP, self.row])
-
-    def gradient(self, slopes: Array) -> Array:
-        """See `Quantity`."""
-        return np.asarray(slopes[TIP, self.row])
-
-
-@dataclass(frozen=True)
-class ParameterValue:
-    """One of the varied parameters, by its number, in its own unit."""
-
+    kind: Literal["tip", "parameter"]
     number: int
 
     def value(self, values: Array, parameters: Array) -> float:
-        """See `Quantity`."""
-        return float(parameters[self.number])
+        """Return it for predicted values (m, n) and the varied parameters (p,)."""
+        return float(values[TIP, self.number] if self.kind == "tip" else parameters[self.number])
 
     def gradient(self, slopes: Array) -> Array:
-        """See `Quantity`."""
+        """Return its derivatives by the parameters, (p,), for those of the values (m, n, p)."""
+        if self.kind == "tip":
+            return np.asarray(slopes[TIP, self.number])
         return np.asarray(np.arange(slopes.shape[-1]) == self.number, dtype=float)
 
 
@@ -73,13 +72,6 @@ class Penalty:
     quantity: Quantity
     target: float
     error: float
-
-
-#: Scaled residual given to trial parameters for which the lever has no state, so that a search
-#: turns back.
-_UNSOLVED = 10.0
-#: A symmetric matrix of unit diagonal with a smaller eigenvalue is singular but for rounding.
-_SINGULAR = 1e-12
 
 
 class Objective:
@@ -136,13 +128,9 @@ class Objective:
 
     # --- parameters and points --------------------------------------------------------------------
 
-    def values(self, probe: Probe) -> Array:
-        """Return the varied parameters of a probe in their own units."""
-        return probe.values(self.varied)
-
     def point(self, probe: Probe) -> Array:
         """Return the point of a probe."""
-        return self.coordinates.point(self.values(probe))
+        return self.coordinates.point(probe.values(self.varied))
 
     def at(self, probe: Probe, point: Array) -> Probe:
         """Return a probe with the values of a point.
@@ -180,7 +168,7 @@ class Objective:
     def unsolved(self, point: Array) -> Array:
         """Return residuals of a lever that has no states: far beyond any real ones."""
         data = np.full(self.residuals.size, _UNSOLVED)
-        penalty = np.full(0 if self._penalty is None else 1, _UNSOLVED)
+        penalty = [] if self._penalty is None else [_UNSOLVED]
         return np.concatenate([data, self.from_priors(point), penalty])
 
     def jacobian(self, slopes: Array, point: Array) -> Array:
@@ -248,8 +236,6 @@ class Objective:
         variance = residual @ residual / free * np.outer(rates, rates)
         return np.asarray(inverse_or_nan(jacobian.T @ jacobian) * variance)
 
-    # --- what follows at a point ------------------------------------------------------------------
-
     def laplace(self, slopes: Array, point: Array) -> Array:
         """Return the covariance of the coordinates that data and priors leave, linearised, (p, p).
 
@@ -271,6 +257,137 @@ class Objective:
         logarithmic = np.zeros(point.size, dtype=bool)
         logarithmic[self._of_prior] = self.prior.relative
         return float(np.sum(np.log(np.where(logarithmic, rates / values, rates))))
+
+
+class Subproblem:
+    """Residuals and their derivatives by points near a prediction, from its surrogate.
+
+    Other predictions say how values bend on the way to them: by what they differ there from what
+    is expected, growing as the square of the distance. Distances are measured by what data and
+    priors tell, so that those along the narrow valleys that a search follows are kept apart from
+    those across (Schnabel and Frank, SIAM J. Numer. Anal. 21, 815 (1984)).
+
+    Parameters
+    ----------
+    objective : Objective
+    at : Prediction
+    others : sequence of Prediction
+    least : float
+        Standard deviations from which on the others count: what nearer ones differ by would be
+        carried too far by those who look far away.
+    """
+
+    def __init__(
+        self,
+        objective: Objective,
+        at: Prediction,
+        others: Sequence[Prediction] = (),
+        least: float = 0.0,
+    ) -> None:
+        self.objective, self.at = objective, at
+        self.origin = objective.point(at.probe)
+        self._surrogate, self._parameters = at.surrogate, at.probe.values(objective.names)
+        self._bends: list[tuple[Array, Array]] = []
+        self._latest: tuple[Array, tuple[Array, Array]] | None = None
+        jacobian = objective.jacobian(at.slopes, self.origin)
+        for other in others:
+            away = objective.point(other.probe) - self.origin
+            along = jacobian.T @ (jacobian @ away)
+            size = float(along @ away)
+            with suppress(ComputationError):
+                missed = other.values - self._predicted(self.origin + away)[0]
+                # the product with this direction is 1 at the other prediction
+                if size > least**2:
+                    self._bends.append((along / size, missed))
+
+    def of(self, objective: Objective) -> Subproblem:
+        """Return the same levers, compared with the data by another objective."""
+        other = copy(self)
+        other.objective = objective
+        return other
+
+    def predict(self, point: Array) -> tuple[Array, Array]:
+        """Return the observables (m, n), and their derivatives by all parameters (m, n, k).
+
+        Raises
+        ------
+        ComputationError
+            If the lever has no such states.
+        """
+        # asked for twice, for the residuals and their derivatives
+        if self._latest is None or not np.array_equal(self._latest[0], point):
+            self._latest = point.copy(), self._predicted(point)
+        return self._latest[1]
+
+    def _predicted(self, point: Array) -> tuple[Array, Array]:
+        objective = self.objective
+        values, slopes = self._surrogate.predict(objective.among(self._parameters, point))
+        for along, missed in self._bends:
+            way = float(along @ (point - self.origin))
+            values = values + missed * way**2
+            slopes[:, :, objective.columns] += missed[:, :, None] * (
+                2.0 * way * along / objective.coordinates.rates(point)
+            )
+        return values, slopes
+
+    def shown(self, point: Array) -> Array:
+        """Return the values of `predict` alone: a sampler asks for thousands."""
+        values = self._surrogate.shown(self.objective.among(self._parameters, point))
+        for along, missed in self._bends:
+            values = values + missed * float(along @ (point - self.origin)) ** 2
+        return values
+
+    def residual(self, point: Array) -> Array:
+        """Return the residuals of data and priors; large ones if the lever has no such states."""
+        try:
+            return self.objective.residual(self.predict(point)[0], point)
+        except ComputationError:
+            return self.objective.unsolved(point)
+
+    def jacobian(self, point: Array) -> Array:
+        """Return their derivatives by the coordinates."""
+        return self.objective.jacobian(self.predict(point)[1], point)
+
+    def squares(self, point: Array) -> float:
+        """Return the sum of squares of the residuals."""
+        residual = self.residual(point)
+        return float(residual @ residual)
+
+    def minimum(
+        self, start: Array | None = None, region: Array | None = None
+    ) -> tuple[Array, float]:
+        """Return the point of least squares, and these.
+
+        Parameters
+        ----------
+        start : ndarray, shape (p,), optional
+            Where the search begins; at the lever that was solved by default, or if there are no
+            states.
+        region : ndarray, shape (p,), optional
+            How far it may go from that lever; by default to the bounds.
+        """
+        low, high = self.objective.bounds
+        if region is not None:
+            low = np.maximum(low, self.origin - region)
+            high = np.minimum(high, self.origin + region)
+        begin = self.origin
+        if start is not None:
+            with suppress(ComputationError):  # where there are no states, none begins
+                self.predict(start)
+                begin = start
+        margin = _INSIDE * (high - low)
+        solution = optimize.least_squares(
+            self.residual,
+            np.clip(begin, low + margin, high - margin),
+            self.jacobian,
+            (low, high),
+            x_scale="jac",
+            ftol=_GAIN if self.objective.informed else _PRECISE_GAIN,
+            xtol=1e-10,
+            gtol=None,
+            max_nfev=100,
+        )
+        return solution.x, 2.0 * float(solution.cost)
 
 
 def inverse_or_nan(matrix: Array) -> Array:

@@ -18,9 +18,8 @@ import numpy as np
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.lack_of_fit import lack_of_fit_text
-from hotlever.estimation.objective import Objective
+from hotlever.estimation.objective import Objective, Subproblem
 from hotlever.estimation.options import SearchOptions
-from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe import Probe
 from hotlever.text import with_unit
 from hotlever.types import Array, Progress
@@ -243,10 +242,10 @@ class Optimiser:
     def _settled(self, previous: Optimum, optimum: Optimum) -> bool:
         """Whether the parameters have moved too little for another confirmation to matter."""
         options, objective = self._options, self.objective
-        now = objective.values(optimum.probe)
+        now = optimum.probe.values(objective.varied)
         size = np.maximum(np.abs(now), objective.coordinates.scale)
         least = np.minimum(options.settled * optimum.stderr, options.settled_relative * size)
-        return bool(np.all(np.abs(now - objective.values(previous.probe)) <= least))
+        return bool(np.all(np.abs(now - previous.probe.values(objective.varied)) <= least))
 
     def solve(self, start: Probe) -> Optimum:
         """Find the optimum of the present model and weights.
@@ -304,7 +303,7 @@ class Optimiser:
         return unknown and self.objective.informed and self._options.scatter_rounds > 0
 
     def _check_start(self, start: Probe) -> None:
-        values = self.objective.values(start).tolist()
+        values = start.values(self.objective.varied).tolist()
         for parameter, value in zip(self.objective.coordinates.parameters, values, strict=True):
             if not parameter.lower <= value <= parameter.upper:
                 raise InputError(

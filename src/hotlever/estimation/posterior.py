@@ -163,7 +163,7 @@ class Posterior:
 
     def of(self, quantity: Quantity) -> tuple[float, float]:
         """Return a quantity and its standard error, linearised."""
-        value = quantity.value(self.at.values, self.objective.values(self.at.probe))
+        value = quantity.value(self.at.values, self.at.probe.values(self.objective.varied))
         return value, float(standard_errors(quantity.gradient(self.slopes), self.covariance))
 
     @property

@@ -17,12 +17,11 @@ from scipy.special import chdtri
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation.experiment import TIP, Experiment, Prediction, experiment_of
-from hotlever.estimation.objective import Objective, ParameterValue, Penalty, TipTemperature
+from hotlever.estimation.objective import Objective, Penalty, Quantity, Subproblem
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.over_a_sample import with_distances
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.result import Fit
-from hotlever.estimation.subproblem import Subproblem
 from hotlever.probe.parameters import parameter_of, usual_parameters
 from hotlever.text import BAND
 from hotlever.types import Array, Index
@@ -96,7 +95,7 @@ def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile
     """
     objective, at, rows = posterior.objective, posterior.at, hotter_rows(posterior.at)
     least = objective.squares(at)
-    tips = {number: TipTemperature(int(row)) for number, row in enumerate(rows)}
+    tips = {number: Quantity("tip", int(row)) for number, row in enumerate(rows)}
     moving = {number: tip for number, tip in tips.items() if posterior.of(tip)[1] > 0.0}
     sides = np.ones((2, rows.size))
     for side, way in enumerate((-1.0, 1.0) if moving else ()):
@@ -140,7 +139,7 @@ def _solved_near(
     return None
 
 
-def _penalty(posterior: Posterior, tip: TipTemperature, way: float) -> Penalty:
+def _penalty(posterior: Posterior, tip: Quantity, way: float) -> Penalty:
     """Return a datum that moves an estimate to `_AWAY` standard errors, if everything is linear.
 
     It is twice as far away, with the error that the tip is known by: the estimate moves half way.
@@ -203,7 +202,7 @@ def profile_likelihood(
         raise InputError(f"found points = {points}, expected an odd number of 5 or more")
     if not result.sum_of_squares > 0:
         raise InputError("the fit meets its data exactly: without scatter nothing tells how sure")
-    quantity = ParameterValue(result.names.index(name))
+    quantity = Quantity("parameter", result.names.index(name))
     names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
     objective = result.objective(names)
     residuals = objective.residuals

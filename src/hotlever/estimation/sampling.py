@@ -31,13 +31,12 @@ from hotlever.estimation.experiment import (
     experiment_of,
     named,
 )
-from hotlever.estimation.objective import TipTemperature
+from hotlever.estimation.objective import Quantity, Subproblem
 from hotlever.estimation.optimiser import Predictor
 from hotlever.estimation.over_a_sample import with_distances
 from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
 from hotlever.estimation.profile import ErrorProfile, hotter_rows
 from hotlever.estimation.result import Fit
-from hotlever.estimation.subproblem import Subproblem
 from hotlever.estimation.surrogate import ReducedSurrogate
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import full_name
@@ -160,7 +159,7 @@ def sample_tip(
     # a walker stands still where a proposal is refused
     different, index = np.unique(points, axis=0, return_inverse=True)
     tips = np.array([near.shown(point)[TIP, rows] for point in different])[index]
-    middle, stderr = np.transpose([posterior.of(TipTemperature(int(row))) for row in rows])
+    middle, stderr = np.transpose([posterior.of(Quantity("tip", int(row))) for row in rows])
     low, high = np.percentile(tips, (2.5, 97.5), axis=0)
     hottest = tips[:, -1].reshape(chains.points.shape[:3])
     return SampledTip(
