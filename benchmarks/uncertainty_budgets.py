@@ -26,11 +26,10 @@ from numpy.random import Generator
 
 from hotlever.calibration.inference import calibrated_by_estimate, estimate_lever
 from hotlever.errors import HotleverError
-from hotlever.estimation.experiment import TIP
+from hotlever.estimation.experiment import TIP, Predictor
 from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.objective import Objective
-from hotlever.estimation.optimiser import Optimiser
-from hotlever.estimation.options import SearchOptions
+from hotlever.estimation.optimiser import Optimiser, SearchOptions
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import draw, measure
@@ -80,7 +79,7 @@ def re_estimated(estimate: Estimate, bias_V: float, draws: int, rng: Generator) 
     for errors in rng.normal(size=(draws, jacobian.shape[0])):
         off = _OfDrawnErrors(own.residuals, estimate.probe, own.names, own.varied, own.prior)
         off.errors = errors
-        search = Optimiser(off, experiment, _WEIGHTS_STAY, near=estimate.prediction)
+        search = Optimiser(off, Predictor(experiment, near=estimate.prediction), _WEIGHTS_STAY)
         anew = search.solve(estimate.probe)
         tip_K = tip_of.predict(anew.probe, anew.prediction).values[TIP, 0]
         changes.append((by_errors @ errors, tip_K - predicted.values[TIP, 0]))

@@ -12,7 +12,7 @@ import pytest
 from hotlever.calibration.procedure import calibrate
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Measurement, fit
-from hotlever.estimation.inverse_problem import in_medium
+from hotlever.estimation.estimator import in_medium
 from hotlever.estimation.residuals import Residuals
 from synthetic_curves import measured_curve, measurement_of
 

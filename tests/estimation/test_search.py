@@ -15,11 +15,11 @@ from hotlever.calibration import calibrate
 from hotlever.errors import InputError
 from hotlever.estimation import Measurement, fit
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.experiment import ExperimentAtRest
+from hotlever.estimation.experiment import ExperimentAtRest, Predictor
 from hotlever.estimation.inverse_problem import estimate
 from hotlever.estimation.objective import Objective
-from hotlever.estimation.optimiser import Optimiser
-from hotlever.estimation.options import FitOptions, SearchOptions
+from hotlever.estimation.optimiser import Optimiser, SearchOptions
+from hotlever.estimation.options import FitOptions
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -64,7 +64,7 @@ def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
     objective, at = found.objective, found.prediction
     least, optimum = objective.squares(at), objective.point(at.probe)
     noise = found.residuals.errors.noise_squares(found.residuals.difference(at.values))
-    assert found.optimum.converged
+    assert found.converged
     jacobian = objective.jacobian(at.slopes, optimum)
     axes = np.linalg.svd(jacobian)[2]
     for axis in axes:
@@ -138,7 +138,7 @@ def test_a_search_that_was_ended_says_that_it_has_not_converged(coarse):
     model = full_experiment(coarse, residuals.bias).measuring(residuals.bias, residuals.shown)
     options = SearchOptions(most_branches=2)
     objective = Objective(residuals, far, model.names, list(PARAMETERS))
-    search = Optimiser(objective, model, options)
+    search = Optimiser(objective, Predictor(model), options)
     optimum = search.solve(far)
     assert not optimum.converged
     assert optimum.decrement > 1e-3 * search.objective.squares(optimum.prediction)

@@ -20,7 +20,7 @@ from hotlever.estimation import FitOptions, Measurement
 from hotlever.estimation.experiment import TIP
 from hotlever.estimation.noise import METERS
 from hotlever.estimation.optimal_design import Information, NoiseLaw
-from hotlever.estimation.options import SearchOptions
+from hotlever.estimation.optimiser import DISCREPANCY
 from hotlever.estimation.posterior import standard_errors
 from hotlever.estimation.prior_density import Coordinates, PriorDensity
 from hotlever.estimation.surrogate import CurveSurrogate, Rows
@@ -37,11 +37,9 @@ from hotlever.units import MOST_BIAS
 
 #: Observables whose scale is an unknown, in order.
 _SCALED = {observable: scale for scale, observable in SCALES.items()}
-#: Noise of a thermometer and of meters that nobody has stated, and what models are off by beside
-#: it.
+#: Noise of a thermometer and of meters that nobody has stated.
 _USUAL_NOISE = {"tip": NoiseLaw(RAMAN_ERROR_K, RAMAN_ERROR_SHARE)}
 _USUAL_OF_METERS = NoiseLaw(0.0, 1e-3)
-_DISCREPANCY = SearchOptions().discrepancy
 
 
 @dataclass(frozen=True)
@@ -277,7 +275,7 @@ class LinearisedLever:
         elif (counts := self.weights.get(observable, np.empty(0)) > 0).any():
             errors = 1.0 / self.weights[observable][counts]
             return NoiseLaw.of(errors, self._size(observable, self._measured)[counts]).at(size)
-        return np.hypot(law.at(size), _DISCREPANCY * size)
+        return np.hypot(law.at(size), DISCREPANCY * size)
 
     @property
     def _measured(self) -> Array:

@@ -24,7 +24,8 @@ from hotlever.calibration.uncertainty_budget import BudgetOf, check_budget_of, l
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import Fit, Measurement, read_fit
 from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.inverse_problem import Estimate, error_of_choice, in_medium
+from hotlever.estimation.estimator import error_of_choice, in_medium
+from hotlever.estimation.inverse_problem import Estimate
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers

@@ -1,27 +1,34 @@
-"""Fitting the material parameters of a lever to measured data."""
+"""Fitting the material parameters of a lever to measured data.
+
+Of a lever whose medium nobody knows both are tried, and it is said which describes the data.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 import xarray as xr
 
-from hotlever.errors import unknown_name
+from hotlever.errors import ComputationError, unknown_name
 from hotlever.estimation.diagnosis import Diagnosis
 from hotlever.estimation.experiment import Experiment, Prediction
-from hotlever.estimation.inverse_problem import Estimate, error_of_choice, estimate, in_medium
+from hotlever.estimation.inverse_problem import Estimate, estimate
 from hotlever.estimation.lack_of_fit import lack_of_fit_text, outlier_notes
-from hotlever.estimation.options import FitOptions
+from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
+from hotlever.estimation.outcome import Outcome
 from hotlever.estimation.posterior import standard_errors
 from hotlever.estimation.result import Fit, band_dataset
 from hotlever.estimation.summary import undetermined
 from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
+from hotlever.probe.surroundings import Medium
 from hotlever.types import Array, Progress
+
+Answer = TypeVar("Answer", bound=Outcome)
 
 
 def fit(
@@ -113,13 +120,13 @@ def _fit_of(estimate: Estimate) -> Fit:
         names=options.varied,
         observables=residuals.observables,
         covariance=posterior.covariance,
-        common_noise_covariance=estimate.optimum.covariance,
+        common_noise_covariance=estimate.covariance,
         data_weights=residuals.data_weights,
         sum_of_squares=float(weighted @ weighted),
         residual_rms=residuals.rms(values),
         band=_band(estimate),
         evaluations=estimate.predictor.evaluations,
-        steps=estimate.optimum.optimiser.steps,
+        steps=estimate.optimiser.steps,
         reason=reason,
         converged=converged,
         seconds=estimate.seconds,
@@ -137,6 +144,69 @@ def _band(estimate: Estimate) -> xr.Dataset:
     power = estimate.probe.circuit.power(columns["bias_V"], columns["current_mA"])
     stderr = standard_errors(slopes, covariance)
     return band_dataset(**along, power_mW=power, tip_K=columns["tip_K"], tip_stderr_K=stderr)
+
+
+def in_medium(
+    asked: str | None,
+    answered: Callable[[str | None], tuple[Estimate, Answer]],
+    of_either: Callable[[Answer, Answer], Answer],
+) -> tuple[Estimate, Answer]:
+    """Answer for a lever in the medium that is asked; if that is unknown, in the likelier one.
+
+    Then a note says how well either describes the data.
+
+    Parameters
+    ----------
+    asked : str or None
+        None is what measurement and probe say.
+    answered : callable
+        Return an estimate in a medium, and the outcome that is read from it.
+    of_either : callable
+        Return an outcome whose errors hold another: where both describe the data, these do not
+        tell which it is.
+
+    Raises
+    ------
+    ComputationError
+        If the lever can be solved in none of them.
+    """
+    if asked != UNKNOWN_MEDIUM:
+        return answered(asked)
+    answers: dict[str, tuple[Estimate, Answer]] = {}
+    failures: dict[str, ComputationError] = {}
+    for medium in get_args(Medium):
+        try:
+            answers[medium] = answered(medium)
+        except ComputationError as error:
+            failures[medium] = error
+    if not answers:
+        raise next(iter(failures.values()))
+
+    def unlikeliness(medium: str) -> tuple[bool, float]:
+        # what describes the data comes first, and of two of a kind the more probable one
+        estimate, answer = answers[medium]
+        return bool(answer.reason), estimate.posterior.deviance
+
+    best, *rest = sorted(answers, key=unlikeliness)
+    texts = [f"in {medium} a lever {_how_well(*answers[medium])}" for medium in (best, *rest)]
+    texts += [f"in {medium} none can be solved: {error}" for medium, error in failures.items()]
+    note = f"the medium is not known: {'; '.join(texts)}"
+    estimate, answer = answers[best]
+    for other in (answers[medium][1] for medium in rest if not answers[medium][1].reason):
+        answer = of_either(answer, other)
+        note += "; the data do not tell which, and the errors of the tip temperature hold both"
+    return estimate, replace(cast("Any", answer), notes=[note, *answer.notes])
+
+
+def error_of_choice(tip_K: Array, other_K: Array) -> Array:
+    """Return the standard error (K) of a tip temperature that may as well be another one."""
+    return np.asarray(np.abs(tip_K - other_K) / np.sqrt(2.0))
+
+
+def _how_well(estimate: Estimate, answer: Outcome) -> str:
+    rms = estimate.residuals.rms(estimate.prediction.values)
+    shown = ", ".join(f"{value:.2g} {name.rsplit('_', 1)[1]}" for name, value in rms.items())
+    return f"{'does not describe' if answer.reason else 'describes'} the data (rms {shown})"
 
 
 def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOptions:

@@ -11,12 +11,15 @@ material, dimensions, the series resistance.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, Self
 
 import numpy as np
 from scipy.interpolate import BSpline
 
+from hotlever.errors import ComputationError
 from hotlever.estimation.surrogate import CurveSurrogate, Rows, Surrogate
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
 from hotlever.lever.curve import spline_through
@@ -28,12 +31,15 @@ from hotlever.measurands import FITTED
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
-from hotlever.types import Array
+from hotlever.types import Array, Progress
 
 #: Where predictions have the tip temperature.
 TIP = list(FITTED).index("tip")
 #: How far beyond zero bias the branch of a lever goes that does not start cold: share of the range.
 _BEYOND_ZERO = 0.05
+#: Levers that most searches solve, for a progress bar to fill; latest predictions that are at hand
+#: and tell how values bend between them.
+_USUAL_LEVERS, _KEPT = 8, 5
 
 
 @dataclass(frozen=True)
@@ -97,6 +103,87 @@ class Experiment(Protocol):
             If the full lever cannot be solved there.
         """
         ...
+
+
+class Predictor:
+    """Predicts with an experiment, each lever from the latest one; the latest are at hand.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Kept as the attribute of this name, as confirmed last.
+    progress : callable, optional
+        Called with the levers solved and how many there usually are.
+    seen : callable, optional
+        Called with each prediction that is compared with the data.
+    near : Prediction, optional
+        Of a lever similar to that at which a search begins.
+
+    Attributes
+    ----------
+    evaluations : int
+        Levers solved.
+    """
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        progress: Progress | None = None,
+        seen: Callable[[Prediction], None] | None = None,
+        near: Prediction | None = None,
+    ) -> None:
+        self.experiment, self.evaluations = experiment, 0
+        self._progress, self._seen = progress, seen
+        self._at_hand = {} if near is None else {near.probe: near}
+
+    def predict(self, probe: Probe) -> Prediction:
+        """Predict from the latest prediction, unless what is asked is at hand."""
+        if probe not in self._at_hand:
+            self._at_hand[probe] = self._solved(probe)
+        self._at_hand[probe] = self._at_hand.pop(probe)  # the latest
+        if len(self._at_hand) > _KEPT:
+            del self._at_hand[next(iter(self._at_hand))]
+        return self._at_hand[probe]
+
+    def _solved(self, probe: Probe) -> Prediction:
+        near = next(reversed(self._at_hand.values()), None)
+        self.evaluations += 1
+        try:
+            prediction = self.experiment.predict(probe, near)
+        except ComputationError:
+            if near is None:
+                raise
+            # a step too far to be followed from there
+            prediction = self.experiment.predict(probe)
+        if self._progress is not None:
+            self._progress(self.evaluations, max(_USUAL_LEVERS, self.evaluations))
+        if self._seen is not None:
+            self._seen(prediction)
+        return prediction
+
+    def others(self, prediction: Prediction) -> list[Prediction]:
+        """Return the predictions at hand beside one."""
+        return [other for other in self._at_hand.values() if other is not prediction]
+
+    def confirm(self, at: Prediction) -> bool:
+        """Make the experiment exact at a prediction; return whether that makes another one.
+
+        Raises
+        ------
+        ComputationError
+            If the full lever cannot be solved there.
+        """
+        confirmed = self.experiment.confirmed(at)
+        if confirmed is self.experiment:
+            return False
+        self.experiment = confirmed
+        others, self._at_hand = self.others(at), {}
+        for other in others:
+            # with what the fast lever lacked, it may melt below the highest bias
+            with suppress(ComputationError):
+                self._at_hand[other.probe] = confirmed.predict(other.probe, other)
+        self._at_hand[at.probe] = confirmed.predict(at.probe, at)
+        return True
 
 
 @dataclass(frozen=True)

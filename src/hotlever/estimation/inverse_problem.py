@@ -1,15 +1,17 @@
 """The inverse problem: what priors and a measurement make most likely of a lever.
 
-Of a lever whose medium nobody knows both are tried, and it is said which describes the data.
+The resistance of a cold lever tells its doping and size, whatever it does when hot. So a lever that
+is far from the data is first made to show their coldest rows, then more and more of them; each
+portion begins where the last has led, and no candidate is asked for biases that it cannot take.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 
@@ -20,19 +22,18 @@ from hotlever.estimation.experiment import (
     ExperimentAtRest,
     Prediction,
     PredictionAtRest,
+    Predictor,
     experiment_of,
 )
 from hotlever.estimation.experiment_in_time import ExperimentInTime, known_in_time
 from hotlever.estimation.noise import errors_of_scales
 from hotlever.estimation.objective import Objective
-from hotlever.estimation.optimiser import Optimum, Predictor
-from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
-from hotlever.estimation.outcome import Outcome
+from hotlever.estimation.optimiser import Optimiser, Optimum, SearchOptions
+from hotlever.estimation.options import FitOptions
 from hotlever.estimation.over_a_sample import with_distances
 from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import FLAT, PriorDensity
 from hotlever.estimation.residuals import Residuals
-from hotlever.estimation.search import Search
 from hotlever.lever.branch import Branch
 from hotlever.measurands import FITTED, OF_A_CONTACT
 from hotlever.measurement import (
@@ -42,13 +43,13 @@ from hotlever.measurement import (
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.measurement.sample import check_sample
 from hotlever.probe import Probe
+from hotlever.probe.parameters import dimensions_of, parameters_of
 from hotlever.probe.priors import (
     ALL_DIMENSIONS,
     Prior,
     PriorUse,
     default_priors,
 )
-from hotlever.probe.surroundings import Medium
 from hotlever.types import Array, Progress
 
 #: The share of the sum of squares that another step would take away, below which a search that has
@@ -61,46 +62,33 @@ _MISSING = {
 }
 #: Data that are enough to tell, with priors, which of them are outliers.
 _ENOUGH = 15
+#: A lever is far from data that differ from what it shows by this share of the largest (median).
+_FAR = 0.06
+#: Portions by which a lever grows, the last of which is all of the rows; the least rows of one.
+_PORTIONS, _FEWEST_ROWS = 6, 3
+#: By how much the usual priors are widened, and the spread of what has none, where only the
+#: directions are to be closed that a few cold rows leave open.
+_WIDENED, _OPEN = 4.0, 0.5
+#: Share of a dimension by which a mesh follows it well; edges' bias moves all of them.
+_MESH_FOLLOWS = 0.2
+#: A portion is to be met within some per cent: the next moves the lever anyway.
+_OF_PORTIONS = SearchOptions(
+    most_branches=4, decrement=2.0, scatter_rounds=0, first_region=0.7, largest_region=1.2
+)
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Optimum):
     """The most likely lever, with the problem that it solves.
 
     The lever as it was `stated` is in the circuit and medium of the measurement.
     """
 
-    optimum: Optimum
     stated: Probe
     measurement: Measurement
     options: FitOptions
     seconds: float
     notes: list[str]
-
-    @property
-    def probe(self) -> Probe:
-        """The lever."""
-        return self.optimum.probe
-
-    @property
-    def prediction(self) -> Prediction:
-        """What it shows."""
-        return self.optimum.prediction
-
-    @property
-    def objective(self) -> Objective:
-        """What is least for it."""
-        return self.optimum.optimiser.objective
-
-    @property
-    def predictor(self) -> Predictor:
-        """What predicts levers like it, by the experiment that was confirmed last."""
-        return self.optimum.optimiser.predictor
-
-    @property
-    def residuals(self) -> Residuals:
-        """The data that it is compared with, with their weights."""
-        return self.objective.residuals
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -142,10 +130,10 @@ class Estimate:
         One that was ended far from describing the data, where another step would take less than
         half of the sum of squares away, has found that no such lever shows them.
         """
-        share = self.optimum.decrement / max(self.objective.squares(self.prediction), 1e-300)
-        if self.optimum.converged or (lack_of_fit and share < _LITTLE):
+        share = self.decrement / max(self.objective.squares(self.prediction), 1e-300)
+        if self.converged or (lack_of_fit and share < _LITTLE):
             return True, lack_of_fit
-        refused = self.optimum.optimiser.refused
+        refused = self.optimiser.refused
         beyond = f"; a lever on the way could not be solved: {refused}" if refused else ""
         return False, (
             f"the search was ended after {self.predictor.evaluations} levers, before it converged: "
@@ -227,7 +215,14 @@ def estimate(
         experiment = experiment.measuring(*residuals.at_rest)
         optimum = search.from_anywhere(experiment, measurement)
     seconds = time.perf_counter() - began
-    return Estimate(optimum, probe, measurement, options, seconds, notes)
+    return Estimate(
+        **vars(optimum),
+        stated=probe,
+        measurement=measurement,
+        options=options,
+        seconds=seconds,
+        notes=notes,
+    )
 
 
 def _observables(
@@ -255,67 +250,136 @@ def _observables(
     return shown if options.observables is None else tuple(options.observables)
 
 
-Answer = TypeVar("Answer", bound=Outcome)
+# --- the search ---------------------------------------------------------------------------------
 
 
-def in_medium(
-    asked: str | None,
-    answered: Callable[[str | None], tuple[Estimate, Answer]],
-    of_either: Callable[[Answer, Answer], Answer],
-) -> tuple[Estimate, Answer]:
-    """Answer for a lever in the medium that is asked; if that is unknown, in the likelier one.
+@dataclass(frozen=True)
+class Search:
+    """What is searched for.
 
-    Then a note says how well either describes the data.
-
-    Parameters
+    Attributes
     ----------
-    asked : str or None
-        None is what measurement and probe say.
-    answered : callable
-        Return an estimate in a medium, and the outcome that is read from it.
-    of_either : callable
-        Return an outcome whose errors hold another: where both describe the data, these do not
-        tell which it is.
-
-    Raises
-    ------
-    ComputationError
-        If the lever can be solved in none of them.
+    residuals : Residuals
+    start : Probe
+        As the lever is known beforehand.
+    varied : list of str
+    robust : bool
+        Whether the weight of outliers is lessened.
+    prior : PriorDensity
+    progress, seen : callable, optional
+        See `hotlever.estimation.experiment.Predictor`.
     """
-    if asked != UNKNOWN_MEDIUM:
-        return answered(asked)
-    answers: dict[str, tuple[Estimate, Answer]] = {}
-    failures: dict[str, ComputationError] = {}
-    for medium in get_args(Medium):
+
+    residuals: Residuals
+    start: Probe
+    varied: list[str]
+    robust: bool
+    prior: PriorDensity = FLAT
+    progress: Progress | None = None
+    seen: Callable[[Prediction], None] | None = None
+
+    def near(self, experiment: Experiment, start: Probe) -> Optimum:
+        """Search from a lever that is not far from the one that was measured."""
+        return self._optimiser(experiment, start).solve_and_confirm(start, self.robust)
+
+    def from_anywhere(self, experiment: ExperimentAtRest, measurement: Measurement) -> Optimum:
+        """Search from a lever of which little may be known.
+
+        If it shows something else than the data, or the search leads to a lever that does, it first
+        grows; of two ends the one that describes the data better counts.
+
+        Raises
+        ------
+        ComputationError
+            If the lever cannot be solved at the start.
+        """
+        ends: list[Optimum] = []
+        optimiser = self._optimiser(experiment, self.start)
+        with suppress(ComputationError):
+            if not _is_far(self.residuals, optimiser.predictor.predict(self.start)):
+                ends.append(optimiser.solve_and_confirm(self.start, self.robust))
+                if ends[0].describes_data:
+                    return ends[0]
+        grown, nearer = self._grown(experiment, measurement)
+        if ends and nearer == self.start:
+            # cold rows say nothing else, and the same search would come to the same end
+            return ends[0]
         try:
-            answers[medium] = answered(medium)
-        except ComputationError as error:
-            failures[medium] = error
-    if not answers:
-        raise next(iter(failures.values()))
+            ends.append(self.near(grown, nearer))
+        except ComputationError:
+            if not ends:
+                raise
+        return min(ends, key=lambda end: (not end.describes_data, end.misfit))
 
-    def unlikeliness(medium: str) -> tuple[bool, float]:
-        # what describes the data comes first, and of two of a kind the more probable one
-        estimate, answer = answers[medium]
-        return bool(answer.reason), estimate.posterior.deviance
+    def _optimiser(self, experiment: Experiment, start: Probe) -> Optimiser:
+        residuals = self.residuals.afresh()
+        objective = Objective(residuals, start, experiment.names, self.varied, self.prior)
+        return Optimiser(objective, Predictor(experiment, self.progress, self.seen))
 
-    best, *rest = sorted(answers, key=unlikeliness)
-    texts = [f"in {medium} a lever {_how_well(*answers[medium])}" for medium in (best, *rest)]
-    texts += [f"in {medium} none can be solved: {error}" for medium, error in failures.items()]
-    note = f"the medium is not known: {'; '.join(texts)}"
-    estimate, answer = answers[best]
-    for other in (answers[medium][1] for medium in rest if not answers[medium][1].reason):
-        answer = of_either(answer, other)
-        note += "; the data do not tell which, and the errors of the tip temperature hold both"
-    return estimate, replace(cast("Any", answer), notes=[note, *answer.notes])
+    def _grown(
+        self, experiment: ExperimentAtRest, measurement: Measurement
+    ) -> tuple[ExperimentAtRest, Probe]:
+        """Return a lever that shows nearly what was measured, up to the hottest portion of rows.
+
+        With it the experiment is returned that is to be searched on with. Without priors the usual
+        ones close what cold rows leave open.
+        """
+        experiment, start = experiment.coarse(), self.start
+        prior = (
+            self.prior if self.prior.names else PriorDensity.of_priors(_closing(start, self.varied))
+        )
+        bias = np.abs(measurement.bias_V)
+        current = measurement.current(start.circuit)
+        heated = np.unique(bias[np.isfinite(current) & (bias > 0)])
+        for portion in range(1, _PORTIONS):
+            count = max(_FEWEST_ROWS, -(-heated.size * portion // _PORTIONS))
+            if count >= heated.size:
+                break
+            part = measurement.part(bias <= heated[count - 1])
+            with_data = set(part.observables)
+            residuals = Residuals(
+                part, [name for name in self.residuals.observables if name in with_data], "errors"
+            )
+            if _has_moved(experiment.fast.drawn, start):
+                experiment = experiment.drawn_anew(start)
+            of_part = experiment.measuring(*residuals.at_rest)
+            objective = Objective(residuals, start, of_part.names, self.varied, prior)
+            # what is seen of a portion is not seen at the rows of the measurement
+            predictor = Predictor(of_part, self.progress)
+            try:
+                start = Optimiser(objective, predictor, _OF_PORTIONS).solve(start).probe
+            except ComputationError:
+                if portion == 1:
+                    raise
+                break
+        moved = _has_moved(experiment.fast.drawn, start)
+        return (experiment.drawn_anew(start) if moved else experiment), start
 
 
-def error_of_choice(tip_K: Array, other_K: Array) -> Array:
-    """Return the standard error (K) of a tip temperature that may as well be another one."""
-    return np.asarray(np.abs(tip_K - other_K) / np.sqrt(2.0))
+def _is_far(residuals: Residuals, at: Prediction) -> bool:
+    """Whether a lever shows something else than the data."""
+    share = residuals.difference(at.values) / residuals.largest
+    # a few wrong rows are no other lever
+    return bool(np.nanmax(np.nanmedian(np.abs(share), axis=1)) > _FAR)
 
 
-def _how_well(estimate: Estimate, answer: Outcome) -> str:
-    rms = estimate.residuals.rms(estimate.prediction.values)
-    shown = ", ".join(f"{value:.2g} {name.rsplit('_', 1)[1]}" for name, value in rms.items())
-    return f"{'does not describe' if answer.reason else 'describes'} the data (rms {shown})"
+def _has_moved(drawn: Probe, probe: Probe) -> bool:
+    """Whether a probe's dimensions are far from those that a mesh was drawn with."""
+    names = dimensions_of(probe)
+    before, now = drawn.values(names), probe.values(names)
+    return bool(np.any(np.abs(now - before) > _MESH_FOLLOWS * np.abs(before)))
+
+
+def _closing(probe: Probe, varied: Sequence[str]) -> dict[str, Prior]:
+    """Return wide priors about a probe for all that is varied."""
+    usual, every = default_priors(probe), parameters_of(probe, anywhere=True)
+    closing = {}
+    for name, value in zip(varied, probe.values(list(varied)).tolist(), strict=True):
+        if name in usual:
+            prior = usual[name]
+            closing[name] = Prior(value, _WIDENED * prior.spread, prior.relative)
+        elif every[name].lower > 0:
+            closing[name] = Prior(value, _OPEN)
+        else:
+            closing[name] = Prior(value, _OPEN * every[name].scale, relative=False)
+    return closing

@@ -8,24 +8,76 @@ Gauss and Newton's step would lower the sum of squares by next to nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimation.experiment import Experiment, Prediction
+from hotlever.errors import HotleverError, InputError
+from hotlever.estimation.experiment import Prediction, Predictor
 from hotlever.estimation.lack_of_fit import lack_of_fit_text
 from hotlever.estimation.objective import Objective, Subproblem
-from hotlever.estimation.options import SearchOptions
+from hotlever.estimation.residuals import Residuals
 from hotlever.probe import Probe
 from hotlever.text import with_unit
-from hotlever.types import Array, Progress
+from hotlever.types import Array
 
-#: Branches that most searches need, for a progress bar to fill.
-_USUAL_BRANCHES = 8
+#: Levers solved for all choices of weights together, after which a search ends where it is; robust
+#: fits without priors, which begin anew, take several times as many.
+_MOST_IN_ALL = 40
+#: A region beyond which only rounding errors are left, in units of `Coordinates.room`.
+_SMALLEST_REGION = 1e-6
+#: The share of the predicted gain from which on the region grows, and below which it shrinks.
+_TRUSTED, _DOUBTED = 0.7, 0.25
+#: Sum of squares that Gauss and Newton's step may still take away at an optimum where no longer
+#: step than the region gains anything, since values are not smooth there, as near a fold that moves
+#: past a row: a third of a standard error.
+_DECREMENT_WHERE_ROUGH, _ROUGH_REGION = 0.1, 1e-3
+#: The same in units of the noise, where weights count no standard deviations: a thirtieth of a
+#: standard error.
+_RELATIVE_DECREMENT = 1e-3
+#: The same as a share of the sum of squares; the second where that is so many times what noise
+#: explains that no such lever shows the data.
+_NEGLIGIBLE, _NEGLIGIBLE_OF_MISFIT, _MISFIT = 1e-6, 1e-3, 10.0
+#: Differences, as shares of the largest value of an observable, of which only rounding errors are
+#: left.
+_PRECISION = 1e-7
+#: Most reweightings by Huber's weights, with which there is one optimum; then by those that forget
+#: outliers.
+_GENTLE_ROUNDS, _ROBUST_ROUNDS = 6, 14
+#: A confirmation by the full lever that moves no parameter by more than these shares of its
+#: standard error and of its value ends the fit: the confirmed model is exact to first order. Most
+#: confirmations.
+_SETTLED, _SETTLED_RELATIVE, _CONFIRMATIONS = 0.5, 0.03, 5
+#: By how much a model is off that describes the data, a share of an observable's largest value,
+#: where something was known of the lever beforehand (model discrepancy: Kennedy and O'Hagan,
+#: J. R. Stat. Soc. B 63, 425 (2001)).
+DISCREPANCY = 5e-4
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """What steers a search.
+
+    Attributes
+    ----------
+    most_branches : int
+        Levers solved for one choice of weights, after which it ends where it is. Good data take 6
+        to 15; those of levers of which little is known up to 30.
+    first_region, largest_region : float
+        How far a step goes, in units of `Coordinates.room`: logarithms, where parameters are
+        positive. Beyond a factor of two neighbours say little.
+    decrement : float
+        Sum of squares that Gauss and Newton's step would still take away at an optimum, where
+        squares count standard deviations (with priors): a tenth of a standard error.
+    scatter_rounds : int
+        Rounds in which an observable without measurement errors finds its scatter.
+    """
+
+    most_branches: int = 25
+    first_region: float = 0.5
+    largest_region: float = 0.7
+    decrement: float = 1e-2
+    scatter_rounds: int = 3
 
 
 @dataclass(frozen=True)
@@ -58,6 +110,21 @@ class Optimum:
         return self.prediction.probe
 
     @property
+    def objective(self) -> Objective:
+        """What is least for it."""
+        return self.optimiser.objective
+
+    @property
+    def predictor(self) -> Predictor:
+        """What predicts levers like it, by the experiment that was confirmed last."""
+        return self.optimiser.predictor
+
+    @property
+    def residuals(self) -> Residuals:
+        """The data that it is compared with, with their weights."""
+        return self.objective.residuals
+
+    @property
     def stderr(self) -> Array:
         """Standard errors from the covariance, (p,); infinite where there are none."""
         variance = np.diag(self.covariance)
@@ -66,100 +133,13 @@ class Optimum:
     @property
     def describes_data(self) -> bool:
         """Whether the search converged to a lever that describes the data."""
-        return self.converged and not lack_of_fit_text(
-            self.optimiser.residuals, self.prediction.values
-        )
+        return self.converged and not lack_of_fit_text(self.residuals, self.prediction.values)
 
     @property
     def misfit(self) -> float:
         """The mean square of differences, as shares of the largest of each observable."""
-        residuals = self.optimiser.residuals
-        share = residuals.difference(self.prediction.values) / residuals.largest
-        return float(np.nanmean((residuals.errors.down * share) ** 2))
-
-
-class Predictor:
-    """Predicts with an experiment, each lever from the latest one; the latest are at hand.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        Kept as the attribute of this name, as confirmed last.
-    kept : int
-        How many predictions are at hand.
-    progress : callable, optional
-        Called with the levers solved and how many there usually are.
-    seen : callable, optional
-        Called with each prediction that is compared with the data.
-    near : Prediction, optional
-        Of a lever similar to that at which a search begins.
-
-    Attributes
-    ----------
-    evaluations : int
-        Levers solved.
-    """
-
-    def __init__(
-        self,
-        experiment: Experiment,
-        kept: int,
-        progress: Progress | None = None,
-        seen: Callable[[Prediction], None] | None = None,
-        near: Prediction | None = None,
-    ) -> None:
-        self.experiment, self.evaluations = experiment, 0
-        self._kept, self._progress, self._seen = kept, progress, seen
-        self._at_hand = {} if near is None else {near.probe: near}
-
-    def predict(self, probe: Probe) -> Prediction:
-        """Predict from the latest prediction, unless what is asked is at hand."""
-        if probe not in self._at_hand:
-            self._at_hand[probe] = self._solved(probe)
-        self._at_hand[probe] = self._at_hand.pop(probe)  # the latest
-        if len(self._at_hand) > self._kept:
-            del self._at_hand[next(iter(self._at_hand))]
-        return self._at_hand[probe]
-
-    def _solved(self, probe: Probe) -> Prediction:
-        near = next(reversed(self._at_hand.values()), None)
-        self.evaluations += 1
-        try:
-            prediction = self.experiment.predict(probe, near)
-        except ComputationError:
-            if near is None:
-                raise
-            # a step too far to be followed from there
-            prediction = self.experiment.predict(probe)
-        if self._progress is not None:
-            self._progress(self.evaluations, max(_USUAL_BRANCHES, self.evaluations))
-        if self._seen is not None:
-            self._seen(prediction)
-        return prediction
-
-    def others(self, prediction: Prediction) -> list[Prediction]:
-        """Return the predictions at hand beside one."""
-        return [other for other in self._at_hand.values() if other is not prediction]
-
-    def confirm(self, at: Prediction) -> bool:
-        """Make the experiment exact at a prediction; return whether that makes another one.
-
-        Raises
-        ------
-        ComputationError
-            If the full lever cannot be solved there.
-        """
-        confirmed = self.experiment.confirmed(at)
-        if confirmed is self.experiment:
-            return False
-        self.experiment = confirmed
-        others, self._at_hand = self.others(at), {}
-        for other in others:
-            # with what the fast lever lacked, it may melt below the highest bias
-            with suppress(ComputationError):
-                self._at_hand[other.probe] = confirmed.predict(other.probe, other)
-        self._at_hand[at.probe] = confirmed.predict(at.probe, at)
-        return True
+        share = self.residuals.difference(self.prediction.values) / self.residuals.largest
+        return float(np.nanmean((self.residuals.errors.down * share) ** 2))
 
 
 class Optimiser:
@@ -168,10 +148,8 @@ class Optimiser:
     Parameters
     ----------
     objective : Objective
-    experiment : Experiment
+    predictor : Predictor
     options : SearchOptions, optional
-    **predicting
-        Of the `Predictor`, which is the attribute `predictor`.
 
     Attributes
     ----------
@@ -182,13 +160,11 @@ class Optimiser:
     def __init__(
         self,
         objective: Objective,
-        experiment: Experiment,
+        predictor: Predictor,
         options: SearchOptions | None = None,
-        **predicting: Any,
     ) -> None:
-        self.objective, self.residuals = objective, objective.residuals
+        self.objective, self.residuals, self.predictor = objective, objective.residuals, predictor
         self._options, self.steps = options or SearchOptions(), 0
-        self.predictor = Predictor(experiment, self._options.kept, **predicting)
         #: What was wrong with the latest lever that could not be drawn or solved.
         self.refused = ""
 
@@ -202,15 +178,14 @@ class Optimiser:
         ComputationError
             If the lever cannot be solved at the start, or confirmations do not settle.
         """
-        options = self._options
         optimum = self.solve(start)
         unknown = self.residuals.errors.without.any() and not self.objective.informed
-        for _ in range(options.scatter_rounds if unknown else 0):
+        for _ in range(self._options.scatter_rounds if unknown else 0):
             self.residuals.take_scatter(optimum.prediction.values)
             optimum = self.solve(optimum.probe)
         if robust:
             optimum = self._reweighted(start, optimum)
-        for _ in range(options.confirmations):
+        for _ in range(_CONFIRMATIONS):
             if not self.predictor.confirm(optimum.prediction):
                 return optimum
             previous, optimum = optimum, self.solve(optimum.probe)
@@ -224,12 +199,11 @@ class Optimiser:
         With priors outliers stand out at once, since these hold a fit that others would pull along;
         without any there is nothing to do.
         """
-        options = self._options
         errors, informed = self.residuals.errors, self.objective.informed
         difference = self.residuals.own_difference(optimum.prediction.values)
         if informed and not errors.has_outliers(difference):
             return optimum
-        for gently, most in ((True, options.gentle_rounds), (False, options.robust_rounds)):
+        for gently, most in ((True, _GENTLE_ROUNDS), (False, _ROBUST_ROUNDS)):
             for _ in range(most):
                 errors.lessen(self.residuals.own_difference(optimum.prediction.values), gently)
                 # outliers can drive the first fit onto a bound, where it would stay without priors
@@ -241,10 +215,10 @@ class Optimiser:
 
     def _settled(self, previous: Optimum, optimum: Optimum) -> bool:
         """Whether the parameters have moved too little for another confirmation to matter."""
-        options, objective = self._options, self.objective
+        objective = self.objective
         now = optimum.probe.values(objective.varied)
         size = np.maximum(np.abs(now), objective.coordinates.scale)
-        least = np.minimum(options.settled * optimum.stderr, options.settled_relative * size)
+        least = np.minimum(_SETTLED * optimum.stderr, _SETTLED_RELATIVE * size)
         return bool(np.all(np.abs(now - previous.probe.values(objective.varied)) <= least))
 
     def solve(self, start: Probe) -> Optimum:
@@ -260,7 +234,7 @@ class Optimiser:
         objective, options = self.objective, self._options
         self._check_start(start)
         # without priors a robust search begins anew with each choice of weights
-        in_all = options.most_in_all * (1 if objective.informed else options.gentle_rounds)
+        in_all = _MOST_IN_ALL * (1 if objective.informed else _GENTLE_ROUNDS)
         most = min(self.predictor.evaluations + options.most_branches, in_all)
         at, region = self.predictor.predict(start), options.first_region
         while True:
@@ -277,20 +251,20 @@ class Optimiser:
             # a step within the region that gains nothing is as good as none
             if left <= enough or (inner and squares - least <= enough):
                 return self._optimum(at, left, converged=True)
-            if region < options.smallest_region or self.predictor.evaluations >= most:
+            if region < _SMALLEST_REGION or self.predictor.evaluations >= most:
                 # only rounding errors are left, if so little is promised
-                precise = left <= options.negligible_of_misfit * squares
-                precise = precise and region < options.smallest_region
+                precise = left <= _NEGLIGIBLE_OF_MISFIT * squares
+                precise = precise and region < _SMALLEST_REGION
                 return self._optimum(at, left, converged=precise or self._is_near(left))
-            if region < options.rough_region and self._is_near(left):
+            if region < _ROUGH_REGION and self._is_near(left):
                 return self._optimum(at, left, converged=True)
             length = float(np.max(np.abs(step) / room))
             trial = self._trial(at, target)
             better = np.inf if trial is None else objective.squares(trial)
             gain = (squares - better) / max(squares - least, 1e-300)
-            if gain < options.doubted:
+            if gain < _DOUBTED:
                 region = 0.3 * length
-            elif gain > options.trusted:
+            elif gain > _TRUSTED:
                 region = min(max(region, 2.0 * length), options.largest_region)
             if trial is not None and better < squares:
                 self.steps += 1
@@ -313,20 +287,20 @@ class Optimiser:
 
     def _is_near(self, left: float) -> bool:
         """Whether an optimum is so near that its errors hold, if values are not smooth there."""
-        return self.objective.informed and left <= self._options.decrement_where_rough
+        return self.objective.informed and left <= _DECREMENT_WHERE_ROUGH
 
     def _tolerance(self, at: Prediction) -> float:
         """Return by how much the sum of squares may still fall where a search ends."""
-        objective, residuals, options = self.objective, self.residuals, self._options
+        objective, residuals = self.objective, self.residuals
         squares, difference = objective.squares(at), residuals.difference(at.values)
         noise = 1.0 if objective.informed else residuals.errors.noise_squares(difference)
         # so far above what noise explains that no lever is near
-        hopeless = squares > options.misfit * residuals.size * noise
-        least = (options.negligible_of_misfit if hopeless else options.negligible) * squares
+        hopeless = squares > _MISFIT * residuals.size * noise
+        least = (_NEGLIGIBLE_OF_MISFIT if hopeless else _NEGLIGIBLE) * squares
         if objective.informed:
-            return float(max(options.decrement, least))
-        precise = residuals.size * (options.precision * residuals.errors.unit_weight) ** 2
-        return float(max(options.relative_decrement * noise, least, precise))
+            return float(max(self._options.decrement, least))
+        precise = residuals.size * (_PRECISION * residuals.errors.unit_weight) ** 2
+        return float(max(_RELATIVE_DECREMENT * noise, least, precise))
 
     def _optimum(self, at: Prediction, left: float, *, converged: bool) -> Optimum:
         return Optimum(self, at, left, converged, self.objective.common_noise_covariance(at))
@@ -341,10 +315,10 @@ class Optimiser:
 
     def _with_scatter(self, point: Array, region: Array, near: Subproblem) -> tuple[Array, float]:
         """Take scatter and optimum in turns, among parameters near those of a prediction."""
-        options, least = self._options, np.inf
-        for _ in range(options.scatter_rounds):
+        least = np.inf
+        for _ in range(self._options.scatter_rounds):
             values, slopes = near.predict(point)
             leverage = self.objective.leverage(slopes, point)
-            self.residuals.take_scatter(values, leverage, options.discrepancy)
+            self.residuals.take_scatter(values, leverage, DISCREPANCY)
             point, least = near.minimum(point, region)
         return point, least

@@ -1,4 +1,4 @@
-"""What a fit is asked, by users (`FitOptions`), and what steers its search (`SearchOptions`)."""
+"""What users ask of a fit."""
 
 from __future__ import annotations
 
@@ -163,79 +163,3 @@ class FitOptions:
         if tuple(values.pop("usual")) != tuple(PARAMETERS):
             values["usual"] = list(self.usual)
         return values
-
-
-@dataclass(frozen=True)
-class SearchOptions:
-    """What steers a search.
-
-    Attributes
-    ----------
-    most_branches, most_in_all : int
-        Levers solved for one choice of weights, and for all of them, after which a search ends
-        where it is; robust fits without priors, which begin anew, take several times as many. Good
-        data take 6 to 15; those of levers of which little is known up to 30.
-    first_region, largest_region, smallest_region : float
-        How far a step goes, in units of `Coordinates.room`: logarithms, where parameters are
-        positive. Beyond a factor of two neighbours say little; below the last, only rounding
-        errors.
-    trusted, doubted : float
-        The share of the predicted gain from which on the region grows, and below which it shrinks.
-    decrement : float
-        Sum of squares that Gauss and Newton's step would still take away at an optimum, where
-        squares count standard deviations (with priors): a tenth of a standard error.
-    decrement_where_rough, rough_region : float
-        The same where no longer step than the latter gains anything, since values are not smooth
-        there, as near a fold that moves past a row: a third of a standard error.
-    relative_decrement : float
-        The same in units of the noise, where weights count no standard deviations: a thirtieth of
-        a standard error.
-    negligible, negligible_of_misfit : float
-        The same as a share of the sum of squares; the latter where that is so many times what
-        noise explains that no such lever shows the data.
-    misfit : float
-        So many times.
-    precision : float
-        Differences, as shares of the largest value of an observable, of which only rounding errors
-        are left.
-    kept : int
-        Latest predictions that tell how values bend between them.
-    scatter_rounds : int
-        Rounds in which an observable without measurement errors finds its scatter.
-    gentle_rounds, robust_rounds : int
-        Most reweightings by Huber's weights, with which there is one optimum; then by those that
-        forget outliers.
-    settled, settled_relative : float
-        A confirmation by the full lever that moves no parameter by more than these shares of its
-        standard error and of its value ends the fit: the confirmed model is exact to first order.
-    confirmations : int
-        Most of them.
-    discrepancy : float
-        By how much a model is off that describes the data, a share of an observable's largest
-        value, where something was known of the lever beforehand (model discrepancy: Kennedy and
-        O'Hagan, J. R. Stat. Soc. B 63, 425 (2001)).
-    """
-
-    most_branches: int = 25
-    most_in_all: int = 40
-    first_region: float = 0.5
-    largest_region: float = 0.7
-    smallest_region: float = 1e-6
-    trusted: float = 0.7
-    doubted: float = 0.25
-    decrement: float = 1e-2
-    decrement_where_rough: float = 0.1
-    rough_region: float = 1e-3
-    relative_decrement: float = 1e-3
-    negligible: float = 1e-6
-    negligible_of_misfit: float = 1e-3
-    misfit: float = 10.0
-    precision: float = 1e-7
-    kept: int = 5
-    scatter_rounds: int = 3
-    gentle_rounds: int = 6
-    robust_rounds: int = 14
-    settled: float = 0.5
-    settled_relative: float = 0.03
-    confirmations: int = 5
-    discrepancy: float = 5e-4

@@ -16,7 +16,7 @@ from scipy.special import chdtri
 
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimation.experiment import TIP, Experiment, Prediction, experiment_of
+from hotlever.estimation.experiment import TIP, Experiment, Prediction, Predictor, experiment_of
 from hotlever.estimation.objective import Objective, Penalty, Quantity, Subproblem
 from hotlever.estimation.optimiser import Optimiser
 from hotlever.estimation.over_a_sample import with_distances
@@ -233,7 +233,9 @@ def profile_likelihood(
             penalised = objective.penalised(Penalty(quantity, target, _HELD * step))
             try:
                 start = near.probe.replace({name: target})
-                near = Optimiser(penalised, experiment, near=near).solve(start).prediction
+                near = (
+                    Optimiser(penalised, Predictor(experiment, near=near)).solve(start).prediction
+                )
             except ComputationError:
                 reasons[side] = f"as far as the lever can be solved ({target:.4g} cannot)"
                 break

@@ -28,11 +28,11 @@ from hotlever.estimation.chains import (
 from hotlever.estimation.experiment import (
     TIP,
     ExperimentAtRest,
+    Predictor,
     experiment_of,
     named,
 )
 from hotlever.estimation.objective import Quantity, Subproblem
-from hotlever.estimation.optimiser import Predictor
 from hotlever.estimation.over_a_sample import with_distances
 from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
 from hotlever.estimation.profile import ErrorProfile, hotter_rows
