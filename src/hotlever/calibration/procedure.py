@@ -80,7 +80,7 @@ def calibrate(
         heats.
     medium : {"vacuum", "air", "unknown"}, optional
         What the lever is in; by default what the data file says, or else the fit or the probe. If
-        it is unknown both are tried (`hotlever.estimation.inverse_problem`).
+        it is unknown both are tried (`hotlever.estimation.estimator`).
         With vacuum for data from air the paper's rule is used: the temperatures that the probe has
         in vacuum, at k times the power.
     priors : mapping of str to Prior or str, optional

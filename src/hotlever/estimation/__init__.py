@@ -1,14 +1,14 @@
 """Estimation: what a measurement and what is known beforehand make of a lever.
 
 ==============  ====================================================================================
-forward map     `experiment`: at rest, in time; `load_lines`, and the `surrogate` of a solved lever
+forward map     `experiment`: at rest, in time, over a sample; the `surrogate` of a solved lever
 noise model     `residuals`: `noise`, drift, and the scales that data have in common
 prior           `hotlever.probe.priors`, together a `prior_density`
-optimiser       of an `objective`: `optimiser`, its `subproblem`; where a `search` begins
+optimiser       of an `objective`: `optimiser`
 posterior       `posterior`: of any quantity, linearised; its `profile`; `sampling` by `chains`
 design          `optimal_design`: which further rows lessen an error most
 diagnosis       `lack_of_fit`; `diagnosis` by `hypotheses`
-problem         `inverse_problem` puts all that together, as `options` ask
+problem         `inverse_problem` puts all that together, as `options` ask, and searches
 answers         `estimator` makes a fit of it: a `result`, an `outcome` as calibrations are, with
                 `summary` and `uncertainty`; a `batch` of fits, and their `levers` compared
 ==============  ====================================================================================

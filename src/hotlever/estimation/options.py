@@ -46,7 +46,7 @@ class FitOptions:
         Let the zeros of I_h, V_r and V_bridge lie on straight lines over the order of the rows.
     medium : {"vacuum", "air", "unknown"}, optional
         What the lever was measured in; wins over measurement and probe. If it is unknown both are
-        tried (`hotlever.estimation.inverse_problem`).
+        tried (`hotlever.estimation.estimator`).
     priors : mapping of str to Prior or str
         What is known before, of parameters of the material, dimensions, the circuit or the scales
         of meters, also as text (`hotlever.probe.priors`); all that have a prior are varied.

@@ -233,9 +233,8 @@ def profile_likelihood(
             penalised = objective.penalised(Penalty(quantity, target, _HELD * step))
             try:
                 start = near.probe.replace({name: target})
-                near = (
-                    Optimiser(penalised, Predictor(experiment, near=near)).solve(start).prediction
-                )
+                predictor = Predictor(experiment, near=near)
+                near = Optimiser(penalised, predictor).solve(start).prediction
             except ComputationError:
                 reasons[side] = f"as far as the lever can be solved ({target:.4g} cannot)"
                 break
