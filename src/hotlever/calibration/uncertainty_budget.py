@@ -18,11 +18,11 @@ from pydantic import PlainSerializer, ValidationInfo, model_validator
 
 from hotlever.calibration.table import BUDGETS, budget_of
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.curvature import CurvedQuantity
 from hotlever.estimation.experiment import TIP
 from hotlever.estimation.gum import Budget, CoverageInterval, InputQuantity, propagate
 from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.outcome import IF_ANY, Correlations, Section
+from hotlever.estimation.posterior import CurvedQuantity
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.surrogate import Rows
 from hotlever.measurands import FITTED, OBSERVABLES

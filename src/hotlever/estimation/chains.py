@@ -1,4 +1,6 @@
-"""Markov chains of independent ensembles of emcee's walkers, and how far to trust them.
+"""The density of a posterior, sampled by Markov chains of emcee's walkers.
+
+Ensembles are independent of each other, which says how far to trust them.
 
 Effective sample size and R̂ are those of Vehtari, Gelman, Simpson, Carpenter and Bürkner, Bayesian
 Analysis 16 (2021) 667, doi:10.1214/20-BA1221.
@@ -9,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import emcee
 import numpy as np
@@ -18,13 +20,21 @@ from scipy.special import ndtri
 from scipy.stats import rankdata
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.posterior import Gaussian
+from hotlever.estimation.experiment import Prediction
+from hotlever.estimation.objective import Objective
 from hotlever.processes import local_processes
 from hotlever.types import Array, Progress
 
 # The logarithm of a density, up to a constant; −∞ where it vanishes.
 LogDensity = Callable[[Array], float]
+#: One unknown noise scale for each observable, or one for all.
+Noise = Literal["each", "common"]
 
+#: Degrees of freedom of what is drawn from a normal approximation: its tails must be wider than
+#: those of the posterior.
+_TAILS = 5.0
+#: Rounds in which weights and residuals settle that follow from each other.
+_WEIGHT_ROUNDS = 50
 #: Ensembles that know nothing of each other, so that R̂ compares independent runs.
 ENSEMBLES = 4
 #: Walkers of an ensemble: at least, and for each parameter.
@@ -41,6 +51,110 @@ FEWEST_EFFECTIVE, SETTLED_RHAT = 400, 1.01
 #: R̂ from which on quantiles are no limits. Ensembles that start alike drift alike, which it cannot
 #: see.
 HIGHEST_RHAT = 1.05
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """A normal approximation of a density of d quantities.
+
+    What is drawn from it has its middle and shape, but the wide tails of a Student's t.
+    """
+
+    mean: Array
+    covariance: Array
+
+    def wide_draws(self, count: int, random: Any) -> Array:
+        """Draw points, shape (count, d)."""
+        normal = random.normal(size=(count, self.mean.size))
+        stretch = np.sqrt(_TAILS / random.chisquare(_TAILS, size=(count, 1)))
+        return np.asarray(self.mean + stretch * (normal @ np.linalg.cholesky(self.covariance).T))
+
+    def wide_log_density(self, points: Array) -> Array:
+        """Return the logarithm of the density of such draws, up to a constant."""
+        away = points - self.mean
+        lengths = np.einsum("ij,jk,ik->i", away, np.linalg.inv(self.covariance), away)
+        return np.asarray(-0.5 * (_TAILS + self.mean.size) * np.log1p(lengths / _TAILS))
+
+
+class PosteriorDensity:
+    """The density of the coordinates, for a sampler.
+
+    The likelihood takes weighted residuals as normal. Without priors their noise is unknown, with
+    the prior 1/σ, and integrated out exactly: a group of n residuals with the sum of squares Q
+    contributes Q^(−n/2). With priors residuals count standard deviations, and contribute
+    exp(−Q/2). A parameter without a prior is uniform within its bounds.
+
+    Parameters
+    ----------
+    objective : Objective
+    at : Prediction
+        About which it is approximated.
+    shown : callable
+        Return the observables (m, n) at a point; picklable, if it is sampled in processes.
+    noise : {"each", "common"}
+        What shares a noise scale: an observable, or all.
+    """
+
+    def __init__(
+        self,
+        objective: Objective,
+        at: Prediction,
+        shown: Callable[[Array], Array],
+        noise: Noise = "each",
+    ) -> None:
+        self.objective, self.optimum = objective, objective.point(at.probe)
+        self._shown = shown
+        self._residual = objective.residuals.weighted(at.values)
+        self._jacobian = objective.of_data(at.slopes, self.optimum)
+        # the data that share a noise scale
+        self._group = np.nonzero(objective.residuals.present)[0] * (noise == "each")
+        self._counts = np.bincount(self._group)
+
+    def log_probability(self, point: Array) -> float:
+        """Return the logarithm of the density, up to a constant; −∞ where there is no lever."""
+        low, high = self.objective.bounds
+        if np.any(point <= low) or np.any(point >= high):
+            return -math.inf
+        try:
+            residual = self.objective.residuals.weighted(self._shown(point))
+        except ComputationError:
+            return -math.inf
+        unlikely = float(residual @ residual)
+        if not self.objective.informed:
+            unlikely = float(self._counts @ np.log(self._squares(residual)))
+        from_priors = self.objective.from_priors(point)
+        return -0.5 * float(unlikely + from_priors @ from_priors) + self.objective.log_volume(point)
+
+    @property
+    def approximation(self) -> Gaussian:
+        """What it is if the model is linear in the coordinates: a normal density.
+
+        Without priors the weights follow from the residuals and the residuals from the weights; a
+        few dozen rounds settle both.
+        """
+        objective, (low, high) = self.objective, self.objective.bounds
+        residual, jacobian = self._residual, self._jacobian
+        of_priors = objective.of_priors(self.optimum)
+        pull = of_priors.T @ objective.from_priors(self.optimum)
+        uniform = np.where(of_priors.any(axis=0), 0.0, 12.0 / (high - low) ** 2)
+        prior = np.diag(uniform) + of_priors.T @ of_priors
+        step, weights = np.zeros(self.optimum.size), np.ones(residual.size)
+        for _ in range(1 if objective.informed else _WEIGHT_ROUNDS):
+            if not objective.informed:
+                squares = self._squares(residual + jacobian @ step)
+                weights = (self._counts / squares)[self._group]
+            covariance = np.linalg.inv(jacobian.T @ (weights[:, None] * jacobian) + prior)
+            step = -covariance @ (jacobian.T @ (weights * residual) + pull)
+        margin = 1e-3 * (high - low)
+        mean = np.clip(self.optimum + step, low + margin, high - margin)
+        return Gaussian(mean, np.asarray(covariance, dtype=float))
+
+    def _squares(self, residual: Array) -> Array:
+        """Return the sum of squares of each group; never zero, for its logarithm."""
+        return np.maximum(np.bincount(self._group, residual**2), np.finfo(float).tiny)
+
+
+# --- chains -------------------------------------------------------------------------------------
 
 
 def split_rhat(chains: Array) -> float:
@@ -181,14 +295,14 @@ def sample(
     return Chains(*kept)
 
 
-def independent_samples(values: Array) -> float:
-    """Return how many independent samples some values, (ensembles, walkers, draws), are worth."""
-    return effective_sample_size(values.reshape(-1, values.shape[-1]))
+def worth(values: Array) -> tuple[float, float]:
+    """Return how many independent samples values, (ensembles, walkers, draws), are worth, and R̂.
 
-
-def rhat_of_ensembles(values: Array) -> float:
-    """Return R̂ of some values between ensembles, which are independent; walkers of one are not."""
-    return split_rhat(np.swapaxes(values, 1, 2).reshape(len(values), -1))
+    That is between ensembles, which are independent; walkers of one are not.
+    """
+    by_ensemble = np.swapaxes(values, 1, 2).reshape(len(values), -1)
+    size = effective_sample_size(values.reshape(-1, values.shape[-1]))
+    return size, split_rhat(by_ensemble)
 
 
 def _started(

@@ -1,35 +1,38 @@
 """The posterior: what data and priors leave of a lever's parameters, and of any quantity of it.
 
 Linearised at the optimum (Laplace's approximation) it is a covariance and what adds up to it;
-sampled, it is a density. The profile of a quantity is `hotlever.estimation.profile`.
+sampled, it is a density (`hotlever.estimation.chains`). The profile of a quantity is
+`hotlever.estimation.profile`.
+
+A quantity is curved beyond first order in the errors of data and priors. Errors that move an
+estimate by δ, if everything is linear, move it to the x at which the residuals r have changed by as
+much as δ would change them along all directions that parameters can take:
+(JᵀJ)⁻¹ Jᵀ (r(x) − r(0)) = δ. To second order x = δ − ½ (JᵀJ)⁻¹ Jᵀ r″[δ, δ], and the quantity
+changes by g x + ½ xᵀ H x. Along the axis where that bends most it is solved instead.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
 
 import numpy as np
+from scipy import optimize
+from scipy.interpolate import PchipInterpolator
 
-from hotlever.errors import ComputationError
 from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.objective import Objective, Quantity, inverse_or_nan
+from hotlever.estimation.objective import Objective, Quantity, Subproblem, inverse_or_nan
+from hotlever.estimation.surrogate import Surrogate
 from hotlever.probe.priors import Moved
 from hotlever.types import Array
 
-#: One unknown noise scale for each observable, or one for all.
-Noise = Literal["each", "common"]
-
-#: Degrees of freedom of what is drawn from a normal approximation: its tails must be wider than
-#: those of the posterior.
-_TAILS = 5.0
 #: A datum that alone decides a parameter says nothing of its own noise.
 _LEAST_FREE = 0.05
-#: Rounds in which weights and residuals settle that follow from each other.
-_WEIGHT_ROUNDS = 50
+#: Standard errors on either side over which derivatives are compared.
+_STEP = 0.5
+#: Standard errors at which the most bent axis is solved, and how bent it must be: its second
+#: derivative as a share of the quantity's standard error.
+_SOLVED_AT, _BENT = (1.25, 2.5), 0.1
 
 
 def standard_errors(slopes: Array, covariance: Array) -> Array:
@@ -180,102 +183,101 @@ class Posterior:
         return float(self.objective.squares(self.at) + residuals.errors.normalisation)
 
 
-@dataclass(frozen=True)
-class Gaussian:
-    """A normal approximation of a density of d quantities.
+class CurvedQuantity:
+    """How a predicted quantity changes with the errors of an estimate.
 
-    What is drawn from it has its middle and shape, but the wide tails of a Student's t.
-    """
-
-    mean: Array
-    covariance: Array
-
-    def wide_draws(self, count: int, random: Any) -> Array:
-        """Draw points, shape (count, d)."""
-        normal = random.normal(size=(count, self.mean.size))
-        stretch = np.sqrt(_TAILS / random.chisquare(_TAILS, size=(count, 1)))
-        return np.asarray(self.mean + stretch * (normal @ np.linalg.cholesky(self.covariance).T))
-
-    def wide_log_density(self, points: Array) -> Array:
-        """Return the logarithm of the density of such draws, up to a constant."""
-        away = points - self.mean
-        lengths = np.einsum("ij,jk,ik->i", away, np.linalg.inv(self.covariance), away)
-        return np.asarray(-0.5 * (_TAILS + self.mean.size) * np.log1p(lengths / _TAILS))
-
-
-class PosteriorDensity:
-    """The density of the coordinates, for a sampler.
-
-    The likelihood takes weighted residuals as normal. Without priors their noise is unknown, with
-    the prior 1/σ, and integrated out exactly: a group of n residuals with the sum of squares Q
-    contributes Q^(−n/2). With priors residuals count standard deviations, and contribute
-    exp(−Q/2). A parameter without a prior is uniform within its bounds.
+    Levers are taken from the surrogates of the optimum. Errors are counted along axes, (p,), in
+    which those that the posterior leaves are independent and of unit variance.
 
     Parameters
     ----------
-    objective : Objective
-    at : Prediction
-        About which it is approximated.
-    shown : callable
-        Return the observables (m, n) at a point; picklable, if it is sampled in processes.
-    noise : {"each", "common"}
-        What shares a noise scale: an observable, or all.
+    posterior : Posterior
+    surrogate : Surrogate
+        Of the estimated lever, in one row.
+    observable : int
+        Place of the quantity among its values.
+
+    Raises
+    ------
+    ComputationError
+        If a lever half a standard error away has no such states.
     """
 
-    def __init__(
-        self,
-        objective: Objective,
-        at: Prediction,
-        shown: Callable[[Array], Array],
-        noise: Noise = "each",
-    ) -> None:
-        self.objective, self.optimum = objective, objective.point(at.probe)
-        self._shown = shown
-        self._residual = objective.residuals.weighted(at.values)
-        self._jacobian = objective.of_data(at.slopes, self.optimum)
-        # the data that share a noise scale
-        self._group = np.nonzero(objective.residuals.present)[0] * (noise == "each")
-        self._counts = np.bincount(self._group)
+    def __init__(self, posterior: Posterior, surrogate: Surrogate, observable: int) -> None:
+        objective = posterior.objective
+        self._near, self._surrogate = Subproblem(objective, posterior.at), surrogate
+        self._parameters = posterior.at.probe.values(objective.names)
+        self._observable = observable
+        self._axes = np.linalg.cholesky(posterior.covariance)
+        self._steps = self._axes / objective.coordinates.rates(self._near.origin)[:, None]
+        jacobian, self._gradient = self._derivatives(self._near.origin)
+        self._inverse = np.linalg.pinv(jacobian)
+        self._curvature = self._second_derivatives()
+        bent, axes = np.linalg.eigh(self._curvature)
+        self._bent_axis = axes[:, np.argmax(np.abs(bent))]
+        self._along: PchipInterpolator | None = None
+        if np.abs(bent).max() > _BENT * np.linalg.norm(self._gradient):
+            self._along = self._solved_along(self._bent_axis)
 
-    def log_probability(self, point: Array) -> float:
-        """Return the logarithm of the density, up to a constant; −∞ where there is no lever."""
-        low, high = self.objective.bounds
-        if np.any(point <= low) or np.any(point >= high):
-            return -math.inf
-        try:
-            residual = self.objective.residuals.weighted(self._shown(point))
-        except ComputationError:
-            return -math.inf
-        unlikely = float(residual @ residual)
-        if not self.objective.informed:
-            unlikely = float(self._counts @ np.log(self._squares(residual)))
-        from_priors = self.objective.from_priors(point)
-        return -0.5 * float(unlikely + from_priors @ from_priors) + self.objective.log_volume(point)
+    def axes_of(self, influences: Array) -> Array:
+        """Return how far influences on the parameters, (p, m), move an estimate along the axes."""
+        return np.asarray(np.linalg.solve(self._axes, influences))
 
-    @property
-    def approximation(self) -> Gaussian:
-        """What it is if the model is linear in the coordinates: a normal density.
+    def changes(self, errors: Array) -> Array:
+        """Return by how much errors (n, p) change the quantity, (n,)."""
+        changes = self._to_second_order(errors)
+        if self._along is None:
+            return changes
+        far = errors @ self._bent_axis
+        within = np.clip(far, self._along.x[0], self._along.x[-1])
+        solved = self._along(within) + self._along(within, 1) * (far - within)
+        # the axis is one of the curvature's own, so that it has no part in the others
+        return changes + solved - self._to_second_order(np.outer(far, self._bent_axis))
 
-        Without priors the weights follow from the residuals and the residuals from the weights; a
-        few dozen rounds settle both.
-        """
-        objective, (low, high) = self.objective, self.objective.bounds
-        residual, jacobian = self._residual, self._jacobian
-        of_priors = objective.of_priors(self.optimum)
-        pull = of_priors.T @ objective.from_priors(self.optimum)
-        uniform = np.where(of_priors.any(axis=0), 0.0, 12.0 / (high - low) ** 2)
-        prior = np.diag(uniform) + of_priors.T @ of_priors
-        step, weights = np.zeros(self.optimum.size), np.ones(residual.size)
-        for _ in range(1 if objective.informed else _WEIGHT_ROUNDS):
-            if not objective.informed:
-                squares = self._squares(residual + jacobian @ step)
-                weights = (self._counts / squares)[self._group]
-            covariance = np.linalg.inv(jacobian.T @ (weights[:, None] * jacobian) + prior)
-            step = -covariance @ (jacobian.T @ (weights * residual) + pull)
-        margin = 1e-3 * (high - low)
-        mean = np.clip(self.optimum + step, low + margin, high - margin)
-        return Gaussian(mean, np.asarray(covariance, dtype=float))
+    def _to_second_order(self, errors: Array) -> Array:
+        bent = np.einsum("ni,ni->n", errors @ self._curvature, errors)
+        return np.asarray(errors @ self._gradient + 0.5 * bent)
 
-    def _squares(self, residual: Array) -> Array:
-        """Return the sum of squares of each group; never zero, for its logarithm."""
-        return np.maximum(np.bincount(self._group, residual**2), np.finfo(float).tiny)
+    def _derivatives(self, point: Array) -> tuple[Array, Array]:
+        """Return those of the residuals, (N, p), and of the quantity, (p,), along the axes."""
+        objective = self._near.objective
+        _, slopes = self._surrogate.predict(objective.among(self._parameters, point))
+        gradient = slopes[self._observable, 0, objective.columns]
+        gradient = gradient * objective.coordinates.rates(point)
+        return self._near.jacobian(point) @ self._steps, gradient @ self._steps
+
+    def _second_derivatives(self) -> Array:
+        """Return those of the quantity by errors, (p, p)."""
+        by_residuals, rows = self._gradient @ self._inverse, []
+        for step in _STEP * self._steps.T:
+            (after, risen), (before, fallen) = (
+                self._derivatives(self._near.origin + way * step) for way in (1.0, -1.0)
+            )
+            rows.append((risen - fallen - by_residuals @ (after - before)) / (2.0 * _STEP))
+        return 0.5 * (np.array(rows) + np.transpose(rows))
+
+    def _solved_along(self, axis: Array) -> PchipInterpolator:
+        """Return how the quantity changes along an axis, as far as levers were solved for."""
+        near, objective = self._near, self._near.objective
+        low, high = objective.bounds
+        at_rest, changes = near.residual(near.origin), {0.0: 0.0}
+        value = self._value(near.origin)
+        for way in (-1.0, 1.0):
+            point = near.origin
+            for size in _SOLVED_AT:
+                moved = way * size * axis
+                point = optimize.least_squares(
+                    lambda point, to=moved: self._inverse @ (near.residual(point) - at_rest) - to,
+                    point,
+                    lambda point: self._inverse @ near.jacobian(point),
+                    (low, high),
+                    x_scale="jac",
+                    ftol=1e-6,
+                    max_nfev=50,
+                ).x
+                changes[way * size] = self._value(point) - value
+        return PchipInterpolator(*np.transpose(sorted(changes.items())))
+
+    def _value(self, point: Array) -> float:
+        parameters = self._near.objective.among(self._parameters, point)
+        return float(self._surrogate.shown(parameters)[self._observable, 0])

@@ -21,9 +21,10 @@ from hotlever.estimation.chains import (
     FEWEST_EFFECTIVE,
     HIGHEST_RHAT,
     Chains,
-    independent_samples,
-    rhat_of_ensembles,
+    Noise,
+    PosteriorDensity,
     sample,
+    worth,
 )
 from hotlever.estimation.experiment import (
     TIP,
@@ -34,7 +35,7 @@ from hotlever.estimation.experiment import (
 )
 from hotlever.estimation.objective import Quantity, Subproblem
 from hotlever.estimation.over_a_sample import with_distances
-from hotlever.estimation.posterior import Noise, Posterior, PosteriorDensity
+from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.profile import ErrorProfile, hotter_rows
 from hotlever.estimation.result import Fit
 from hotlever.estimation.surrogate import ReducedSurrogate
@@ -164,8 +165,7 @@ def sample_tip(
     hottest = tips[:, -1].reshape(chains.points.shape[:3])
     return SampledTip(
         ErrorProfile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),
-        independent_samples(hottest),
-        rhat_of_ensembles(hottest),
+        *worth(hottest),
     )
 
 
@@ -271,19 +271,18 @@ def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> x
         sampled = {owned[name]: column for name, column in columns.items() if name in owned}
         if sampled:  # else it is what it was
             columns[INVERSION] = silicon.model_copy(update=sampled).inversion_temperature()
-    rhat = [rhat_of_ensembles(column) for column in columns.values()]
+    sizes, rhat = zip(*map(worth, columns.values()), strict=True)
     chained = {
         name: column.reshape(ensembles * walkers, draws)
         for name, column in (columns | {"log_probability": chains.log_probability}).items()
     }
-    size = [independent_samples(column) for column in columns.values()]
     held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
     at_rest = zip(held, fit.probe.values(held).tolist(), strict=True)
     data = labelled(
         {
             **chained,
-            "rhat": ("quantity", rhat),
-            "effective_sample_size": ("quantity", size),
+            "rhat": ("quantity", list(rhat)),
+            "effective_sample_size": ("quantity", list(sizes)),
             "acceptance_fraction": ((), chains.accepted),
         },
         ("chain", "draw"),
