@@ -10,7 +10,13 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.estimation.batch import Batch
-from hotlever.estimation.levers import INVERSION, compare_levers, lever_rows, levers_csv, statements
+from hotlever.estimation.summary import (
+    INVERSION,
+    compare_levers,
+    lever_rows,
+    levers_csv,
+    statements,
+)
 from hotlever.materials import PARAMETERS, PUBLISHED
 from made_up import fit_of
 

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import xarray as xr
 
-from hotlever.estimation.levers import lever_rows, levers_text
+from hotlever.estimation.summary import lever_rows, statements, table_text
 from hotlever.estimation.uncertainty import Uncertainty
 from made_up import levers
 
@@ -36,7 +36,8 @@ def test_table_has_units_and_ends_with_mean_and_scatter():
     # three levers, each with an error of 0.05
     assert re.fullmatch(r"\d\.\d\d\(\d\d?\)", rows[3][3])
     assert float(rows[6][3]) > 0.1
-    text = levers_text(levers(3)).splitlines()
+    table = levers(3)
+    text = table_text(lever_rows(table), statements(table)).splitlines()
     assert set(text[4]) == {"-"}
 
 

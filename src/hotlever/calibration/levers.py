@@ -24,7 +24,7 @@ from hotlever.datasets import QUANTITIES, frame_text, labelled
 from hotlever.errors import HotleverError
 from hotlever.estimation import FitOptions
 from hotlever.estimation.batch import Batch, Work, estimate_many
-from hotlever.estimation.levers import (
+from hotlever.estimation.summary import (
     Compared,
     compared,
     lever_rows,
@@ -150,7 +150,7 @@ def compare_calibrations(
     Returns
     -------
     xarray.Dataset
-        See `hotlever.estimation.levers.compared`, of the quantities ``tip_K``; ``knee_lever_V``,
+        See `hotlever.estimation.summary.compared`, of the quantities ``tip_K``; ``knee_lever_V``,
         ``knee_current_mA``, ``knee_power_mW``, ``knee_tip_K``; ``k``; and those of `LAW`. On
         ``lever`` too: ``tip_low_K`` and ``tip_high_K``, between which 95 % lie, ``file``,
         ``describes_data``, and ``reason``: why there is no tip temperature.

@@ -22,11 +22,19 @@ from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
 from hotlever.estimation.outcome import Outcome
 from hotlever.estimation.posterior import standard_errors
 from hotlever.estimation.result import Fit, band_dataset
-from hotlever.estimation.summary import undetermined
 from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
+from hotlever.probe.parameters import of_materials, parameters_of
 from hotlever.probe.surroundings import Medium
+from hotlever.text import NOT_DETERMINED, value_with_error, with_unit
 from hotlever.types import Array, Progress
+
+#: A parameter is called poorly determined from this relative standard error.
+_POOR = 0.15
+#: A parameter is at its bound within this share of it.
+_AT_THE_BOUND = 1e-3
+#: Two parameters are called hard to tell apart from this correlation.
+_ENTANGLED = 0.95
 
 Answer = TypeVar("Answer", bound=Outcome)
 
@@ -207,6 +215,50 @@ def _how_well(estimate: Estimate, answer: Outcome) -> str:
     rms = estimate.residuals.rms(estimate.prediction.values)
     shown = ", ".join(f"{value:.2g} {name.rsplit('_', 1)[1]}" for name, value in rms.items())
     return f"{'does not describe' if answer.reason else 'describes'} the data (rms {shown})"
+
+
+def undetermined(fit: Fit) -> list[str]:
+    """Say in words what the data do not determine, and what that means for the tip temperature."""
+    texts, declared = [], parameters_of(fit.probe, in_time=True)
+    for name in fit.names:
+        fitted, bounds = fit.parameters[name], declared[name].bounds
+        if fitted.stderr is None:
+            if fit.describes_data:
+                texts.append(f"{name}: no standard error could be estimated")
+        elif fitted.stderr >= abs(fitted.value):
+            value = value_with_error(fitted.value, fitted.stderr, bounds=bounds)
+            texts.append(
+                f"{name} is not determined by these data: its standard error is larger than its "
+                "value"
+                if value == NOT_DETERMINED
+                else f"{name} is only bounded by these data: {with_unit(value, fitted.unit)} (95 %)"
+            )
+        elif (share := fitted.stderr / abs(fitted.value)) > _POOR:
+            texts.append(
+                f"{name} is poorly determined by these data: its standard error is {share:.0%} of "
+                "its value"
+            )
+    of_material = [name for name in of_materials(fit.probe, in_time=True) if name in fit.names]
+    texts += [
+        f"{name} ended at the bound of what it may be, "
+        f"{with_unit(f'{bound:g}', declared[name].unit)}: these data would have it beyond"
+        for name in of_material
+        for bound in declared[name].bounds
+        if abs(fit.parameters[name].value - bound) < _AT_THE_BOUND * abs(bound)
+    ]
+    correlation = np.tril(fit.correlation, -1)
+    texts += [
+        f"{fit.names[second]} and {fit.names[first]} are hardly told apart by these "
+        f"data (correlation {correlation[first, second]:+.2f})"
+        for first, second in np.argwhere(np.abs(correlation) > _ENTANGLED)
+    ]
+    largest = float(fit.band.tip_stderr_K.max())
+    if texts and np.isfinite(largest):
+        texts.append(
+            "the tip temperature that follows has nevertheless a standard error of at most "
+            f"{largest:.1f} K from the fitted parameters"
+        )
+    return texts
 
 
 def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOptions:

@@ -354,7 +354,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
     Parameters
     ----------
     levers : xarray.Dataset
-        From `hotlever.estimation.levers.compare_levers`; without what was held or does not count.
+        From `hotlever.estimation.summary.compare_levers`; without what was held or does not count.
     """
     count = levers.sizes["lever"]
     many = count > MOST_NAMES

@@ -9,9 +9,15 @@ import numpy as np
 
 from hotlever import figures
 from hotlever.estimation.batch import Batch
-from hotlever.estimation.levers import compare_levers, lever_rows, statements
 from hotlever.estimation.result import Fit
-from hotlever.estimation.summary import NEAREST, conclusions, parameter_rows
+from hotlever.estimation.summary import (
+    NEAREST,
+    compare_levers,
+    conclusions,
+    lever_rows,
+    parameter_rows,
+    statements,
+)
 from hotlever.estimation.uncertainty import Uncertainty
 from hotlever.lever import Lever
 from hotlever.materials.parameters import INVERSION

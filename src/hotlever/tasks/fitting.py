@@ -9,8 +9,14 @@ from hotlever.errors import ComputationError, HotleverError
 from hotlever.estimation import Fit, FitOptions, fit
 from hotlever.estimation.batch import Batch, fit_many
 from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.levers import compare_levers, levers_csv, levers_text
-from hotlever.estimation.summary import fit_text
+from hotlever.estimation.summary import (
+    compare_levers,
+    fit_text,
+    lever_rows,
+    levers_csv,
+    statements,
+    table_text,
+)
 from hotlever.estimation.uncertainty import Uncertainty, examine
 from hotlever.files import Outputs, write_text
 from hotlever.measurement import read_measurement_of
@@ -103,4 +109,5 @@ def _summary(batch: Batch[Fit]) -> Summary:
 
     table = compare_levers(batch.results)
     files = {LEVERS_TABLE: levers_csv(table)}
-    return Summary(levers_text(table), lambda: levers_page(batch), files)
+    text = table_text(lever_rows(table), statements(table))
+    return Summary(text, lambda: levers_page(batch), files)
