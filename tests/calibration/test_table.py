@@ -8,7 +8,7 @@ import pytest
 from hotlever.calibration.table import (
     even_rows,
     interpolated,
-    table_with_budget,
+    table_with_budgets,
     with_steep_rows,
 )
 from hotlever.errors import InputError
@@ -24,7 +24,7 @@ def tip(bias):
 def table_of(bias, tip_K, power=None):
     power = bias**2 / 20.0 if power is None else power
     columns = {"bias_V": bias, "power_mW": power, "tip_K": tip_K}
-    return table_with_budget(columns, {"measurement": np.ones(bias.size)})
+    return table_with_budgets(columns, {"budget_K": {"measurement": np.ones(bias.size)}})
 
 
 @pytest.fixture

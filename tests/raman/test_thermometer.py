@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import synthetic_spectra as synthetic
 from hotlever.errors import InputError
-from hotlever.raman import anharmonic
+from hotlever.raman import anharmonic, lineshape
 from hotlever.raman.calibration import (
     Point,
     calibrate_raman,
@@ -46,6 +46,15 @@ PLATE = np.arange(295.0, 896.0, 25.0)
 
 
 # --- the law -------------------------------------------------------------------------------
+
+
+def test_a_spectrum_without_noise_is_known_as_well_as_its_numbers_are_rounded():
+    """As one that was computed: its line had no error at all, and no weight as a reference."""
+    x = np.arange(440.0, 600.0, 0.5)
+    peak = fit_peak(x, 1000.0 * lineshape.line(x, 520.0, 4.0)[0])
+    assert 0.0 < peak.centre_stderr < 1e-12
+    published = Thermometer(published_raman_calibration(), reference=521.0)
+    assert published.with_reference([(peak, None)]).reference == pytest.approx(520.0, abs=1e-9)
 
 
 @given(st.floats(30.0, 1600.0))

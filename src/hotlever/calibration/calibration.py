@@ -29,7 +29,7 @@ from hotlever.calibration.table import (
     TABLE_COLUMNS,
     TABLES_BY,
     TOTAL_POWER,
-    budget_of,
+    budgets_of,
     check_rows,
     even_rows,
     interpolated,
@@ -225,15 +225,14 @@ class Calibration(Outcome):
 
     def file(self, request: dict[str, JsonValue] | None = None) -> CalibrationFile:
         """Return what the calibration file holds."""
-        budget, gum = budget_of(self.table), self.gum
+        budgets, gum = budgets_of(self.table), self.gum
         return CalibrationFile.holding(
             self,
             power_law_residual_K=self.law_residual_K,
             knee=vars(self.knee) | {"tip_K": self.knee_tip_K, "measured": self.knee_measured},
-            uncertainty_budget_K={source: part.max() for source, part in budget.items()},
+            uncertainty_budget_K={name: part.max() for name, part in budgets[BUDGETS[0]].items()},
             table={name: self.table[name].values for name in self.columns},
-            budget_K=budget,
-            apex_budget_K=budget_of(self.table, BUDGETS[1]) or None,
+            **budgets,
             **({} if gum is None else BudgetFields.fields_of(gum)),
             data=MeasurementSection.of(self.measurement),
             request=request,
@@ -310,13 +309,18 @@ class CalibrationFile(BudgetFields, ResultFile[Calibration]):
     pulse: _Pulse | None = IF_ANY
     weights: dict[str, Vector] | None = IF_ANY
 
+    @property
+    def _budgets(self) -> dict[str, dict[str, Array]]:
+        own = zip(BUDGETS, (self.budget_K, self.apex_budget_K), strict=True)
+        return {name: budget for name, budget in own if budget is not None}
+
     @field_serializer("power_law")
     def _with_threshold(self, law: PowerLaw | None) -> dict[str, float] | None:
         return None if law is None else law.values(self.base_temperature_K)
 
     @model_validator(mode="after")
     def _rows_belong_together(self, info: ValidationInfo) -> Self:
-        check_rows(self.table, self.budget_K, "bias", str(info.context), self.apex_budget_K)
+        check_rows(self.table, self._budgets, "bias", str(info.context))
         if self.gum is not None and self.gum_bias_V not in self.table["bias_V"]:
             raise InputError(f"{info.context}: gum_bias_V: expected the bias of a row of the table")
         for name, weights in (self.weights or {}).items():
@@ -329,8 +333,7 @@ class CalibrationFile(BudgetFields, ResultFile[Calibration]):
         """Return the calibration, to go on with as if it had just been made."""
         knee = {name: self.knee[name] for name in Knee.__dataclass_fields__ if name in self.knee}
         more = [name for name in (TOTAL_POWER, *OF_THE_CONTACT) if name in self.table]
-        names, apex = [*TABLE_COLUMNS, *more], self.apex_budget_K
-        table = stored_table(self.table, self.budget_K, names, of_apex=apex)
+        table = stored_table(self.table, self._budgets, [*TABLE_COLUMNS, *more])
         return Calibration(
             law_residual_K=self.power_law_residual_K,
             knee_tip_K=self.knee.get("tip_K", np.nan),

@@ -24,7 +24,7 @@ from hotlever.calibration.knee import (
     scale_to,
 )
 from hotlever.calibration.power_law import PowerLaw, law_of_model, power_turns
-from hotlever.calibration.table import table_by_bias
+from hotlever.calibration.table import BUDGETS, table_by_bias
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.noise import METERS
 from hotlever.lever import Branch, OperatingPoint
@@ -171,7 +171,7 @@ def calibrated_by_knee(
         )
     own = reference.at(circuit.power(measured.bias_V, current), knee_mW)
     return Calibration(
-        table=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, parts),
+        table=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, {BUDGETS[0]: parts}),
         route=route,
         medium="vacuum",
         power_law=used,

@@ -37,12 +37,12 @@ from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, known_beforehand
 from hotlever.text import value_with_error
 
-#: Of a knee, by its names in calibration files.
+#: What levers are compared by beside the tip temperature somewhere: of a knee,
 _KNEE = {
-    "lever_V": Compared("knee V_l (V)", "V", "knee_lever_V{}", "lever voltage of the knee"),
-    "current_mA": Compared("knee I_h (mA)", "mA", "knee_current_mA{}", "current of the knee"),
-    "power_mW": Compared("knee P_l (mW)", "mW", "knee_power_mW{}", "power of the knee"),
-    "tip_K": Compared("knee T_tip (K)", "K", "knee_tip_K", "tip temperature of the knee"),
+    "knee_lever_V": Compared("knee V_l (V)", "V", "knee_lever_V{}", "lever voltage of the knee"),
+    "knee_current_mA": Compared("knee I_h (mA)", "mA", "knee_current_mA{}", "current of the knee"),
+    "knee_power_mW": Compared("knee P_l (mW)", "mW", "knee_power_mW{}", "power of the knee"),
+    "knee_tip_K": Compared("knee T_tip (K)", "K", "knee_tip_K", "tip temperature of the knee"),
 }
 _K = Compared("k", "1", "k{}", "k")
 #: Of a power law.
@@ -162,40 +162,48 @@ def compare_calibrations(
     """
     at = at or highest_common_bias(calibrations)
     tip = Compared(f"T_tip at {at.text} (K)", "K", "tip{}_K", f"tip temperature at {at.text}")
-    knee = {f"knee_{name}": how for name, how in _KNEE.items()}
     tips = {lever: _tip_at(each, at) for lever, each in calibrations.items()}
     quantities = {}
     for lever, each in calibrations.items():
-        values = vars(each.knee) | {"tip_K": each.knee_tip_K}
+        knee = each.knee
         quantities[lever] = {
             "tip_K": (tips[lever]["tip_K"], tips[lever]["tip_stderr_K"]),
-            **{f"knee_{name}": (values[name], values.get(f"{name}_stderr")) for name in _KNEE},
+            "knee_lever_V": (knee.lever_V, knee.lever_V_stderr),
+            "knee_current_mA": (knee.current_mA, knee.current_mA_stderr),
+            "knee_power_mW": (knee.power_mW, knee.power_mW_stderr),
+            "knee_tip_K": (each.knee_tip_K, None),
             "k": (each.k, each.k_stderr),
             **{name: (getattr(each.power_law, name, np.nan), None) for name in LAW},
         }
+    answers = {True: "true", False: "false", None: "unknown"}
     more = {
         name: [values[name] for values in tips.values()] for name in ("tip_low_K", "tip_high_K")
     } | {
-        "describes_data": [_answer(each.describes_data) for each in calibrations.values()],
+        "describes_data": [answers[each.describes_data] for each in calibrations.values()],
         "reason": [
             each.doubt or _why_none(each, at, tips[lever]) for lever, each in calibrations.items()
         ],
         "file": [each.measurement.path for each in calibrations.values()],
         at.along: [at.value] * len(calibrations),
     }
-    table = compared(calibrations, quantities, {"tip_K": tip, **knee, "k": _K, **LAW}, more)
+    table = compared(calibrations, quantities, {"tip_K": tip, **_KNEE, "k": _K, **LAW}, more)
     return table.assign_attrs(along=at.along)
+
+
+def _rows_along(calibration: Calibration, along: str) -> xr.Dataset | None:
+    """Return the rows that tell a tip temperature by bias or power; None if there are none."""
+    by_bias = along == "bias_V"
+    if not calibration.describes_data or not (by_bias or calibration.power_law is not None):
+        return None
+    return calibration.table if by_bias else calibration.heating
 
 
 def _tip_at(calibration: Calibration, at: Setting) -> dict[str, float]:
     """Return the tip temperature with its errors (K); NaN where there is none."""
-    by_bias = at.along == "bias_V"
-    rows = calibration.table if by_bias else calibration.heating
-    is_stated = calibration.describes_data and (by_bias or calibration.power_law is not None)
-    return {
-        name: float(interpolated(rows, at.value, at.along, name)) if is_stated else np.nan
-        for name in ("tip_K", *STATED)
-    }
+    rows, names = _rows_along(calibration, at.along), ("tip_K", *STATED)
+    if rows is None:
+        return dict.fromkeys(names, np.nan)
+    return {name: float(interpolated(rows, at.value, at.along, name)) for name in names}
 
 
 def _why_none(calibration: Calibration, at: Setting, tip: Mapping[str, float]) -> str:
@@ -207,10 +215,6 @@ def _why_none(calibration: Calibration, at: Setting, tip: Mapping[str, float]) -
     low, high = calibration.heating[at.along].values[[0, -1]]
     unit = QUANTITIES[at.along][0]
     return f"{at.text} is out of its range, {low:.4g} to {high:.4g} {unit}, or where it jumps"
-
-
-def _answer(described: bool | None) -> str:
-    return "unknown" if described is None else str(described).lower()
 
 
 def tips_along(calibrations: Mapping[str, Calibration], along: str) -> xr.Dataset:
@@ -229,9 +233,9 @@ def tips_along(calibrations: Mapping[str, Calibration], along: str) -> xr.Datase
         and where it jumps.
     """
     tables = {
-        lever: each.table if along == "bias_V" else each.heating
+        lever: rows
         for lever, each in calibrations.items()
-        if each.describes_data and (along == "bias_V" or each.power_law is not None)
+        if (rows := _rows_along(each, along)) is not None
     }
     edges = [float(table[along].values[end]) for table in tables.values() for end in (0, -1)]
     at = np.linspace(min(edges, default=0.0), max(edges, default=1.0), _POINTS)

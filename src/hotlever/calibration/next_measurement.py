@@ -16,7 +16,7 @@ from scipy.special import ndtri
 
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.linearised_lever import LinearisedLever
-from hotlever.calibration.table import budget_of
+from hotlever.calibration.table import BUDGETS, budgets_of
 from hotlever.calibration.tip_temperature import error_of_model
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, unknown_name
@@ -192,6 +192,8 @@ def plan_next(
     candidates = _candidates(lever, most, bias[:safe], costs or {}, noise or {})
     limited = {kind: number for kind, number in most.items() if number is not None}
     chosen = best_first(lever.information, candidates, gradient, count, limited)
+    if not chosen:
+        raise InputError("what to measure next: nothing is allowed, expected a measurement or more")
     each = (candidates[number].rows for number in chosen)
     after = list(accumulate(each, Information.with_rows, initial=lever.information))
     stays, notes = _errors_that_stay(lever, calibration, np.append(bias, aim))
@@ -365,7 +367,8 @@ def _errors_that_stay(
         return of_model, []
     table, notes = calibration.table, []
     budget = {
-        source: np.interp(bias, table.bias_V, error) for source, error in budget_of(table).items()
+        source: np.interp(bias, table.bias_V, error)
+        for source, error in budgets_of(table)[BUDGETS[0]].items()
     }
     if "jump" in budget and budget["jump"][-1] > 0.0:
         notes.append(

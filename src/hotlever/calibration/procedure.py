@@ -17,8 +17,7 @@ from hotlever.calibration.inference import (
 from hotlever.calibration.knee_scaling import calibrated_by_knee
 from hotlever.calibration.power_law import PowerLaw
 from hotlever.calibration.pulses import PulseTiming, pulse_calibration
-from hotlever.calibration.table import BUDGETS, table_with_budget
-from hotlever.calibration.table import budget_of as table_budget
+from hotlever.calibration.table import budgets_of, table_with_budgets
 from hotlever.calibration.tip_temperature import check_in_range, limits_of_range
 from hotlever.calibration.uncertainty_budget import BudgetOf, check_budget_of, limits_of
 from hotlever.errors import ComputationError, InputError
@@ -131,18 +130,16 @@ def calibrate(
     notes = note_on_averages(whole, measured)
     check_budget_of(budget_of, origin.contact is not None)
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
-        if samples:
-            raise InputError("the paper's rule has no posterior; expected a probe or a fit")
-        if at_V is not None or budget_of != "tip":
-            raise InputError(
-                "the paper's rule has no uncertainty budget; expected a probe or a fit, in the "
-                "medium of the data"
-            )
-        if pulse is not None:
-            raise InputError(
-                "the paper's rule says nothing about a pulse; expected a probe or a fit, in the "
-                "medium of the data"
-            )
+        asked = {
+            "has no posterior": samples > 0,
+            "has no uncertainty budget": at_V is not None or budget_of != "tip",
+            "says nothing about a pulse": pulse is not None,
+        }
+        for lack, wanted in asked.items():
+            if wanted:
+                raise InputError(
+                    f"the paper's rule {lack}; expected a probe or a fit, in the medium of the data"
+                )
         # a power law holds for vacuum, whatever the lever is in
         anywhere = measured if law is None else replace(measured, medium=None)
         probe, of_circuit = with_measured_circuit(origin, anywhere, "vacuum")
@@ -196,14 +193,11 @@ def _in_either(result: Calibration, other: Calibration) -> Calibration:
         name = error.replace("_stderr", "")
         choices[name] = error_of_choice(columns[name], others[name])
         columns[error] = np.hypot(columns[error], choices[name])
-    parts, of_apex = (
-        budget and budget | {"medium": choices[name]}
-        for budget, name in (
-            (table_budget(result.table), "tip_K"),
-            (table_budget(result.table, BUDGETS[1]), "apex_K"),
-        )
-    )
-    table, gum = table_with_budget(columns, parts, of_apex=of_apex), result.gum
+    budgets = {
+        name: parts | {"medium": choices["apex_K" if name.startswith("apex") else "tip_K"]}
+        for name, parts in budgets_of(result.table).items()
+    }
+    table, gum = table_with_budgets(columns, budgets), result.gum
     if gum is not None and other.gum is not None:
         row = columns["bias_V"].tolist().index(gum.bias_V)
         limits = limits_of(table.isel(bias=row), gum.of)

@@ -21,12 +21,13 @@ from scipy.integrate import simpson
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from hotlever.calibration.table import (
-    budget_of,
+    BUDGETS,
+    budgets_of,
     check_rows,
     even_rows,
     interpolated,
     stored_table,
-    table_with_budget,
+    table_with_budgets,
     total_error,
 )
 from hotlever.calibration.tip_temperature import error_of_model, errors_by_source, measured_range
@@ -124,7 +125,7 @@ class PulseCalibration:
     def section(self) -> PulseSection:
         """Return the section of the calibration file."""
         table = {name: self.table[name].values for name in PULSE_COLUMNS}
-        return PulseSection.holding(self.timing, table=table, budget_K=budget_of(self.table))
+        return PulseSection.holding(self.timing, table=table, **budgets_of(self.table))
 
     def table_csv(self, by: str = "temperature", step: float | None = None) -> str:
         """Return the table as CSV, to load into an instrument; see `Calibration.table_csv`.
@@ -152,7 +153,7 @@ class PulseSection(Section):
     @model_validator(mode="after")
     def _belongs_together(self, info: ValidationInfo) -> Self:
         where = f"{info.context}: pulse"
-        check_rows(self.table, self.budget_K, "height", where)
+        check_rows(self.table, {BUDGETS[0]: self.budget_K}, "height", where)
         try:
             PulseTiming(self.length_us, self.period_us)
         except InputError as error:
@@ -161,7 +162,8 @@ class PulseSection(Section):
 
     def calibration(self) -> PulseCalibration:
         """Return what was written."""
-        table = stored_table(self.table, self.budget_K, PULSE_COLUMNS, "height")
+        budgets = {BUDGETS[0]: self.budget_K}
+        table = stored_table(self.table, budgets, PULSE_COLUMNS, "height")
         return PulseCalibration(PulseTiming(self.length_us, self.period_us), table)
 
 
@@ -195,7 +197,10 @@ def pulse_calibration(
         corrections.append(pulses.change(row, pulses.fine))
         changes.append(change)
         if row == _SOME[0]:
-            kept = _main(change[:-1])
+            # the directions that hold nearly all of the variance
+            shares = (change[:-1] ** 2 / (change[:-1] ** 2).sum(axis=0)).max(axis=1)
+            order = np.argsort(shares)
+            kept = np.sort(order[np.cumsum(shares[order]) > _LEFT_OUT])
     heights = pulses.heights
     # over V² they hardly change when cold
     by_square = CubicSpline(heights, np.log(pulses.rises / heights[:, None] ** 2))
@@ -278,13 +283,6 @@ class _Pulses:
         return moments - lever.circuit.base_temperature_K, state
 
 
-def _main(changes: Array) -> Index:
-    """Return the directions (rows) that hold nearly all of the variance."""
-    shares = (changes**2 / (changes**2).sum(axis=0)).max(axis=1)
-    order = np.argsort(shares)
-    return np.sort(order[np.cumsum(shares[order]) > _LEFT_OUT])
-
-
 def _through(heights: Array, values: list[Array], at: Array) -> Array:
     """Return values at falling heights at others; below the lowest they stay."""
     curve = PchipInterpolator(heights[::-1], values[::-1])
@@ -321,7 +319,7 @@ def _with_errors(
     columns = dict(zip(PULSE_COLUMNS, rows.T, strict=True))
     peak = MOMENTS.index("peak")
     budget = {source: part[:, peak] for source, part in parts.items()}
-    return PulseCalibration(timing, table_with_budget(columns, budget, "height"))
+    return PulseCalibration(timing, table_with_budgets(columns, {BUDGETS[0]: budget}, "height"))
 
 
 def _share_of_air(probe: Probe, time_us: float) -> float:

@@ -23,8 +23,9 @@ TABLE_COLUMNS = ("bias_V", "lever_V", "current_mA", "power_mW", "tip_K", *STATED
 TOTAL_POWER = "total_power_mW"
 #: More of a tip in contact: its apex and the sample's surface under it, and their standard errors.
 OF_THE_CONTACT = ("apex_K", "apex_stderr_K", "surface_K", "surface_stderr_K")
-#: The standard errors of the tip and the apex by source.
+#: The standard errors of the tip and, in contact, the apex by source; both have the same sources.
 BUDGETS = ("budget_K", "apex_budget_K")
+Budgets = Mapping[str, Mapping[str, Array]]
 #: A table has more rows where the tip rises by more than this (K) from one to the next.
 STEEP_K = 10.0
 #: Between rows further apart (K), and by so many times further than those beside them, a lever
@@ -36,32 +37,26 @@ MOST_ROWS = 10_000
 TABLES_BY = {"temperature": ("tip_K", "K"), "power": ("power_mW", "mW"), "bias": ("bias_V", "V")}
 
 
-def table_with_budget(
-    columns: Mapping[str, Array],
-    budget: Mapping[str, Array],
-    along: str = "bias",
-    of_apex: Mapping[str, Array] | None = None,
+def table_with_budgets(
+    columns: Mapping[str, Array], budgets: Budgets, along: str = "bias"
 ) -> xr.Dataset:
-    """Return columns on a dimension, rising in ``{along}_V``, and `BUDGETS` by ``source``.
-
-    That of the apex, if there is one, has the same sources.
-    """
-    budgets = zip(BUDGETS, (budget, of_apex), strict=True)
+    """Return columns on a dimension, rising in ``{along}_V``, and `BUDGETS` by ``source``."""
+    sources = list(budgets[BUDGETS[0]])
     errors = {
-        name: (("source", along), np.array([parts[source] for source in budget]))
-        for name, parts in budgets
-        if parts
+        name: (("source", along), np.array([parts[source] for source in sources]))
+        for name, parts in budgets.items()
     }
-    coordinates = {along: columns[f"{along}_V"], "source": list(budget)}
+    coordinates = {along: columns[f"{along}_V"], "source": sources}
     return labelled({**columns, **errors}, along, coordinates)
 
 
-def budget_of(table: xr.Dataset, name: str = BUDGETS[0]) -> dict[str, Array]:
-    """Return the standard errors (K) of a table by source, independent of each other.
-
-    There are none of an apex that touches nothing.
-    """
-    return {error.source.item(): error.values for error in table[name]} if name in table else {}
+def budgets_of(table: xr.Dataset) -> dict[str, dict[str, Array]]:
+    """Return the standard errors (K) of a table by source, independent of each other."""
+    return {
+        name: {error.source.item(): error.values for error in table[name]}
+        for name in BUDGETS
+        if name in table
+    }
 
 
 def total_error(parts: Mapping[str, Array]) -> Array:
@@ -125,7 +120,7 @@ def even_rows(
     Parameters
     ----------
     table : xarray.Dataset
-        From `table_with_budget`, from the coldest row on.
+        From `table_with_budgets`, from the coldest row on.
     names : sequence of str
     along : str
         The column that the rows are even in.
@@ -144,7 +139,10 @@ def even_rows(
     values, (unit, meaning) = table[along].values, QUANTITIES[along]
     if not np.all(np.diff(values) > 0.0):
         raise InputError(f"a table by {meaning}: it does not rise all along, expected by bias")
-    step = _round_step(np.ptp(values) / fewest) if step is None else step
+    if step is None:
+        largest = np.ptp(values) / fewest
+        power = 10.0 ** np.floor(np.log10(largest))
+        step = float(power * max(digit for digit in (1, 2, 5) if digit * power <= largest))
     if np.ptp(values) > MOST_ROWS * step:
         raise InputError(
             f"a table by {meaning}: found a step of {step:g} {unit} over {np.ptp(values):.4g} "
@@ -158,71 +156,53 @@ def even_rows(
     return {name: np.interp(at, values, table[name].values) for name in names}
 
 
-def _round_step(largest: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is no larger."""
-    power = 10.0 ** np.floor(np.log10(largest))
-    return float(power * max(digit for digit in (1, 2, 5) if digit * power <= largest))
-
-
 def table_by_bias(
     circuit: Circuit,
     bias: Array,
     current: Array,
     tip: Array,
-    parts: Mapping[str, Array],
+    budgets: Budgets,
     limits: tuple[Array, Array] | None = None,
     more: Mapping[str, Array] | None = None,
-    of_apex: Mapping[str, Array] | None = None,
 ) -> xr.Dataset:
     """Return the table of bias (V), current (mA) and tip temperature (K), with its errors.
 
-    95 % lie between the limits, or as far away as the errors say. There may be `more` columns, and
-    the errors of the apex by source.
+    95 % lie between the limits, or as far away as the errors say. There may be `more` columns.
     """
-    stderr, lever = total_error(parts), circuit.lever_voltage(bias, current)
+    stderr, lever = total_error(budgets[BUDGETS[0]]), circuit.lever_voltage(bias, current)
     low, high = limits or (tip - BAND * stderr, tip + BAND * stderr)
     values = (bias, lever, current, lever * current, tip, stderr, low, high)
     columns = dict(zip(TABLE_COLUMNS, values, strict=True))
-    return table_with_budget({**columns, **(more or {})}, parts, of_apex=of_apex)
+    return table_with_budgets({**columns, **(more or {})}, budgets)
 
 
 # --- in files -----------------------------------------------------------------------------------
 
 
-def check_rows(
-    columns: Mapping[str, Array],
-    budget: Mapping[str, Array],
-    along: str,
-    where: str,
-    of_apex: Mapping[str, Array] | None = None,
-) -> None:
-    """Refuse what a file holds in place of a table with its budget; `where` names the file.
+def check_rows(columns: Mapping[str, Array], budgets: Budgets, along: str, where: str) -> None:
+    """Refuse what a file holds in place of a table with its budgets; `where` names the file.
 
     Raises
     ------
     InputError
-        If its rows do not rise, or the budget, or that of the apex, is not one of them.
+        If its rows do not rise, or a budget is not one of them.
     """
-    rising = columns.get(f"{along}_V", np.array([]))
-    if not rising.size or not budget or not np.all(np.diff(rising) > 0):
+    rising, sources = columns.get(f"{along}_V", np.array([])), budgets[BUDGETS[0]].keys()
+    if not rising.size or not sources or not np.all(np.diff(rising) > 0):
         raise InputError(
             f"{where}: table: expected rows of rising {along}, and a budget of their errors"
         )
-    for name, parts in zip(BUDGETS, (budget, of_apex or budget), strict=True):
-        if parts.keys() != budget.keys():
-            raise InputError(f"{where}: {name}: expected the sources {', '.join(budget)}")
+    for name, parts in budgets.items():
+        if parts.keys() != sources:
+            raise InputError(f"{where}: {name}: expected the sources {', '.join(sources)}")
         for source, errors in parts.items():
             array(errors, rising.shape, f"{where}: {name}: {source}")
 
 
 def stored_table(
-    columns: Mapping[str, Array],
-    budget: Mapping[str, Array],
-    names: Sequence[str],
-    along: str = "bias",
-    of_apex: Mapping[str, Array] | None = None,
+    columns: Mapping[str, Array], budgets: Budgets, names: Sequence[str], along: str = "bias"
 ) -> xr.Dataset:
     """Return the table that a file holds; columns are NaN that an older file has not."""
     unknown = np.full_like(columns[f"{along}_V"], np.nan)
     own = {name: columns.get(name, unknown) for name in names}
-    return table_with_budget(own, budget, along, of_apex)
+    return table_with_budgets(own, budgets, along)

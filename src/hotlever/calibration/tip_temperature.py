@@ -15,7 +15,13 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from hotlever.calibration.table import TOTAL_POWER, table_by_bias, total_error, with_steep_rows
+from hotlever.calibration.table import (
+    BUDGETS,
+    TOTAL_POWER,
+    table_by_bias,
+    total_error,
+    with_steep_rows,
+)
 from hotlever.datasets import quantity
 from hotlever.errors import InputError
 from hotlever.estimation.experiment import TIP, PredictionAtRest
@@ -123,11 +129,16 @@ def tip_by_bias(
         high = np.where(here, np.maximum(high, jump.hot_K), high)
         either = here * (jump.hot_K - jump.cold_K) / (2.0 * BAND)
         parts["jump"] = np.hypot(parts.get("jump", 0.0), either)
-    more, of_apex = _at_the_contact(estimate, predicted, parts)
-    limits = low, high
-    table = table_by_bias(circuit, bias, predicted.values[0], tip, parts, limits, more, of_apex)
+    more, budgets = dict[str, Array](), {BUDGETS[0]: parts}
+    if probe.contact is not None:
+        more, budgets[BUDGETS[1]] = _at_the_contact(estimate, predicted, parts)
+    table = table_by_bias(circuit, bias, predicted.values[0], tip, budgets, (low, high), more)
     if not circuit.starts_cold:
-        total = table.power_mW.values + _held_power(estimate, bias)
+        # the held supplies' part is within a coarse mesh's error
+        branch = estimate.branch
+        swept = branch.x[-1] * branch.equations.observed(branch.x)[1]
+        held = spline_through(branch.u, branch.equations.power(branch.x) - swept)
+        total = table.power_mW.values + held(branch.read(circuit, bias).u)
         table[TOTAL_POWER] = quantity(TOTAL_POWER, "bias", total)
     return TipByBias(table, jumps, asymmetry)
 
@@ -147,15 +158,13 @@ def tips_in_contact(estimate: Estimate) -> tuple[Array, Array]:
 def _at_the_contact(
     estimate: Estimate, predicted: PredictionAtRest, of_tip: Mapping[str, Array]
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Return columns of apex and surface, and the errors of the apex by source; or nothing.
+    """Return columns of apex and surface, and the errors of the apex by source.
 
     What is left out of the model of the lever, and where it jumps, are those of the tip as far as
     the apex follows it.
     """
     columns: dict[str, Array] = {}
     of_apex: dict[str, Array] = {}
-    if estimate.probe.contact is None:
-        return columns, of_apex
     base_K = estimate.probe.circuit.base_temperature_K
     rise = predicted.values[TIP] - base_K
     for name, of in OF_A_CONTACT.items():
@@ -208,15 +217,6 @@ def highest_bias(estimate: Estimate) -> float:
     """Return the highest bias (V) up to the highest measured one at which the lever has a state."""
     measured = float(estimate.residuals.bias.max())
     return estimate.branch.highest_bias(estimate.probe.circuit, measured)
-
-
-def _held_power(estimate: Estimate, bias: Array) -> Array:
-    """Return the power of the held supplies at some biases (mW), within a coarse mesh's error."""
-    branch = estimate.branch
-    equations, x = branch.equations, branch.x
-    own = x[-1] * equations.observed(x)[1]
-    u = branch.read(estimate.probe.circuit, bias).u
-    return np.asarray(spline_through(branch.u, equations.power(x) - own)(u))
 
 
 # --- how sure it is -----------------------------------------------------------------------------

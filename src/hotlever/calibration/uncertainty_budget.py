@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 from pydantic import PlainSerializer, ValidationInfo, model_validator
 
-from hotlever.calibration.table import BUDGETS, budget_of
+from hotlever.calibration.table import BUDGETS, budgets_of
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.experiment import TIP
 from hotlever.estimation.gum import Budget, CoverageInterval, InputQuantity, propagate
@@ -165,7 +165,7 @@ def budget_of_estimate(
         With the standard errors beside those of the parameters.
     of : {"tip", "apex"}
     """
-    bias_V, errors_K = row.bias_V.item(), budget_of(row, BUDGETS[of == "apex"])
+    bias_V, errors_K = row.bias_V.item(), budgets_of(row)[BUDGETS[of == "apex"]]
     model = {name: errors_K[name].item() for name in ("model", "jump") if name in errors_K}
     residuals, objective = estimate.residuals, estimate.objective
     predicted = estimate.predicted(np.array([bias_V]))

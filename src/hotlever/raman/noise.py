@@ -27,7 +27,8 @@ def variance(residual: Array, model: Array, parameters: int) -> Array:
     Photon noise has a variance proportional to the signal, but neither the detector's gain
     nor the level that was subtracted is in the file. So the variance is s²·(model + o) with
     the scale s² and the offset o of greatest likelihood for these residuals; pure photon
-    noise (o = 0) is kept unless the residuals contradict it.
+    noise (o = 0) is kept unless the residuals contradict it. No curve is known better than its
+    numbers are rounded.
 
     Examples
     --------
@@ -37,10 +38,12 @@ def variance(residual: Array, model: Array, parameters: int) -> Array:
     >>> bool(np.allclose(variance(noise, model, 0) / model, 2.0, rtol=0.1))
     True
     """
-    level = np.maximum(model, 0.0) / (float(np.max(np.abs(model))) or 1.0)
+    largest = float(np.max(np.abs(model))) or 1.0
+    level = np.maximum(model, 0.0) / largest
     offsets = _OFFSETS if level.min() > 1e-3 else _OFFSETS[1:]
     shape = (level + offsets[:, None]) / (1.0 + offsets[:, None])
-    scale = np.maximum(np.mean(residual**2 / shape, axis=1), np.finfo(float).tiny)
+    rounded = np.finfo(float).eps * largest
+    scale = np.maximum(np.mean(residual**2 / shape, axis=1), rounded**2)
     loss = residual.size * np.log(scale) + np.sum(np.log(shape), axis=1)
     best = int(np.argmin(loss))
     if loss[0] - loss[best] < _POISSON_PREFERENCE:
