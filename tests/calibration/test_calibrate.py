@@ -245,6 +245,7 @@ def test_a_calibration_file_is_read_back_whole(calibrated, tmp_path):
         (("data", "columns", "I_h"), [1.0, 2.0], "I_h: expected numbers in 40 places"),
         (("knee",), "none", "knee = 'none'"),
         (("table",), [], "expected rows of rising bias"),
+        (("table",), [{"bias_V": 1.0, "tip_K": None}], "expected a tip temperature (tip_K)"),
         (("table", 5, "tip_K"), "hot", "tip_K = 'hot'"),
         (("budget_K", "k"), [1.0], "budget_K: k: expected numbers in 1"),
         (("power_law", "exponents"), 2.0, "did you mean 'exponent'"),

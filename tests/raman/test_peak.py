@@ -220,6 +220,10 @@ def test_result_does_not_depend_on_the_unit_of_intensity():
         other = fit_peak(X, scale * y + offset)
         assert other.centre == pytest.approx(peak.centre, abs=0.5 * peak.centre_stderr)
         assert other.centre_stderr == pytest.approx(peak.centre_stderr, rel=0.4)
+    # noise of less than 1e-4 was once taken for settled at its first guess
+    tiny = fit_peak(X, 1e-9 * y)
+    assert tiny.centre == pytest.approx(peak.centre, abs=1e-6 * peak.centre_stderr)
+    assert tiny.centre_stderr == pytest.approx(peak.centre_stderr, rel=1e-9)
 
 
 def test_order_and_area():

@@ -320,7 +320,7 @@ class CalibrationFile(BudgetFields, ResultFile[Calibration]):
 
     @model_validator(mode="after")
     def _rows_belong_together(self, info: ValidationInfo) -> Self:
-        check_rows(self.table, self._budgets, "bias", str(info.context))
+        check_rows(self.table, self._budgets, "bias", "tip_K", str(info.context))
         if self.gum is not None and self.gum_bias_V not in self.table["bias_V"]:
             raise InputError(f"{info.context}: gum_bias_V: expected the bias of a row of the table")
         for name, weights in (self.weights or {}).items():

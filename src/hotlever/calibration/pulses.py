@@ -153,7 +153,7 @@ class PulseSection(Section):
     @model_validator(mode="after")
     def _belongs_together(self, info: ValidationInfo) -> Self:
         where = f"{info.context}: pulse"
-        check_rows(self.table, {BUDGETS[0]: self.budget_K}, "height", where)
+        check_rows(self.table, {BUDGETS[0]: self.budget_K}, "height", "peak_K", where)
         try:
             PulseTiming(self.length_us, self.period_us)
         except InputError as error:

@@ -179,19 +179,23 @@ def table_by_bias(
 # --- in files -----------------------------------------------------------------------------------
 
 
-def check_rows(columns: Mapping[str, Array], budgets: Budgets, along: str, where: str) -> None:
+def check_rows(
+    columns: Mapping[str, Array], budgets: Budgets, along: str, tip: str, where: str
+) -> None:
     """Refuse what a file holds in place of a table with its budgets; `where` names the file.
 
     Raises
     ------
     InputError
-        If its rows do not rise, or a budget is not one of them.
+        If its rows do not rise or have no tip temperature, or a budget is not one of them.
     """
     rising, sources = columns.get(f"{along}_V", np.array([])), budgets[BUDGETS[0]].keys()
     if not rising.size or not sources or not np.all(np.diff(rising) > 0):
         raise InputError(
             f"{where}: table: expected rows of rising {along}, and a budget of their errors"
         )
+    if not np.isfinite(columns.get(tip, np.nan)).any():
+        raise InputError(f"{where}: table: expected a tip temperature ({tip}) in some rows")
     for name, parts in budgets.items():
         if parts.keys() != sources:
             raise InputError(f"{where}: {name}: expected the sources {', '.join(sources)}")

@@ -238,24 +238,13 @@ def _rows_of_fit(
     unit = np.where(relative, values, 1.0)
     covariance = np.linalg.inv(whitening.T @ whitening)
     spread = np.sqrt(np.diag(covariance))
+    names = [prior.names[number] for number in numbers]
+    distributions = np.where(relative, "log-normal", "normal").tolist()
+    errors, sensitivities = (spread * unit).tolist(), (by_fit @ whitening / unit).tolist()
+    columns = zip(names, values.tolist(), errors, distributions, sensitivities, strict=True)
     rows = [
-        InputQuantity(
-            f"{prior.names[number]} of the fit",
-            value,
-            units[prior.names[number]],
-            u,
-            "B",
-            "log-normal" if logarithmic else "normal",
-            sensitivity,
-        )
-        for number, value, u, logarithmic, sensitivity in zip(
-            numbers,
-            values.tolist(),
-            (spread * unit).tolist(),
-            relative.tolist(),
-            (by_fit @ whitening / unit).tolist(),
-            strict=True,
-        )
+        InputQuantity(f"{name} of the fit", value, units[name], u, "B", distribution, sensitivity)
+        for name, value, u, distribution, sensitivity in columns
     ]
     return rows, covariance / np.outer(spread, spread)
 

@@ -234,7 +234,9 @@ def _refine(
             use = used
         seen = noise.variance((y - value)[use], value[use], len(problem.free))
         variance = np.interp(np.arange(y.size), np.flatnonzero(use), seen)
-        settled = np.array_equal(use, used) and np.allclose(variance, assumed, rtol=0.02)
+        # in whatever unit the intensity is
+        alike = np.allclose(variance, assumed, rtol=0.02, atol=0.0)
+        settled = alike and np.array_equal(use, used)
     # settled, the weights of the last pass are within 2 %: the errors take the newest scale
     if not settled:
         p = problem.solve(p, variance, use)
