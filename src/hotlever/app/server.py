@@ -8,7 +8,6 @@ import logging
 import secrets
 import socket
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
@@ -77,46 +76,42 @@ _ASK = """<!doctype html><html lang="en"><meta charset="utf-8"><title>hotlever</
 <button>Open</button></form></html>"""
 
 
-@dataclass(frozen=True)
-class Served:
-    """Where the app is served, and to whom.
-
-    Attributes
-    ----------
-    host : str
-    port : int
-        0 takes one that is free.
-    password : str or None
-        Asked for in place of the token in the address, when others may come.
-    """
-
-    host: str = "127.0.0.1"
-    port: int = 0
-    password: str | None = None
-
-
 def serve(
     project: Project,
-    served: Served,
+    *,
+    host: str,
+    port: int,
+    password: str | None,
     browser: bool,
     say: Callable[[str], None],
     failed: Callable[[BaseException], None],
 ) -> None:
     """Serve a project until Ctrl-C.
 
-    `say` is told the address, `failed` what nobody foresaw.
+    Parameters
+    ----------
+    project : Project
+    host : str
+    port : int
+        0 takes one that is free.
+    password : str or None
+        Asked for in place of the token in the address, when others may come.
+    browser : bool
+        Whether the address is opened.
+    say, failed : callable
+        Told the address, and what nobody foresaw.
 
     Raises
     ------
     InputError
         If the port is taken.
     """
-    port = _free(served)
+    port = _free(host, port)
     token = secrets.token_urlsafe(24)
-    shown = f"[{served.host}]" if ":" in served.host else served.host
-    ticket = "" if served.password else f"?token={token}"
-    hosts = {served.host, *(LOCAL if served.host in LOCAL else ())}
-    if served.host in ("0.0.0.0", "::"):
+    shown = f"[{host}]" if ":" in host else host
+    ticket = "" if password else f"?token={token}"
+    hosts = {host, *(LOCAL if host in LOCAL else ())}
+    if host in ("0.0.0.0", "::"):
         name = socket.gethostname()
         hosts |= {*LOCAL, name.lower(), socket.getfqdn().lower(), *_addresses(name)}
         shown = name
@@ -131,10 +126,10 @@ def serve(
     logging.getLogger("nicegui").setLevel(logging.CRITICAL + 1)
     app.on_exception(failed)
     add_pages(session)
-    limits: Any = {"password": served.password, "largest": LARGEST_FILE}
+    limits: Any = {"password": password, "largest": LARGEST_FILE}
     app.add_middleware(Access, token=token, hosts=hosts, **limits)
     ui.run(
-        host=served.host,
+        host=host,
         port=port,
         title="hotlever",
         favicon="🌡",
@@ -176,19 +171,17 @@ def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
     return page
 
 
-def _free(served: Served) -> int:
+def _free(host: str, port: int) -> int:
     """Return the port to serve at."""
-    family = socket.AF_INET6 if ":" in served.host else socket.AF_INET
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind((served.host, served.port))
+            probe.bind((host, port))
             return int(probe.getsockname()[1])
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(
-            f"--host {served.host} --port {served.port}: cannot be served at ({reason})"
-        ) from None
+        raise InputError(f"--host {host} --port {port}: cannot be served at ({reason})") from None
 
 
 def _addresses(name: str) -> set[str]:

@@ -42,7 +42,7 @@ def open_app(reporter: Reporter, request: AppRequest) -> None:
     except ImportError:
         raise InputError("the app is an extra: pip install 'hotlever[app]'") from None
     from hotlever.app.project import Project
-    from hotlever.app.server import LOCAL, Served, serve
+    from hotlever.app.server import LOCAL, serve
 
     check_number("--port", request.port, 0, 65535)
     password = None
@@ -65,8 +65,15 @@ def open_app(reporter: Reporter, request: AppRequest) -> None:
     def failed(error: BaseException) -> None:
         reporter.fail(unforeseen_error(error, ["app", str(request.folder)]))
 
-    served = Served(request.host, request.port, password)
-    serve(Project(request.folder), served, not request.no_browser, say, failed)
+    serve(
+        Project(request.folder),
+        host=request.host,
+        port=request.port,
+        password=password,
+        browser=not request.no_browser,
+        say=say,
+        failed=failed,
+    )
 
 
 def _asked() -> str:

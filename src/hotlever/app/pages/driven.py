@@ -20,7 +20,7 @@ from hotlever.app.pages.chosen_lever import (
     stem,
 )
 from hotlever.app.pages.frame import ErrorBanner, caption, figure
-from hotlever.app.pages.page import KINDS, DrawnPage, Work, outputs
+from hotlever.app.pages.page import FILM, KINDS, DrawnPage, Work, outputs
 from hotlever.app.pages.plots import compare_histories
 from hotlever.app.session import Session
 from hotlever.app.state import Result
@@ -49,7 +49,7 @@ class Pulses(DrawnPage):
 
     name = "pulse"
     alt = "Voltages, current, tip temperature and heat in time"
-    kinds: ClassVar = {**KINDS, "film": "the temperature map in time (GIF)"}
+    kinds: ClassVar = {**KINDS, **FILM}
 
     def __init__(self, session: Session, banner: ErrorBanner, lever: dict[str, Any]) -> None:
         super().__init__(session, banner)
@@ -146,12 +146,6 @@ class Pulses(DrawnPage):
             return
         compare_histories(path.with_suffix(".csv"), other)
         caption(f"Line: the lever. Dashed: {result.numbers[0][1]}.").classes("remark")
-
-    def _ask(self, task: Task, path: Path, kind: str) -> None:
-        if kind == "film":
-            self.run(task.writing({"film": path.with_suffix(".gif").name}))
-        else:
-            super()._ask(task, path, kind)
 
     async def _ended(self, job: Job) -> None:
         if job.task.written.endswith(".gif"):

@@ -11,6 +11,7 @@ from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
+    PAGES,
     ErrorBanner,
     caption,
     download_button,
@@ -34,13 +35,11 @@ _GOES_ON = (
 
 @dataclass(frozen=True)
 class _Made:
-    """What is made of all measurements: button, folder, table, report, and one lever's page."""
+    """What is made of all measurements: a folder of results, a table in it, and a report."""
 
-    button: str
     folder: str
     table: str
     report: str
-    page: str
 
     @property
     def files(self) -> dict[str, str]:
@@ -49,12 +48,10 @@ class _Made:
         return {table: "Table (CSV)", page: "Page (HTML)"}
 
 
-#: By command.
+#: By command, which is also the name of one lever's page.
 _MADE = {
-    "fit": _Made("Fit all", FITS, "levers.csv", "levers", "fit"),
-    "calibrate": _Made(
-        *("Calibrate all", CALIBRATIONS, "calibrations.csv", "levers-calibrated", "calibrate")
-    ),
+    "fit": _Made(FITS, "levers.csv", "levers"),
+    "calibrate": _Made(CALIBRATIONS, "calibrations.csv", "levers-calibrated"),
 }
 _LOOK_S = 1.0
 
@@ -85,8 +82,8 @@ class LeversPage(Page):
                     flat_button("None", partial(self._files.set_value, []))
                 self.probe_choice()
                 with ui.row().classes("w-full"):
-                    for command, made in _MADE.items():
-                        start = ui.button(made.button, icon="table_rows")
+                    for command in _MADE:
+                        start = ui.button(f"{command.capitalize()} all", icon="table_rows")
                         start.classes("col").on_click(partial(self._make, command))
                 caption(_GOES_ON)
             with right:
@@ -99,42 +96,48 @@ class LeversPage(Page):
     async def _take_all(self) -> None:
         """Choose all measurements of levers that lie in the folder."""
         names = self.session.project.data
-        measured = await self.session.ask("full", "showing:measurements", names, len(names))
-        # others may have been dropped meanwhile
-        self._files.set_options(self.session.project.data)
-        self._files.set_value(list(dict.fromkeys([*measured, *self._files.value])))
+        self._take(await self.session.ask("full", "showing:measurements", names, len(names)))
 
     async def _dropped(self, names: list[str]) -> None:
-        self._files.set_options(self.session.project.data)
-        taken = [name for name in names if name in self._files.options]
-        self._files.set_value(list(dict.fromkeys([*self._files.value, *taken])))
+        self._take(names)
         await say_refused(self.session, self.banner, names, spectra=False)
+
+    def _take(self, names: list[str]) -> None:
+        """Choose files beside those that are chosen."""
+        # others may have been dropped meanwhile
+        data = self.session.project.data
+        self._files.set_options(data)
+        taken = [name for name in names if name in data]
+        self._files.set_value(list(dict.fromkeys([*self._files.value, *taken])))
+
+    @property
+    def _page(self) -> str:
+        """The title of the page of one lever."""
+        title, _ = PAGES[self.chosen["command"]]
+        return title
 
     @property
     def _made(self) -> _Made:
         return _MADE[self.chosen["command"]]
 
     def task(self) -> Task:
-        """Return the task that fits or calibrates all."""
-        made, probe = self._made, self.chosen["probe"]
-        options = {"probe": probe, "output": made.folder, "report": made.report}
-        return Task(self.chosen["command"], tuple(self._files.value), options)
+        """Return the task that fits or calibrates all.
+
+        Raises
+        ------
+        InputError
+            If these are not several.
+        """
+        made, data = self._made, tuple(self._files.value)
+        if len(data) < 2:
+            raise InputError(f"choose two measurements or more; the page {self._page} takes one")
+        options = {"probe": self.chosen["probe"], "output": made.folder, "report": made.report}
+        return Task(self.chosen["command"], data, options)
 
     def _make(self, command: str) -> None:
         self.chosen["command"] = command
         self.show_command()
         self.start()
-
-    def start(self) -> bool:
-        """Fit or calibrate all, if these are several."""
-        with self.banner.caught():
-            if len(self._files.value) < 2:
-                page = self._made.page
-                raise InputError(
-                    f"choose two measurements or more; the page {page.capitalize()} takes one"
-                )
-            return super().start()
-        return False
 
     async def _fitted(self, job: Job) -> None:
         await self.open()
@@ -165,7 +168,7 @@ class LeversPage(Page):
             for name, label in self._made.files.items():
                 download_button(self.session, name, label)
         table(levers["head"], levers["rows"], self._open)
-        caption(f"A click on a lever opens it on the page {self._made.page.capitalize()}.")
+        caption(f"A click on a lever opens it on the page {self._page}.")
 
     def _open(self, stem: str) -> None:
         """Open one lever on its page, with what was made of it here."""
@@ -173,6 +176,6 @@ class LeversPage(Page):
         if source is None:
             self.banner.say(f"{stem}: its measurement is not in the folder any more")
             return
-        page = self._made.page
+        page = self.chosen["command"]
         self.session.choices(page)["data"] = source
         ui.navigate.to(f"/{page}")

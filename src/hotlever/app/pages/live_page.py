@@ -13,7 +13,7 @@ from nicegui import background_tasks, ui
 from hotlever.app.jobs import Task
 from hotlever.app.pages.chosen_lever import stem
 from hotlever.app.pages.frame import ErrorBanner, caption, number_shown, two_columns
-from hotlever.app.pages.page import DrawnPage, Page, Work, outputs
+from hotlever.app.pages.page import Page, Work, outputs
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
@@ -95,8 +95,8 @@ class LivePage(Page):
     numbers: ClassVar[Numbers]
     #: What is chosen of a state, beside the task, in the order in which it is asked for.
     state: ClassVar[tuple[str, ...]]
-    #: What the table may be asked for as, and the processes that answer in full, and quickly.
-    kinds, workers = DrawnPage.kinds, ("full", "quick")
+    #: The processes that answer in full, and quickly.
+    workers = ("full", "quick")
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
@@ -226,7 +226,7 @@ class LivePage(Page):
         with ui.card().classes("w-full last").props("flat bordered"):
             ui.label("Take it with you").classes("text-bold")
             self.about_table()
-            self.kind_buttons(lambda kind: self.run(self._writing(kind)), self.kinds)
+            self.kind_buttons(lambda kind: self.run(self._writing(kind)))
             Work(self.session, self.name, self.give)
             self.command()
 

@@ -68,7 +68,9 @@ class MeasuredPage(Page):
         self._read_of: tuple[str | None, str | None] | None = None
         with two_columns() as (left, right):
             with left:
-                self._data_controls()
+                drop_zone(session, banner, _DROP, self._dropped)
+                self._try = small_button("Try the example", self._example, icon="science")
+                self._select = self.choice("data", "Measurement", self._offered, None)
                 self.options()
                 title, icon = PAGES[self.name]
                 self._button = ui.button(title, icon=icon, on_click=self.start)
@@ -118,12 +120,6 @@ class MeasuredPage(Page):
         return f"{self.stem}{self.ending}"
 
     # --- the measurement --------------------------------------------------------------------------
-
-    def _data_controls(self) -> None:
-        """Show where a measurement is dropped or chosen, and what is told of it."""
-        drop_zone(self.session, self.banner, _DROP, self._dropped)
-        self._try = small_button("Try the example", self._example, icon="science")
-        self._select = self.choice("data", "Measurement", self._offered, None)
 
     @property
     def _offered(self) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -42,6 +42,7 @@ KINDS = {
     "PDF": "the figure",
     "VTU": "the fields, for ParaView",
 }
+FILM = {"film": "the temperature map in time (GIF)"}
 _TABLES = {"CSV": "csv", "NetCDF": "nc"}
 #: Seconds between two looks at the work that runs.
 _LOOK_S = 0.1
@@ -59,6 +60,8 @@ class Page:
     """
 
     name = ""
+    #: What its task may be asked for as.
+    kinds: ClassVar = {kind: meaning for kind, meaning in KINDS.items() if kind != "VTU"}
 
     @classmethod
     async def fill(cls, session: Session) -> None:
@@ -179,10 +182,10 @@ class Page:
 
     # --- what was written is given ----------------------------------------------------------------
 
-    def kind_buttons(self, asked: Callable[[str], Any], kinds: Mapping[str, str] = KINDS) -> None:
-        """Show a button for each of some kinds of files."""
+    def kind_buttons(self, asked: Callable[[str], Any]) -> None:
+        """Show a button for each kind of file."""
         with ui.row().classes("items-center"):
-            for kind, meaning in kinds.items():
+            for kind, meaning in self.kinds.items():
                 small_button(kind, lambda _, to=kind: asked(to)).tooltip(meaning)
 
     def written(self, job: Job) -> bool:
@@ -210,13 +213,15 @@ def several(text: str) -> list[str]:
 
 
 def outputs(stem: str, kind: str) -> dict[str, str]:
-    """Return the options that have a task write one of `KINDS`, whose name stands last.
+    """Return the options that have a task write one of `KINDS` or a film, whose name stands last.
 
     Examples
     --------
     >>> outputs("a", "PDF"), outputs("a", "VTU")
     ({'output': 'a.csv', 'plot': 'a.pdf'}, {'fields': 'a.fields'})
     """
+    if kind in FILM:
+        return {"film": f"{stem}.gif"}
     if kind == "VTU":
         return {"fields": f"{stem}.fields"}
     if kind in _TABLES:
@@ -319,11 +324,8 @@ class Work:
 class DrawnPage(Page):
     """A page, or a part of one, that shows the figure of its task and gives what it computed."""
 
-    #: What the figure shows, and what it may be asked for as.
+    #: What the figure shows.
     alt = ""
-    kinds: ClassVar[Mapping[str, str]] = {
-        kind: meaning for kind, meaning in KINDS.items() if kind != "VTU"
-    }
 
     def show_result(self) -> None:
         """Show the work here, what it drew last, and the command line."""
@@ -369,7 +371,7 @@ class DrawnPage(Page):
             self.show_figure(path)
             with ui.row().classes("w-full items-center"):
                 caption(task.writing({}).line).classes("remark col min-w-60")
-                self.kind_buttons(partial(self._ask, task, path), self.kinds)
+                self.kind_buttons(partial(self._ask, task, path))
 
     def show_figure(self, path: Path) -> None:
         """Show the figure that was drawn."""

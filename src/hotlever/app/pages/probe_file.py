@@ -187,13 +187,14 @@ class ProbeFields:
             roles = _ROLES if row.role in _ROLES else {**_ROLES, row.role: row.role}
             role = ui.select(roles, label=f"layer {row.label}", value=row.role)
             role.classes("col min-w-36")
-            role.on_value_change(lambda event: self._set_layer(row, role=event.value))
+            role.on_value_change(lambda event: self._set_layer(row, event.value, row.material))
             if row.role in (*TERMINALS, *({row.name} if row.part == "terminals" else ())):
                 return
             shown = materials if row.role else {**materials, "": "–"}
             made_of = ui.select(shown, label="made of", value=row.material, with_input=True)
             made_of.classes("col min-w-36").props(f'aria-label="layer {row.label} is made of"')
-            made_of.on_value_change(lambda event: self._set_layer(row, material=event.value))
+            role_then = row.role or FILM
+            made_of.on_value_change(lambda event: self._set_layer(row, role_then, event.value))
             if row.role == FILM and row.material:
                 section = ("layers", row.name)
                 label = "thickness (µm)"
@@ -201,14 +202,10 @@ class ProbeFields:
                 made.props('placeholder="a part of the body" stack-label').classes("w-full")
 
     def _set_layer(
-        self, row: LayerRow, role: str | None = None, material: str | None = None
+        self, row: LayerRow, role: str | None, material: str | None
     ) -> Awaitable[None] | None:
-        if role is None and material is None:
+        if role is None or material is None:
             return None
-        if material is not None and not row.role:
-            role = FILM
-        role = row.role if role is None else role
-        material = row.material if material is None else material
         return self._edit(with_layer(self._text, row, role, material))
 
     async def _rename(self, old: str) -> None:
