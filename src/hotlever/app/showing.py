@@ -80,7 +80,6 @@ def understood(report: Report, name: str, told: Mapping[str, Any] | None = None)
         # those that were not used are among the columns, all of which the page shows
         "notes": list(measurement.notes),
         "observables": list(measurement.observables),
-        "medium": measurement.medium,
         "data": in_time
         | {column: data[column].values.tolist() for column in columns_shown if column in data},
     }

@@ -23,7 +23,7 @@ from hotlever.app.pages.frame import (
     two_columns,
 )
 from hotlever.app.pages.page import Page, Work
-from hotlever.app.pages.probe_file import ProbeFields, ProbeFile, new_probe
+from hotlever.app.pages.probe_file import ProbeFields, ProbeFile, ProbeText, new_probe
 from hotlever.app.project import DATA, DRAWINGS
 from hotlever.app.session import Session
 from hotlever.app.state import Lever, Simulate
@@ -97,14 +97,12 @@ class LeverPage(Page):
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
         self._file = ProbeFile(self)
-        self._shown_text = ""
         self._awaited: str | None = None
         with two_columns() as (left, right):
             with left:
                 drop_zone(session, banner, _DROP, self._dropped)
-                self._pick = ui.select(self._files, label="Open")
-                self._pick.on_value_change(lambda event: self._open(event.value))
-                self._pick.classes("w-full").props("clearable")
+                self._pick = ui.select(self._files, label="Open").classes("w-full")
+                self._pick.props("clearable").on_value_change(lambda event: self._open(event.value))
                 with ui.row():
                     for shape, words in _SHAPES.items():
                         small_button(words, partial(self._take_shape, shape))
@@ -123,10 +121,7 @@ class LeverPage(Page):
                         go.props("outline").on_click(partial(self._go_on, page))
                     for suffix in FIGURE_FILES:
                         flat_button(suffix[1:].upper(), partial(self._give, suffix))
-                with ui.expansion("The probe file"):
-                    self._text = ui.textarea(on_change=self._edited).classes("w-full")
-                    self._text.props('outlined autogrow debounce=400 aria-label="Probe file"')
-                    self._text.props("input-class=font-mono input-style=font-size:.8rem")
+                self._text = ProbeText(self._edited)
                 self.command()
 
     @property
@@ -140,7 +135,7 @@ class LeverPage(Page):
             self._file.take_up()
         if self.chosen["text"] is None:
             self.chosen["text"] = new_probe(next(iter(_SHAPES)))
-        self._quietly(self.chosen["text"])
+        self._text.put(self.chosen["text"])
         await self.draw()
         await self._open(self.chosen["drawing"])
 
@@ -223,14 +218,14 @@ class LeverPage(Page):
         self._name.set_value(name)
         self._picture.clear()
         self._kept.clear()
-        self._quietly("")
+        self._text.put("")
         self.show_command()
 
     async def _show(self, name: str, listing: str = "", plot: str = "") -> None:
         """Show a probe file, and what the drawing holds that it was proposed for."""
         self._begin(name)
         with self.banner.caught():
-            self._quietly(self._file.open(name))
+            self._text.put(self._file.open(name))
             await self.draw()
             if plot:
                 outlines = self.session.project.path(plot).read_text(encoding="utf-8")
@@ -247,24 +242,17 @@ class LeverPage(Page):
         else:
             self._begin()
 
-    def _edited(self, event: Any) -> Awaitable[None] | None:
+    def _edited(self, text: str) -> Awaitable[None]:
         """Take what was typed, at once: later the text may be another one, which nobody typed."""
-        if event.value == self._shown_text:
-            return None
-        self.chosen["text"] = self._shown_text = event.value
+        self.chosen["text"] = text
         return self.draw()
 
     async def _set(self, text: str) -> None:
         """Take a text in which a field was set."""
         self.chosen["text"] = text
         self._work.hide()
-        self._quietly(text)
+        self._text.put(text)
         await self.draw()
-
-    def _quietly(self, text: str) -> None:
-        """Show a probe file that nobody typed."""
-        self._shown_text = text
-        self._text.set_value(text)
 
     # --- what is shown and written ----------------------------------------------------------------
 
@@ -277,7 +265,7 @@ class LeverPage(Page):
     async def _write(self) -> bool:
         """Write the probe file; return whether it is there now."""
         with self.banner.caught():
-            name = await self._file.save(self._name.value or "", self._shown_text)
+            name = await self._file.save(self._name.value or "", self._text.text)
             if name is None:
                 return False
             self._name.set_value(name)

@@ -14,6 +14,7 @@ from hotlever.app.jobs import Task
 from hotlever.app.pages.chosen_lever import stem
 from hotlever.app.pages.frame import ErrorBanner, caption, number_shown, two_columns
 from hotlever.app.pages.page import Page, Work, outputs
+from hotlever.app.pages.plots import redraw
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
@@ -268,14 +269,9 @@ class LivePage(Page):
         self.plots.show(answer)
         if not self._drawn.visible:
             self._drawn.set_visibility(True)
-            self.resized()
+            redraw(self._drawn)
         await self.shown(at, quick)
         return True
-
-    def resized(self) -> None:
-        """Have figures drawn anew: what was hidden had no size that they could be drawn for."""
-        resize = "setTimeout(() => window.dispatchEvent(new Event('resize')))"
-        self._drawn.client.run_javascript(resize)
 
     def blank(self) -> None:
         """Show no numbers where there are none: the last ones were of another state."""

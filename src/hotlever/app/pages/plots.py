@@ -74,6 +74,12 @@ def _short(values: Any) -> list[float]:
     return [float(f"{value:.5g}") for value in np.atleast_1d(values).tolist()]
 
 
+def redraw(element: ui.element) -> None:
+    """Have the plots of a page drawn anew: what was hidden had no size that they could have."""
+    resize = "setTimeout(() => window.dispatchEvent(new Event('resize')))"
+    element.client.run_javascript(resize)
+
+
 def side_by_side() -> ui.element:
     """Return where plots stand beside one another, as many as there is room for."""
     columns = "grid-template-columns: repeat(auto-fit, minmax(250px, 1fr))"

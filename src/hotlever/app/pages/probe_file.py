@@ -127,6 +127,34 @@ def _digest(text: str | None) -> str:
     return "" if text is None else hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()
 
 
+class ProbeText:
+    """The field in which the text of a probe file is edited; `typed` is told what somebody typed.
+
+    Attributes
+    ----------
+    text : str
+        What stands there.
+    """
+
+    def __init__(self, typed: Callable[[str], Awaitable[None]]) -> None:
+        self._typed, self.text = typed, ""
+        with ui.expansion("The probe file"):
+            self._area = ui.textarea(on_change=self._changed).classes("w-full")
+            self._area.props('outlined autogrow debounce=400 aria-label="Probe file"')
+            self._area.props("input-class=font-mono input-style=font-size:.8rem")
+
+    def put(self, text: str) -> None:
+        """Show a text that nobody typed."""
+        self.text = text
+        self._area.set_value(text)
+
+    def _changed(self, event: Any) -> Awaitable[None] | None:
+        if event.value == self.text:
+            return None
+        self.text = event.value
+        return self._typed(event.value)
+
+
 class ProbeFields:
     """What can be set in the probe file that is open; `edited` is told its new text."""
 

@@ -20,7 +20,7 @@ from hotlever.app.pages.driven import Pulses, SmallSignals
 from hotlever.app.pages.frame import flat_button
 from hotlever.app.pages.live_page import LivePage, texts_of
 from hotlever.app.pages.page import KINDS
-from hotlever.app.pages.plots import LivePlots
+from hotlever.app.pages.plots import LivePlots, redraw
 from hotlever.errors import HotleverError, InputError
 from hotlever.lever.set_points import HELD
 from hotlever.materials.parameters import label
@@ -82,7 +82,7 @@ class SimulatePage(LivePage):
 
     def _viewed(self, event: Any) -> None:
         self.chosen["view"] = event.value
-        self.resized()
+        redraw(self._view)
 
     async def changed(self) -> None:
         """Show another probe, as it stands in its file, another one beside, or another table."""
