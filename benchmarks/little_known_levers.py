@@ -21,8 +21,8 @@ from hotlever.calibration.procedure import calibrate
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimation import Measurement
 from hotlever.lever import Branch, Lever
+from hotlever.lever.discretisation import chosen_space, energy_between_degrees, making
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.meshing import chosen_space, energy_between_degrees, making
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.parts import PriorTexts

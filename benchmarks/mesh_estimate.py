@@ -16,9 +16,9 @@ import numpy as np
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever import Lever
+from hotlever.lever.discretisation import energy_between_degrees, making
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.meshing import energy_between_degrees, making
 from hotlever.probe import MeshOptions, Probe
 from problems import table
 

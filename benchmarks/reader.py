@@ -22,12 +22,11 @@ from scipy.optimize import fsolve
 from hotlever import Lever, Probe
 from hotlever.air.operator import PanelledAir
 from hotlever.air.panels import PanelOptions
+from hotlever.lever.discretisation import plate_of
 from hotlever.lever.lever import COARSE, State
-from hotlever.lever.noise import NoiseOptions, johnson, of_temperature
+from hotlever.lever.noise import NoiseOptions, Response, johnson, of_temperature
 from hotlever.lever.reader import best_bias, over_surface
-from hotlever.lever.response import Response
 from hotlever.lever.space import TIP
-from hotlever.lever.surroundings import plate_of
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.materials.air import (
     kirchhoff_variable,

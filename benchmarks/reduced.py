@@ -18,7 +18,7 @@ from hotlever.estimation.experiment import ExperimentAtRest, experiment_of
 from hotlever.estimation.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
-from hotlever.lever.reduced.error_estimate import estimated_error
+from hotlever.lever.reduced.lever import estimated_error
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.lever.reduced.training import cached_reduction
 from hotlever.lever.similar import SimilarLevers

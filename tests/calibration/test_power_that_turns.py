@@ -63,7 +63,7 @@ def test_a_branch_says_where_its_power_turns(branch, reference):
 
 def test_a_power_tells_a_temperature_only_where_it_has_one(branch):
     tips = np.linspace(300.0, branch.hottest_K, 500)
-    power, highest = branch.power(tips), branch.highest_power_mW
+    power, highest = branch.power(tips), branch.by_power.highest_mW
     assert highest < power.max()
     cold = tips[power < highest]
     cold = cold[cold < branch.power_turns_K]
@@ -73,7 +73,7 @@ def test_a_power_tells_a_temperature_only_where_it_has_one(branch):
     some = np.linspace(0.1, 0.9, 5) * highest
     step = 1e-4
     slope = (branch.tip_temperature(some + step) - branch.tip_temperature(some - step)) / 2 / step
-    np.testing.assert_allclose(branch.tip_slope(some), slope, rtol=1e-3)
+    np.testing.assert_allclose(branch.by_power.slope(some), slope, rtol=1e-3)
     assert branch.tip_temperature(0.5 * highest).shape == ()
 
 

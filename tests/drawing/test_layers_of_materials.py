@@ -11,7 +11,7 @@ from drawn import box, reference_points
 from hotlever.errors import BranchEndError, InputError
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.sensitivities import by_parameter
+from hotlever.lever.observables import by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever3d import SolidLever
 from hotlever.materials import HIGH_DOPED, published

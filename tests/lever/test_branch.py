@@ -81,7 +81,7 @@ def test_the_curve_converges_with_the_spacing_of_the_states(coarse):
     """Every second state is left out: the error grows as the sixth power, or little less."""
     branch = coarse.branch(1000.0)
     some = np.r_[0, 1 : branch.u.size : 2]
-    from hotlever.lever.curve import smooth_curve
+    from hotlever.piecewise import smooth_curve
 
     sparse = smooth_curve(branch.u[some], branch.values[some], branch.value_slopes[some])
     middle = branch.u[3:-1:2]
@@ -109,7 +109,7 @@ def test_power_and_temperature_are_inverse(reference):
     by_difference = (
         reference.tip_temperature(power + step) - reference.tip_temperature(power - step)
     ) / (2 * step)
-    np.testing.assert_allclose(reference.tip_slope(power), by_difference, rtol=1e-5)
+    np.testing.assert_allclose(reference.by_power.slope(power), by_difference, rtol=1e-5)
 
 
 def test_the_bias_of_a_temperature_heats_to_it(lever, reference):
@@ -119,7 +119,7 @@ def test_the_bias_of_a_temperature_heats_to_it(lever, reference):
 
 
 def test_nothing_is_said_beyond_the_hottest_state_or_below_the_base(reference):
-    assert np.isnan(reference.tip_temperature(reference.highest_power_mW + 0.1))
+    assert np.isnan(reference.tip_temperature(reference.by_power.highest_mW + 0.1))
     assert np.isnan(reference.power([280.0, reference.hottest_K + 1.0])).all()
     assert reference.power(293.0) == 0.0
 

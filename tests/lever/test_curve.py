@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
-from hotlever.lever.curve import hermite_weights, smooth_curve, spline_through
-from hotlever.piecewise import Piecewise
+from hotlever.piecewise import Piecewise, hermite_weights, smooth_curve, spline_through
 
 
 @pytest.mark.parametrize("degree", range(6))

@@ -16,14 +16,14 @@ from taylor import remainder_orders
 from hotlever.errors import BranchEndError
 from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.lever import Branch, Lever
-from hotlever.lever.branch import Reach
+from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.equations import BALANCES, balance_columns
 from hotlever.lever.lever import COARSE
 from hotlever.lever.monitors import MonitorMap
-from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.observables import Linearised, by_parameter
+from hotlever.lever.reduced.lever import BranchSolver, ReducedLever
 from hotlever.lever.reduced.training import cached_reduction
-from hotlever.lever.sensitivities import Linearised, by_parameter
-from hotlever.lever.similar import BranchSolver, SimilarLevers
+from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.space import LEVER, TIP
 from hotlever.lever3d import SolidLever
 from hotlever.materials import PARAMETERS, published
@@ -264,7 +264,7 @@ def test_with_little_resistance_the_ramp_ends_at_the_fold_or_jumps_there(one, re
     assert np.isnan(reading.u[3])
     shown = branch.shown(np.linspace(0.0, branch.end_u, 4001))
     bias = circuit.bias(shown["lever_V"], shown["current_mA"])
-    ended = branch.ended(reading)
+    ended = branch_end(branch, reading)
     assert isinstance(ended, BranchEndError)
     assert ended.bias_reached == pytest.approx(bias.max(), abs=1e-5)
     assert f"at a bias of {bias.max():.4f} V" in str(ended)

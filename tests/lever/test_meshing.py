@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hotlever.lever import Lever
+from hotlever.lever.discretisation import TOLERANCE, chosen_space, energy_between_degrees
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.meshing import TOLERANCE, chosen_space, energy_between_degrees
 from hotlever.probe import MeshOptions, Probe
 
 #: A wide heater with a sharp border: its usual triangles are ten times as long as its doping takes.

@@ -18,6 +18,7 @@ from hotlever.figures import figure_of
 from hotlever.lever.lever import COARSE
 from hotlever.lever.noise import (
     NoiseOptions,
+    Response,
     johnson,
     johnson_without_feedback,
     of_resistors,
@@ -25,7 +26,6 @@ from hotlever.lever.noise import (
     per_hooge,
 )
 from hotlever.lever.reader import Reader, at_distance, best_bias, over_surface, rows_of
-from hotlever.lever.response import Response
 from hotlever.lever.space import TIP
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.studies.thermoelectric_strip import strip_of

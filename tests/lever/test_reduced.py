@@ -12,7 +12,7 @@ from experiments import reduced_experiment
 from hotlever.cache import CACHE_VARIABLE, store_arrays, stored
 from hotlever.estimation import Measurement, fit
 from hotlever.lever import Lever
-from hotlever.lever.branch import Reach
+from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.response_surface import ParameterDomain
@@ -200,9 +200,9 @@ def test_where_a_reduced_lever_ends_is_not_said_of_the_lever(coarse, reduced):
     branch = reduced.branch(coarse.probe, Reach(circuit, 13.0))
     reading = branch.read(circuit, np.array([13.0]))
     assert np.isnan(reading.u).all()
-    text = str(branch.ended(reading))
+    text = str(branch_end(branch, reading))
     assert text.startswith("the reduced lever ends at a bias of 12.2")
     assert "no steady state" not in text
     # nor is it where a branch was not followed further
     short = coarse.with_probe(coarse.probe).branch(1000.0)
-    assert "no steady state" not in str(short.ended(short.read(circuit, np.array([13.0]))))
+    assert "no steady state" not in str(branch_end(short, short.read(circuit, np.array([13.0]))))

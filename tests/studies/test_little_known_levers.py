@@ -11,8 +11,8 @@ import xarray as xr
 import little_known_levers
 from hotlever.errors import ComputationError
 from hotlever.lever import Lever
+from hotlever.lever.discretisation import chosen_space
 from hotlever.lever.lever import COARSE
-from hotlever.lever.meshing import chosen_space
 from hotlever.measurement import read_measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import default_priors

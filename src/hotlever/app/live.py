@@ -24,7 +24,7 @@ from hotlever.app.workers import Report
 from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError
 from hotlever.lever import Branch, Lever
-from hotlever.lever.branch import Reach
+from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever
@@ -156,7 +156,7 @@ class LiveLever:
         """
         reading = self.branch.read(self.circuit, np.array([bias]))
         if not np.isfinite(reading.u).all():
-            raise self.branch.ended(reading)
+            raise branch_end(self.branch, reading)
         report.note(*reading.notes(np.array([bias])))
         shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
         x = self.branch.equations.space.expanded(self.branch.states(reading.u))

@@ -28,7 +28,7 @@ from hotlever.calibration.table import interpolated
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
-from hotlever.lever.transient.waveform_texts import waveform_from_text
+from hotlever.lever.transient.waveform import waveform_from_text
 from hotlever.measurands import FITTED
 from hotlever.measurement import (
     FileColumn,

@@ -375,7 +375,7 @@ def scale_to(curve: IVCurve, like: Branch) -> Scale:
             f"the lever voltage is highest at point {curve.peak + 1}: too few are below "
             "the knee to tell how much power the lever needs; measure from a lower bias"
         )
-    top = like.knee.power_mW if like.knee is not None else like.highest_power_mW
+    top = like.knee.power_mW if like.knee is not None else like.by_power.highest_mW
 
     def ln_resistance(power: Array, ln_power_scale: float, ln_resistance_scale: float) -> Array:
         own = power * np.exp(-ln_power_scale)

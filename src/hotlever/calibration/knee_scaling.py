@@ -29,10 +29,10 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.estimation.noise import METERS
 from hotlever.lever import Branch, OperatingPoint
 from hotlever.lever.branch import Reach, shifted
-from hotlever.lever.curve import spline_through
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
+from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
 from hotlever.probe.parameters import RESISTANCE
 from hotlever.probe.priors import default_priors
@@ -265,7 +265,7 @@ def _similar_branches(probe: Probe, like: Branch) -> list[Branch]:
 def _error_of_other_levers(similar: list[Branch], ratio: Array) -> Array:
     """Return the standard deviation (K) of the tip at powers over that of the knee, (n,)."""
     knees = [knee_of(branch).power_mW for branch in similar]
-    ends = [branch.highest_power_mW for branch in similar]
+    ends = [branch.by_power.highest_mW for branch in similar]
     # where one of them has melted they differ as they do before
     power = np.outer(knees, np.minimum(ratio, np.min(np.divide(ends, knees))))
     tip, *moved = (branch.tip_temperature(row) for branch, row in zip(similar, power, strict=True))

@@ -269,7 +269,7 @@ def fit_power_law(
 
 def law_of_model(vacuum: Branch, threshold_mW: float | None) -> tuple[PowerLaw, float]:
     """Fit Eq. 12 to the model in vacuum, with its threshold at the knee; return what it misses."""
-    highest = vacuum.highest_power_mW
+    highest = vacuum.by_power.highest_mW
     if threshold_mW is not None:
         highest = min(highest, _TO * threshold_mW)
     power = np.linspace(0.0, highest, _POINTS + 1)[1:]

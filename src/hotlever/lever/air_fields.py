@@ -17,8 +17,8 @@ from hotlever.air.panels import Panels
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
+from hotlever.lever.discretisation import plate_of
 from hotlever.lever.lever import Lever, State
-from hotlever.lever.surroundings import plate_of
 from hotlever.materials.air import temperature_from_kirchhoff
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM

@@ -7,8 +7,8 @@ through both give every state between. All curves run over u = √(T_tip − T_b
 smooth down to zero power: the potential begins as u, the temperature as u². The curves of a lever
 that more than the swept supply heats run over their length.
 
-A sweep reads the branch in a circuit, as a slow ramp of the bias does (`hotlever.lever.ramp`). The
-fold of a ramp is a maximum of that bias, the knee of the I-V curve the maximum of V_l.
+A sweep reads the branch in a circuit, as a slow ramp of the bias does (`hotlever.lever.readings`).
+The fold of a ramp is a maximum of that bias, the knee of the I-V curve the maximum of V_l.
 """
 
 from __future__ import annotations
@@ -20,18 +20,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.errors import BranchEndError
-from hotlever.lever.by_power import ByPower
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.newton import NewtonResult
 from hotlever.lever.parametrisation import NATURAL, UNIT_K, UNIT_V, Parametrisation, PseudoArclength
-from hotlever.lever.ramp import Reading, slow_ramp
+from hotlever.lever.readings import ByPower, Reading, slow_ramp
 from hotlever.lever.solved_states import SolvedStates
 from hotlever.piecewise import Piecewise
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
-#: A bias (V) that is none.
-_NO_BIAS = 1e-9
 #: Steps of Newton's method from the root of a rise to its place.
 _CORRECTIONS = 3
 #: Where a branch's values have the rise of the tip.
@@ -184,11 +181,6 @@ class Branch(SolvedStates):
         return ByPower(self, self.curve)
 
     @property
-    def highest_power_mW(self) -> float:
-        """Power at the end of the branch, or up to which each has one temperature (mW)."""
-        return self.by_power.highest_mW
-
-    @property
     def power_turns_K(self) -> float | None:
         """Tip temperature from which on the power falls (K); None if it rises to the end."""
         turn = self.by_power.turn_u
@@ -197,10 +189,6 @@ class Branch(SolvedStates):
     def tip_temperature(self, power_mW: ArrayLike) -> Array:
         """Return the tip temperature (K) by power (mW); NaN where there is none, or several."""
         return self.tip_K(self.by_power.u(np.asarray(power_mW, dtype=float)))
-
-    def tip_slope(self, power_mW: ArrayLike) -> Array:
-        """Return dT_tip/dP_l (K/mW) by power (mW), which is not zero."""
-        return self.by_power.slope(np.asarray(power_mW, dtype=float))
 
     @cached_property
     def knee_u(self) -> float | None:
@@ -248,46 +236,7 @@ class Branch(SolvedStates):
     def _ramp(self, circuit: Circuit, bias: Array) -> Reading:
         """Find the states that a slow ramp takes from zero upwards."""
         curve = self.bias_by_u(circuit)
-        start = self._without_bias(curve)
-        turns = self.turns(curve)
-        ends = [start, *turns[turns > start].tolist(), self.end_u]
-        return slow_ramp(curve, ends, bias, self.tip_K)
-
-    def _without_bias(self, curve: Piecewise) -> float:
-        """Return where a curve of the bias by u is zero: near where it was followed from."""
-        if abs(float(curve(0.0))) < _NO_BIAS:
-            return 0.0
-        # a similar lever has no bias elsewhere
-        roots = curve.roots()
-        return float(roots[np.argmin(np.abs(roots))]) if roots.size else float(self.u[0])
-
-    def ended(self, reading: Reading) -> BranchEndError:
-        """Return the error that says where a ramp of the bias ends.
-
-        The lever itself ends there only if it was followed until something melts, and is no reduced
-        one, which goes as far as it was made for.
-        """
-        bias, tip = reading.last_V, reading.last_K
-        limit, end = self.equations.laws.limit
-        side = self if bias >= 0 else self.mirrored
-        at_end = f"at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
-        if self.equations.space.is_reduced:
-            text = f"the reduced lever ends {at_end}: beyond it the full lever has to be solved"
-        elif not side.melts:
-            text = (
-                f"the branch was solved up to a state {at_end}; how far the lever itself goes is "
-                "not known from it"
-            )
-        elif abs(reading.last_u) == side.end_u:
-            text = f"{end} {at_end}"
-        else:
-            at = self.point(reading.last_u)
-            text = (
-                f"the branch of a slow bias ramp ends at a bias of {bias:.4f} V (lever "
-                f"{at.lever_V:.4f} V, current {at.current_mA:.4f} mA, tip {tip:.1f} K): beyond it "
-                f"there is no steady state below {limit:.0f} K"
-            )
-        return BranchEndError(text, bias_reached=bias)
+        return slow_ramp(curve, self.turns(curve), self.end_u, bias, self.tip_K)
 
 
 @dataclass(frozen=True)
@@ -325,3 +274,32 @@ def shifted(branch: Branch, changes: Array, slopes: Array) -> Branch:
     return replace(
         branch, values=branch.values + changes, value_slopes=branch.value_slopes + slopes
     )
+
+
+def branch_end(branch: Branch, reading: Reading) -> BranchEndError:
+    """Return the error that says where a ramp of the bias ends.
+
+    The lever itself ends there only if it was followed until something melts, and is no reduced
+    one, which goes as far as it was made for.
+    """
+    bias, tip = reading.last_V, reading.last_K
+    limit, end = branch.equations.laws.limit
+    side = branch if bias >= 0 else branch.mirrored
+    at_end = f"at a bias of {bias:.4f} V, where the tip is at {tip:.1f} K"
+    if branch.equations.space.is_reduced:
+        text = f"the reduced lever ends {at_end}: beyond it the full lever has to be solved"
+    elif not side.melts:
+        text = (
+            f"the branch was solved up to a state {at_end}; how far the lever itself goes is "
+            "not known from it"
+        )
+    elif abs(reading.last_u) == side.end_u:
+        text = f"{end} {at_end}"
+    else:
+        at = branch.point(reading.last_u)
+        text = (
+            f"the branch of a slow bias ramp ends at a bias of {bias:.4f} V (lever "
+            f"{at.lever_V:.4f} V, current {at.current_mA:.4f} mA, tip {tip:.1f} K): beyond it "
+            f"there is no steady state below {limit:.0f} K"
+        )
+    return BranchEndError(text, bias_reached=bias)

@@ -14,7 +14,7 @@ from hotlever.contact.law import INTERFACE, ContactLaw
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.lever.lever import Lever, State
-from hotlever.lever.sensitivities import sensitivities_of
+from hotlever.lever.observables import sensitivities_of
 from hotlever.lever.transient import Waveform, simulate
 from hotlever.probe import Probe
 from hotlever.probe.contact import OUT_OF_CONTACT

@@ -194,33 +194,30 @@ class FullSpace(Space):
 
     # --- the air ----------------------------------------------------------------------------------
 
-    def in_vacuum(self) -> FullSpace:
-        """Return the same space in vacuum; everything is shared."""
+    def with_air(self, air: AirLoss) -> FullSpace:
+        """Return the same space with another loss to the air; everything else is shared."""
         space = copy(self)
-        space.air = AirLoss.nothing(self.size + 1)
+        space.air = air
         return space
 
+    def in_vacuum(self) -> FullSpace:
+        """Return the same space in vacuum."""
+        return self.with_air(AirLoss.nothing(self.size + 1))
+
     def in_air(self, air: AirOperator, around: Callable[[float], HeatInAir]) -> FullSpace:
-        """Return the same space with this air around it; everything is shared.
+        """Return the same space with this air around it.
 
         What the air takes up in time is made once it is asked for.
         """
         element, shares, _ = self.elements.at_points(air.sites)
         losses = self._jacobian.of_losses(element, shares)
         unknowns = self._T[self.elements.dofs[element]]
-        space = copy(self)
-        space.air = AirLoss(air, unknowns, shares, losses, self.size + 1)
-        space.air.around = around
-        return space
-
-    def in_gas(self, conductivity: float) -> FullSpace:
-        """Return the same space in a gas that conducts so many times as well as air."""
-        space = copy(self)
-        space.air = self.air.in_gas(conductivity)
-        return space
+        loss = AirLoss(air, unknowns, shares, losses, self.size + 1)
+        loss.around = around
+        return self.with_air(loss)
 
     def in_air_at_nodes(self, air: Any, surface: Index) -> FullSpace:
-        """Return the same space in air whose sites are these nodes; everything is shared.
+        """Return the same space in air whose sites are these nodes.
 
         The air is what has the attributes of an `AirOperator`.
         """
@@ -229,10 +226,8 @@ class FullSpace(Space):
         nodes = self.elements.dofs.shape[1]
         element, node = np.divmod(first[surface], nodes)
         losses = self._jacobian.of_losses(element, np.eye(nodes)[node])
-        space = copy(self)
         shares = np.ones((surface.size, 1))
-        space.air = AirLoss(air, self._T[surface, None], shares, losses, self.size + 1)
-        return space
+        return self.with_air(AirLoss(air, self._T[surface, None], shares, losses, self.size + 1))
 
     def factorised(
         self, tangent: Tangent, surface: SurfaceTangent, constraint: Constraint, conductance: Array
@@ -397,7 +392,7 @@ def numbered(
     size : int
         How many there are, without the lever voltage.
     """
-    order = _fill_reducing_order(elements.dofs, elements.size)
+    order = elements.fill_reducing_order()
     free = np.zeros((2, elements.size), dtype=bool)
     free[0], free[1, conducts] = True, True
     free[0, ends] = free[1, contact_nodes[wiring.swept]] = False
@@ -416,17 +411,3 @@ def numbered(
     for name in wiring.held:
         V[contact_nodes[name]] = V[contact_nodes[name][0]]
     return T, V, size
-
-
-def _fill_reducing_order(dofs: Index, size: int) -> Index:
-    """Order nodes for little fill: SuperLU's minimum degree ordering of the nodes' pattern.
-
-    It is found once, so that each factorisation can take the natural order.
-    """
-    nodes = dofs.shape[1]
-    rows = np.repeat(dofs, nodes, axis=1).ravel()
-    columns = np.tile(dofs, (1, nodes)).ravel()
-    pattern = csc_matrix((np.ones(rows.size), (rows, columns)), shape=(size, size))
-    pattern.data[:] = 1.0
-    pattern.setdiag(size)
-    return np.argsort(splu(pattern, permc_spec="MMD_AT_PLUS_A").perm_c)

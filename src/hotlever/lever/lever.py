@@ -14,17 +14,16 @@ from numpy.typing import ArrayLike
 
 from hotlever.air.panels import PanelOptions
 from hotlever.errors import ComputationError, InputError, as_far_as_possible
-from hotlever.lever.branch import TIP_RISE, Branch, Reach
+from hotlever.lever.branch import TIP_RISE, Branch, Reach, branch_end
 from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.dataset import at_bias, checked_bias, dataset_of_branch, dataset_of_states
+from hotlever.lever.discretisation import chosen_space, flat_space, surrounded
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.meshing import chosen_space, flat_space
+from hotlever.lever.observables import sensitivities_of
 from hotlever.lever.parametrisation import state_at_bias
-from hotlever.lever.ramp import Reading
-from hotlever.lever.sensitivities import sensitivities_of
+from hotlever.lever.readings import Reading
 from hotlever.lever.space import TIP, Constraint
-from hotlever.lever.surroundings import surrounded
 from hotlever.materials import Material
 from hotlever.probe import Circuit, MeshOptions, Probe
 from hotlever.probe.parameters import usual_parameters
@@ -52,7 +51,7 @@ class Lever:
         A probe, or the name of a probe file.
     mesh : MeshOptions, optional
         Taken as they are; by default the usual mesh is refined where it is not fine enough, see
-        `hotlever.lever.meshing`.
+        `hotlever.lever.discretisation`.
     space : FullSpace, optional
         Mesh and operators of another lever of the same shape.
     progress : callable, optional
@@ -224,7 +223,7 @@ class Lever:
         branch, failure = as_far_as_possible(lambda: self.branch_to(above, progress, below))
         reading = branch.read(self.circuit, bias)
         missing = np.isnan(reading.u).any()
-        return branch, reading, (failure or branch.ended(reading)) if missing else None
+        return branch, reading, (failure or branch_end(branch, reading)) if missing else None
 
     @one_blas_thread
     def polished(self, guess: Array, bias: float, constraint: Constraint = TIP) -> State:

@@ -1,5 +1,7 @@
 """What instruments and a thermometer show of a lever in its circuit: the observables.
 
+And their derivatives by material parameters and dimensions, exact, at any bias.
+
 A lever by itself shows V_l, I_h, V_r and the rise of its tip. Each observable follows from these
 and from the circuit; all that compares a lever with a measurement has them from here.
 """
@@ -7,14 +9,23 @@ and from the circuit; all that compares a lever with a measurement has them from
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from hotlever.lever.branch import TIP_RISE, Branch
+from hotlever.lever.continuation import Enough, continued
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.space import TIP, Constraint, Factors
 from hotlever.measurands import OBSERVABLES
+from hotlever.piecewise import spline_through
+from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
 _BRIDGE = OBSERVABLES["bridge"].name
+#: States whose Jacobians are factorised at once.
+_AT_ONCE = 20
 
 
 def observed(circuit: Circuit, shown: Array) -> Array:
@@ -88,7 +99,7 @@ def at_fixed_bias(
     circuit : Circuit
     shown : ndarray, shape (n, 4, p)
         Derivatives of V_l, I_h, V_r and the rise of the tip, see
-        `hotlever.lever.sensitivities.by_parameter`.
+        `by_parameter`.
     of_circuit : ndarray, shape (n, p)
         Derivatives of the bias for a given state, see `hotlever.probe.supply.SweptSupply.bias_by`.
 
@@ -100,3 +111,158 @@ def at_fixed_bias(
     missing = circuit.bias(shown[:, 0], shown[:, 1]) + of_circuit
     moved = -missing / circuit.bias(along[:, 0], along[:, 1])[:, None]
     return np.moveaxis(shown + along[:, :, None] * moved[:, None], 1, 0)
+
+
+# --- derivatives by parameters --------------------------------------------------------------------
+
+
+def by_parameter(
+    equations: LeverEquations,
+    x: Array,
+    names: Sequence[str],
+    factors: Factors | None = None,
+    constraint: Constraint = TIP,
+) -> Array:
+    """Return how V_l, I_h, V_r and the rise of the tip change with parameters, (n, 4, k).
+
+    The constraint is fixed; if it is the rise of the tip, that does not change. Beside those of the
+    material the parameters may be dimensions whose motions the equations know. The states have
+    power; factors are those of these very states. Adjoint: one solve for each quantity that changes
+    and each state, however many parameters there are.
+    """
+    factors = factors or equations.factorised(x, constraint)
+    direct, of_tip = equations.by_parameter(x, names), equations.tip_by_parameter(x, names)
+    missing = -direct
+    missing[-1] = -np.reshape(constraint.tip, (-1, 1)) * of_tip
+    gradient, moves = equations.observed_gradient(x), constraint is not TIP
+    if moves:
+        unknowns, weights = equations.space.tip
+        tip = np.zeros((*x.shape, 1))
+        tip[unknowns, :, 0] = weights[:, None]
+        gradient = np.concatenate([gradient, tip], axis=-1)
+    adjoint = factors.solve(gradient, np.arange(x.shape[1]), transposed=True)
+    shown = np.zeros((x.shape[1], TIP_RISE + 1, len(names)))
+    shown[:, : gradient.shape[-1]] = np.einsum("sno,snk->nok", adjoint, missing)
+    shown[:, 1] += direct[-1]
+    shown[:, TIP_RISE] += moves * of_tip
+    if equations.space.reader is None:
+        shown[:, 2] = np.nan
+    return shown
+
+
+def with_changes(
+    equations: LeverEquations, x: Array, names: Sequence[str], factors: Factors
+) -> tuple[Array, Array]:
+    """Return how the states themselves change, (size + 1, n, k), and what `by_parameter` does.
+
+    The factors may be those of states nearby.
+    """
+    direct = equations.by_parameter(x, names)
+    right_hand_side = -direct
+    right_hand_side[-1] = -equations.tip_by_parameter(x, names)
+    changes = equations.solve_linear(x, factors, right_hand_side)
+    shown = np.zeros((TIP_RISE + 1, *changes.shape[1:]))
+    shown[:TIP_RISE] = equations.observed_change(x, changes)
+    shown[1] += direct[-1]
+    return changes, shown.swapaxes(0, 1)
+
+
+def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence[str]) -> Array:
+    """Return derivatives of the observables by parameters of the lever, at fixed bias.
+
+    They are at any u of a branch, (observables, n, p); see `observed`.
+    """
+    shown = np.zeros((u.size, TIP_RISE + 1, len(names)))
+    # without power nothing depends on the material
+    powered = np.flatnonzero(branch.has_power(u))
+    for start in range(0, powered.size, _AT_ONCE):
+        some = powered[start : start + _AT_ONCE]
+        constraint = branch.parametrisation.constraint(u[some])
+        x = branch.states(u[some])
+        shown[some] = by_parameter(branch.equations, x, names, constraint=constraint)
+    slopes = at_fixed_bias(branch.curve(u, 1), circuit, shown)
+    return observed_by(circuit, branch.curve(u).T, slopes, names)
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """A branch, and how it changes with some parameters at fixed places of it.
+
+    Places are rises of the tip, or other constraints; see
+    `hotlever.lever.parametrisation`.
+
+    Attributes
+    ----------
+    probe : Probe
+        Whose branch it is.
+    names : tuple of str
+        The parameters, by their names in a probe file.
+    branch : Branch
+    factors : Factors or None
+        Of all its states that were solved; None if they were not kept.
+    changes : ndarray, shape (size + 1, k, p)
+        Derivatives of the states by the parameters; empty if they were not asked for.
+    shown : ndarray, shape (k, 4, p)
+        Derivatives of V_l, I_h, V_r and the rise of the tip.
+    """
+
+    probe: Probe
+    names: tuple[str, ...]
+    branch: Branch
+    factors: Factors | None
+    changes: Array
+    shown: Array
+
+    @classmethod
+    def of(
+        cls,
+        probe: Probe,
+        names: tuple[str, ...],
+        branch: Branch,
+        enough: Enough,
+        derivatives: LeverEquations | None = None,
+        factors: Factors | None = None,
+    ) -> Linearised:
+        """Follow a branch until it goes far enough (see `continued`), and differentiate it.
+
+        With equations for the derivatives, which may differ a little and cost less, the states are
+        differentiated as well; the factors may then be those of states nearby.
+        """
+        longer = continued(branch.equations, enough, branch)
+        x, changes = longer.x[:, longer.solved], np.empty(0)
+        if derivatives is None:
+            constraint = longer.parametrisation.constraint(longer.u[longer.solved])
+            factors = longer.equations.factorised(x, constraint)
+            shown = by_parameter(longer.equations, x, names, factors, constraint)
+        else:
+            if factors is None or longer is not branch:
+                factors = derivatives.factorised(x)
+            changes, shown = with_changes(derivatives, x, names, factors)
+        if longer.starts_cold:
+            # without power nothing depends on the parameters
+            cold = int(np.searchsorted(longer.u, 0.0))
+            shown = np.insert(shown, cold, 0.0, axis=0)
+            changes = np.insert(changes, cold, 0.0, axis=1) if changes.size else changes
+        return cls(probe, names, longer, factors, changes, shown)
+
+    def states(self, probe: Probe) -> Array:
+        """Return the states of a similar probe, (size + 1, k), to first order or roughly.
+
+        Roughly: with the same temperatures, and potentials in proportion to the lever voltage; the
+        same states if there are other supplies.
+        """
+        moved, x = probe.values(self.names) - self.probe.values(self.names), self.branch.x
+        if self.changes.size:
+            return np.asarray(x + self.changes @ moved)
+        if not self.branch.starts_cold:
+            return x
+        factor, solved = np.ones(x.shape[1]), self.branch.solved
+        factor[solved] += self.shown[solved, 0] @ moved / x[-1, solved]
+        return np.where(self.branch.equations.space.is_temperature[:, None], x, factor * x)
+
+    def shown_at(self, u: Array) -> Array:
+        """Return the derivatives of ``shown`` at any u, (n, 4, p).
+
+        Between the states they are within some 1e-3 of the largest.
+        """
+        return np.asarray(spline_through(self.branch.u, self.shown, 5)(u))

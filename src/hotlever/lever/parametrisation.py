@@ -9,8 +9,6 @@ of a similar lever, so that the states of both can be compared.
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from hotlever.errors import NewtonError
@@ -30,47 +28,32 @@ def in_plane(space: Space, x: Array) -> Array:
     return np.stack([space.tip_rise(x) / UNIT_K, x[-1] / UNIT_V], axis=-1)
 
 
-class Parametrisation(Protocol):
-    """The constraints of the points u (n,) of a branch."""
+class Parametrisation:
+    """The constraints of the points u (n,) of a branch.
 
-    def constraint(self, u: Array) -> Constraint:
-        """Return the constraint of each place."""
-        ...
-
-    def values(self, u: Array) -> Array:
-        """Return the value that the constraint has there, (n,)."""
-        ...
-
-    def rate(self, u: Array, space: Space, x: Array) -> Array:
-        """Return how fast the values pass states (size + 1, n), by u, (n,)."""
-        ...
-
-
-class Natural:
-    """The points of a lever that starts cold: u = √(T_tip − T_base), negative with the bias.
-
+    They are those of a lever that starts cold: u = √(T_tip − T_base), negative with the bias.
     With thermoelectricity the temperature begins in proportion to the bias, not to its square: the
     points between the cold state and the next are those of the smooth curve through both.
     """
 
     def constraint(self, u: Array) -> Constraint:
-        """See `Parametrisation`."""
+        """Return the constraint of each place."""
         return TIP
 
     def values(self, u: Array) -> Array:
-        """See `Parametrisation`."""
+        """Return the value that the constraint has there, (n,)."""
         return np.asarray(u**2)
 
     def rate(self, u: Array, space: Space, x: Array) -> Array:
-        """See `Parametrisation`."""
+        """Return how fast the values pass states (size + 1, n), by u, (n,)."""
         return np.asarray(2.0 * u)
 
 
 #: It has no state of its own.
-NATURAL = Natural()
+NATURAL = Parametrisation()
 
 
-class PseudoArclength:
+class PseudoArclength(Parametrisation):
     """Lines across a curve in the plane of tip and lever voltage.
 
     Parameters

@@ -18,8 +18,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.lever.dataset import checked_bias, probe_attributes
 from hotlever.lever.laws import GAP
 from hotlever.lever.lever import Lever
-from hotlever.lever.noise import SOURCES, NoiseOptions, spectral_densities
-from hotlever.lever.response import Response
+from hotlever.lever.noise import SOURCES, NoiseOptions, Response, spectral_densities
 from hotlever.probe import Probe
 from hotlever.steps import each
 from hotlever.types import Array, Progress

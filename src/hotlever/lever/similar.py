@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import replace
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -17,8 +16,8 @@ from hotlever.lever.films import PlacedFilm, thickness_at
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
 from hotlever.lever.newton import NewtonOptions
+from hotlever.lever.observables import Linearised
 from hotlever.lever.parametrisation import solve_at
-from hotlever.lever.sensitivities import Linearised
 from hotlever.lever.transport import Motion
 from hotlever.probe import Probe
 from hotlever.probe.layout import BorderTaper, Layout, Taper
@@ -29,42 +28,6 @@ from hotlever.types import Array, Index
 
 #: A small change of a dimension (µm), by which the thickness of a cone is differenced.
 _SMALL_UM = 1e-4
-
-
-class BranchSolver(Protocol):
-    """Solves the branch of any similar probe: a lever as it is, on a coarse mesh, or reduced."""
-
-    @property
-    def drawn(self) -> Probe:
-        """The probe whose drawing has the mesh."""
-        ...
-
-    def linearised(
-        self,
-        probe: Probe,
-        reach: Reach,
-        near: Linearised | None = None,
-        names: tuple[str, ...] | None = None,
-    ) -> Linearised:
-        """Solve the branch of a probe, with its derivatives; see `SimilarLevers.linearised`."""
-        ...
-
-    def for_any_parameters(self) -> BranchSolver:
-        """Return what solves levers far away too, for which this may not be made."""
-        ...
-
-    def full_states(
-        self, branch: Branch, equations: LeverEquations, reach: Reach
-    ) -> tuple[Array, Array]:
-        """Return u of states of a branch of this lever, (k,), and those of another's equations.
-
-        These, (size + 1, k), are as many as it takes to see by how much the branches differ.
-        """
-        ...
-
-    def tip_error_K(self, probe: Probe, branch: Branch) -> float:
-        """Return by how much tips on a branch of it may be off its equations' at a fixed bias."""
-        ...
 
 
 class SimilarLevers:
@@ -102,18 +65,24 @@ class SimilarLevers:
         return LeverEquations.of_probe(space, probe, motions=motions)
 
     def for_any_parameters(self) -> Self:
-        """See `BranchSolver`."""
+        """Return what solves levers far away too, for which this may not be made."""
         return self
 
     def full_states(
         self, branch: Branch, equations: LeverEquations, reach: Reach
     ) -> tuple[Array, Array]:
-        """See `BranchSolver`."""
+        """Return u of states of a branch of this lever, (k,), and those of another's equations.
+
+        These, (size + 1, k), are as many as it takes to see by how much the branches differ.
+        """
         other = at_points_of(branch, continued(equations, reach))
         return other.u[other.solved], other.x[:, other.solved]
 
     def tip_error_K(self, probe: Probe, branch: Branch) -> float:
-        """See `BranchSolver`: its states are solved."""
+        """Return by how much tips on a branch of it may be off its equations' at a fixed bias.
+
+        Its states are solved.
+        """
         return 0.0
 
     def _space(self, probe: Probe) -> FullSpace:
@@ -121,10 +90,8 @@ class SimilarLevers:
         space = self._lever.space
         if (probe.shape, probe.tip) != (self.drawn.shape, self.drawn.tip):
             space = FullSpace(self._moving.mesh_of(probe), wiring=space.wiring)
-        space = copy(space)
         # air takes up from a place nearly what it took before the place moved a little
-        space.air = self._air(probe)
-        return space
+        return space.with_air(self._air(probe))
 
     def _air(self, probe: Probe) -> AirLoss:
         """Return the air around a similar probe."""

@@ -15,9 +15,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.lever.curve import smooth_curve
 from hotlever.lever.equations import SHOWN, LeverEquations, steps_of
-from hotlever.piecewise import Piecewise
+from hotlever.piecewise import Piecewise, smooth_curve
 from hotlever.types import Array, Index
 
 #: Places along a branch that are looked at together.

@@ -20,7 +20,7 @@ from hotlever.lever.dataset import at_bias, checked_bias
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever, State
-from hotlever.lever.ramp import Reading
+from hotlever.lever.readings import Reading
 from hotlever.lever3d.still_air import OpenAir, ngsolve
 from hotlever.probe import Layout, Probe, Wiring
 from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid, middle_and_reach
@@ -115,7 +115,7 @@ class SolidLever(Lever):
 
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
         """Return the space in the probe's gas: in free space the air is the same at any base."""
-        return space.in_gas(self.probe.surroundings.gas_conductivity)
+        return space.with_air(space.air.in_gas(self.probe.surroundings.gas_conductivity))
 
     def with_probe(self, probe: Probe) -> Lever:
         """Return the lever of a probe of the same shape and tip; another medium is meshed anew."""

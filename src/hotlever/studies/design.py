@@ -154,7 +154,7 @@ def quantities(probe: Probe, power_mW: float, air: bool = True) -> dict[str, flo
     """
     lever = Lever(probe.in_medium("vacuum"), DESIGN_MESH)
     vacuum = lever.branch_past_knee()
-    if vacuum.highest_power_mW < power_mW:
+    if vacuum.by_power.highest_mW < power_mW:
         vacuum = lever.branch()
     silicon, knee = probe.heater_silicon, vacuum.knee
     cold = vacuum.point(_COLD_U)

@@ -213,7 +213,7 @@ def _row(case: Case) -> dict[str, float]:
     silicon = case.probe.heater_silicon
     c_kappa = 1.0 if silicon is None else silicon.c_kappa
     conducted = thermal_conductivity(np.array([knee, (knee + end) / 2, end]), c_kappa)[0]
-    slopes = branch.tip_slope(branch.power(ends))
+    slopes = branch.by_power.slope(branch.power(ends))
     parts = dataset_of_branch(case.probe, branch, branch.u_at(ends))
     shares = (parts.heater_ohm / (parts.heater_ohm + parts.legs_ohm)).values
     thickness = PER_CM_TO_MILLI_PER_UM * conducted[1] * case.probe.layout().thickness_um

@@ -1,7 +1,7 @@
 """What a lever shows at a working point and at its knee, with derivatives by its design.
 
 A quantity of a state follows from V_l, I_h and T_tip. At a fixed rise of the tip their derivatives
-by a dimension or a material parameter are exact (`hotlever.lever.sensitivities`); the state of a
+by a dimension or a material parameter are exact (`hotlever.lever.observables`); the state of a
 working point, or of the knee, then moves along the branch until it is one again:
 dq = ∂q + q' du with g' du = −∂g, where g = 0 says which state it is. How sensitively a lever reads
 its distance to a surface depends on the air, which moves with every dimension, so that it is
@@ -21,9 +21,9 @@ from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.continuation import continued
 from hotlever.lever.lever import COARSE, Lever, State
 from hotlever.lever.newton import NewtonOptions
+from hotlever.lever.observables import by_parameter
 from hotlever.lever.parametrisation import solve_at
 from hotlever.lever.reader import Reader, Signal
-from hotlever.lever.sensitivities import by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.probe import Circuit, Probe

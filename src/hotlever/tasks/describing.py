@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hotlever.errors import unknown_name
-from hotlever.lever.meshing import chosen_space
+from hotlever.lever.discretisation import chosen_space
 from hotlever.materials.catalogue import curves, listing
 from hotlever.probe import Probe
 from hotlever.probe.drawing.outlines import DrawingError

@@ -236,7 +236,7 @@ class DriveRequest:
     def read_waveform(self) -> Waveform | None:
         """Return the one wave form that is asked for; None if none is."""
         from hotlever.lever.transient import read_waveform
-        from hotlever.lever.transient.waveform_texts import waveform_from_text
+        from hotlever.lever.transient.waveform import waveform_from_text
 
         names = [name for name in self._kinds if name in self.drive]
         if len(names) > 1:

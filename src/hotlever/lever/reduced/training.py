@@ -11,10 +11,10 @@ import numpy as np
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.lever.equations import SHOWN
 from hotlever.lever.lever import Lever
+from hotlever.lever.observables import Linearised
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.response_surface import C_KAPPA, ParameterDomain, ResponseSurface
 from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
-from hotlever.lever.sensitivities import Linearised
 from hotlever.materials import full_name
 from hotlever.probe import Probe
 from hotlever.probe.parameters import of_materials

@@ -35,40 +35,13 @@ _MOMENT = 1e-4
 _SHORTEST = 1e-12
 
 
-@dataclass(frozen=True)
-class StepController:
-    """How long the next step is, by the error of the last one.
-
-    Attributes
-    ----------
-    safety : float
-        A step is made so much shorter than its error asks for.
-    least, most : float
-        By these factors a step changes at least and at most.
-    failed : float
-        By this one where Newton's method fails.
-    power : float
-        A step changes with this power of its error, which is of order four.
-    first : float
-        The first step changes so many tolerances, were it explicit.
-    """
-
-    safety: float = 0.9
-    least: float = 0.2
-    most: float = 6.0
-    failed: float = 0.25
-    power: float = 0.22
-    first: float = 40.0
-
-    def change(self, share: float) -> float:
-        """Return by which factor a step changes whose error is a share of the tolerance."""
-        if not np.isfinite(share):
-            return self.failed
-        change = max(self.safety * max(share, 1e-6) ** -self.power, self.least)
-        return min(change, self.most if share <= 1.0 else self.safety)
-
-
-METHOD, CONTROLLER = ARK436L2SA, StepController()
+#: A step is made so much shorter than its error asks for; by these factors it changes at least and
+#: at most, and by that one where Newton's method fails; and with which power of its error, which is
+#: of order four.
+_SAFETY, _LEAST_CHANGE, _MOST_CHANGE, _FAILED, _POWER = 0.9, 0.2, 6.0, 0.25, 0.22
+#: The first step changes so many tolerances, were it explicit.
+_FIRST_STEP = 40.0
+METHOD = ARK436L2SA
 
 
 class LinearSolver(Protocol):
@@ -204,7 +177,7 @@ class Stepper:
         """
         here = self._consistent(start, x)
         speed = max(self._problem.norm(here.slope), 1e-300)
-        self.length = first or CONTROLLER.first * self._tolerance / speed
+        self.length = first or _FIRST_STEP * self._tolerance / speed
         while here.t < end:
             stop = min((time for time in stops if here.t < time < end), default=end)
             then = _next(here.t, min(self.length, longest), stop)
@@ -213,7 +186,7 @@ class Stepper:
                 share = error / self._tolerance
             except NewtonError:
                 share = np.inf
-            self.length = CONTROLLER.change(share) * (then - here.t)
+            self.length = _step_change(share) * (then - here.t)
             if share <= 1.0:
                 yield step
                 self.accepted, here = self.accepted + 1, there
@@ -339,6 +312,14 @@ class _Reached:
     flow: Array
     monitored: Array
     monitored_slopes: Array
+
+
+def _step_change(share: float) -> float:
+    """Return by which factor a step changes whose error is a share of the tolerance."""
+    if not np.isfinite(share):
+        return _FAILED
+    change = max(_SAFETY * max(share, 1e-6) ** -_POWER, _LEAST_CHANGE)
+    return min(change, _MOST_CHANGE if share <= 1.0 else _SAFETY)
 
 
 def _next(t: float, length: float, end: float) -> float:

@@ -102,7 +102,7 @@ def resistance_ratio(probe: Probe, *, power_mW: float, from_mW: float) -> float:
 
 def _reaching(lever: Lever, power_mW: float) -> Branch:
     branch = lever.branch_past_knee()
-    return branch if branch.highest_power_mW >= power_mW else lever.branch()
+    return branch if branch.by_power.highest_mW >= power_mW else lever.branch()
 
 
 def johnson_noise(probe: Probe, *, tip_K: float) -> float:

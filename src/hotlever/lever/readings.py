@@ -1,20 +1,27 @@
-"""The tip temperature of a lever by its power, as far as that is a function.
+"""Readings of a branch: by the power, and by a slow ramp of the bias.
 
 On most levers the power rises with the tip temperature to the end. Where the heat moves towards the
 tip faster than the tip gets hotter, the power turns: the tip gets hotter with less of it, and a
 power belongs to several temperatures.
+
+A slow ramp of the bias takes the first state whose bias V_l + R_s I_h has been reached.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
-from hotlever.lever.curve import crossing, smooth_curve
 from hotlever.lever.solved_states import SolvedStates
-from hotlever.piecewise import Piecewise
+from hotlever.piecewise import Piecewise, crossing, smooth_curve
 from hotlever.types import Array
+
+#: A bias (V) that is none.
+_NO_BIAS = 1e-9
 
 
 class ByPower:
@@ -84,3 +91,76 @@ class ByPower:
         by_u = np.append(np.sqrt(slopes[0, 0] * slopes[0, 1]), slope[1:] / (2.0 * root[1:]))
         bent = root[np.isin(states.u, states.steps)]
         return smooth_curve(root, states.u, 1.0 / by_u, bent)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Where a slow ramp of the bias finds a lever.
+
+    Attributes
+    ----------
+    u : ndarray, shape (n,)
+        Where on the branch each bias asked for is; NaN beyond the last that has a state.
+    jumps : list of tuple of float
+        Bias and tip temperature at each fold that the ramp passes.
+    last_V, last_u, last_K : float
+        The highest bias that has a state on the branch, where that is, and the tip temperature.
+    """
+
+    u: Array
+    jumps: list[tuple[float, float]]
+    last_V: float
+    last_u: float
+    last_K: float
+
+    @property
+    def mirrored(self) -> Reading:
+        """The same of the other polarity."""
+        jumps = [(-fold, tip) for fold, tip in self.jumps]
+        return Reading(-self.u, jumps, -self.last_V, -self.last_u, self.last_K)
+
+    def notes(self, bias: Array) -> list[str]:
+        """Say where a ramp through some biases (V) leaves the branch for a hotter part of it."""
+        return [
+            f"at a bias of {fold:.4f} V the lever jumps from a tip at {tip:.0f} K to a hotter "
+            "branch"
+            for fold, tip in self.jumps
+            if bias.min(initial=0.0) < fold < bias.max(initial=0.0)
+        ]
+
+
+def slow_ramp(
+    curve: Piecewise, turns: Array, end: float, bias: Array, tip_K: Callable[[float], Array]
+) -> Reading:
+    """Find the states that a slow ramp takes from zero upwards.
+
+    Parameters
+    ----------
+    curve : Piecewise
+        The bias (V) by u.
+    turns : ndarray
+        Each u at which the curve is level, rising.
+    end : float
+        Where the branch ends.
+    bias : ndarray, shape (n,)
+        What is looked for, in any order.
+    tip_K : callable
+        The tip temperature by u.
+    """
+    u, start = np.full(bias.shape, np.nan), 0.0
+    if abs(float(curve(start))) >= _NO_BIAS:
+        # a similar lever has no bias elsewhere, near where its branch was followed from
+        roots = curve.roots()
+        start = float(roots[np.argmin(np.abs(roots))]) if roots.size else float(curve.x[0])
+    # what is at no bias is found to rounding errors
+    reading = Reading(u, [], min(0.0, float(curve(start))), start, float(tip_K(start)))
+    for low, high in pairwise([start, *turns[turns > start].tolist(), end]):
+        highest = float(curve(high))
+        if highest <= reading.last_V:
+            continue  # the bias falls here, or has been as high before
+        fell = float(curve(low)) < reading.last_V
+        jumps = [*reading.jumps, (reading.last_V, reading.last_K)] if fell else reading.jumps
+        here = np.flatnonzero(np.isnan(u) & (bias <= highest))
+        u[here] = crossing(curve, low, high, bias[here])
+        reading = Reading(u, jumps, highest, high, float(tip_K(high)))
+    return reading
