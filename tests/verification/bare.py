@@ -13,7 +13,7 @@ from hotlever.lever.continuation import continued
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.parametrisation import state_at_bias
+from hotlever.lever.solved_states import state_at_bias
 from hotlever.materials import HIGH_DOPED, LOW_DOPED, Kind, Material
 from hotlever.probe import Circuit, Layout, ProbeMesh, Region, Taper, Terminal
 from hotlever.probe.layout import Film

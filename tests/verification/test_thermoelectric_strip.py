@@ -14,7 +14,7 @@ from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations, heat_left
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.newton import NewtonOptions, find_roots
-from hotlever.lever.parametrisation import Constrained
+from hotlever.lever.solved_states import Constrained
 from hotlever.lever.space import LEVER
 from hotlever.materials.film_kinds import MetalFilm
 from hotlever.probe import Circuit, Layout, ProbeMesh, Region, Terminal

@@ -306,8 +306,9 @@ class StatesAtPoints:
     def storage_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how `storage` changes with parameters of materials, (size + 1, n, k)."""
         cold = np.full_like(self.space.weights, self.base_temperature_K)
-        by = self.laws.enthalpy_by(self.at(x)[0].T, names) - self.laws.enthalpy_by(cold, names)
-        return self._only_heat(by)
+        _, by = self.laws.enthalpy(self.at(x)[0].T, names)
+        _, by_cold = self.laws.enthalpy(cold, names)
+        return self._only_heat(np.stack([by[name] - by_cold[name] for name in names], axis=-1))
 
     def _only_heat(self, heat: Array) -> Array:
         """Test a heat by area alone."""

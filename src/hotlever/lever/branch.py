@@ -22,9 +22,15 @@ from numpy.typing import ArrayLike
 from hotlever.errors import BranchEndError
 from hotlever.lever.equations import SHOWN, LeverEquations
 from hotlever.lever.newton import NewtonResult
-from hotlever.lever.parametrisation import NATURAL, UNIT_K, UNIT_V, Parametrisation, PseudoArclength
 from hotlever.lever.readings import ByPower, Reading, slow_ramp
-from hotlever.lever.solved_states import SolvedStates
+from hotlever.lever.solved_states import (
+    NATURAL,
+    UNIT_K,
+    UNIT_V,
+    Parametrisation,
+    PseudoArclength,
+    SolvedStates,
+)
 from hotlever.piecewise import Piecewise
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
@@ -116,7 +122,7 @@ class Branch(SolvedStates):
 
     @cached_property
     def path(self) -> Piecewise:
-        """Tip and lever voltage by u, in the units of `hotlever.lever.parametrisation.in_plane`."""
+        """Tip and lever voltage by u, in the units of `hotlever.lever.solved_states.in_plane`."""
         own = self.curve.c[..., [TIP_RISE, 0]] / np.array([UNIT_K, UNIT_V])
         return Piecewise(own, self.curve.x)
 

@@ -20,7 +20,7 @@ from hotlever.errors import ComputationError, NewtonError
 from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.equations import LeverEquations, steps_of
 from hotlever.lever.newton import NewtonOptions
-from hotlever.lever.parametrisation import PseudoArclength, in_plane, solve_at, state_at_bias
+from hotlever.lever.solved_states import PseudoArclength, in_plane, solve_at, state_at_bias
 from hotlever.lever.space import LEVER
 from hotlever.piecewise import hermite_weights
 from hotlever.types import Array

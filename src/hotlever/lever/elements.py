@@ -22,12 +22,6 @@ if TYPE_CHECKING:
     from skfem.element import Element
 
 
-def sums_by_index(index: Index, values: Array, size: int) -> Array:
-    """Return the sums of `values` with equal `index`, shape (size,); the arrays match."""
-    # numpy's stubs overlook that weights make the counts floats
-    return np.bincount(index.ravel(), values.ravel(), minlength=size)  # type: ignore[return-value]
-
-
 #: A point this share of an element's size outside it is taken to lie on its edge.
 _BY_ROUNDING = 1e-3
 #: Steps along an edge at which the highest value between the nodes is looked for: four times as
@@ -163,20 +157,6 @@ class FiniteElements:
         together = np.concatenate(factors).transpose(1, 0, 2).reshape(elements, -1)
         return np.asarray(together @ np.concatenate(tables)).reshape(elements, nodes, nodes)
 
-    def fill_reducing_order(self) -> Index:
-        """Order nodes for little fill: SuperLU's minimum degree ordering of the nodes' pattern.
-
-        It is found once, so that each factorisation can take the natural order.
-        """
-        nodes = self.dofs.shape[1]
-        rows = np.repeat(self.dofs, nodes, axis=1).ravel()
-        columns = np.tile(self.dofs, (1, nodes)).ravel()
-        shape = (self.size, self.size)
-        pattern = csc_matrix((np.ones(rows.size), (rows, columns)), shape=shape)
-        pattern.data[:] = 1.0
-        pattern.setdiag(self.size)
-        return np.argsort(splu(pattern, permc_spec="MMD_AT_PLUS_A").perm_c)
-
     @cached_property
     def _lattice(self) -> Array:
         """The basis functions on a lattice over an element, (nodes, points)."""
@@ -276,6 +256,20 @@ class FiniteElements:
         values = np.stack([value for value, _ in shape], axis=1)
         slopes = np.stack([slope for _, slope in shape], axis=-1)
         return elements, values, np.einsum("nra,rnk->ank", self.inverse[elements], slopes)
+
+
+def fill_reducing_order(elements: FiniteElements) -> Index:
+    """Order nodes for little fill: SuperLU's minimum degree ordering of the nodes' pattern.
+
+    It is found once, so that each factorisation can take the natural order.
+    """
+    nodes, shape = elements.dofs.shape[1], (elements.size, elements.size)
+    rows = np.repeat(elements.dofs, nodes, axis=1).ravel()
+    columns = np.tile(elements.dofs, (1, nodes)).ravel()
+    pattern = csc_matrix((np.ones(rows.size), (rows, columns)), shape=shape)
+    pattern.data[:] = 1.0
+    pattern.setdiag(elements.size)
+    return np.argsort(splu(pattern, permc_spec="MMD_AT_PLUS_A").perm_c)
 
 
 class LinearMap:

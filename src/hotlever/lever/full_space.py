@@ -19,7 +19,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from hotlever.air.coupling import AirLoss
 from hotlever.air.operator import AirOperator
 from hotlever.air.stores import HeatInAir
-from hotlever.lever.elements import FacetPoints, FiniteElements, LinearMap, sums_by_index
+from hotlever.lever.elements import FacetPoints, FiniteElements, LinearMap, fill_reducing_order
 from hotlever.lever.films import Rim, placed_films
 from hotlever.lever.space import Constraint, Space, SurfaceTangent
 from hotlever.lever.transport import Tangent
@@ -87,8 +87,10 @@ class FullSpace(Space):
         self._jacobian = SparseJacobian(self.elements, unknowns, self.size, self.held, self.tip)
         self._losses: dict[str, csr_matrix] = {}
         self.air = AirLoss.nothing(self.size + 1)
-        measurable = "reader" in self.wiring.measurable
-        self.reader = self.potential_at("reader") if measurable else None
+        self.reader = None
+        if "reader" in self.wiring.measurable:
+            nodes = self.contact_nodes["reader"]
+            self.reader = self._V[nodes], np.full(nodes.size, 1.0 / nodes.size)
         sampling, points = self.elements.sampling, self.elements.weights.size
         kinds = 1 + len(self.elements.positions)
         self.temperature = LinearMap(sampling @ self._selection(self._T), kinds)
@@ -110,11 +112,6 @@ class FullSpace(Space):
         self.parts = {part: np.flatnonzero(parts == part) for part in get_args(Part)}
 
     # --- where things are -------------------------------------------------------------------------
-
-    def potential_at(self, name: str) -> tuple[Index, Array]:
-        """Return unknowns and weights that give the mean potential of a terminal."""
-        nodes = self.contact_nodes[name]
-        return self._V[nodes], np.full(nodes.size, 1.0 / nodes.size)
 
     def _selection(self, unknowns: Index) -> csr_matrix:
         """Return the matrix from unknowns to nodal values, those held being zero."""
@@ -315,7 +312,9 @@ class SparseJacobian:
             slope_value=tangent.charge_flux_T, slope_slope=tangent.charge_T
         )
         element[:, nodes:, nodes:] = matrices(slope_slope=tangent.sigma)
-        entries = sums_by_index(self.slots, element, self._entries + 1)[: self._entries]
+        # numpy's stubs overlook that weights make the counts floats
+        sums: Any = np.bincount(self.slots.ravel(), element.ravel(), minlength=self._entries + 1)
+        entries: Array = sums[: self._entries]
         entries[self._held_slots] += conductance
         return entries
 
@@ -392,7 +391,7 @@ def numbered(
     size : int
         How many there are, without the lever voltage.
     """
-    order = elements.fill_reducing_order()
+    order = fill_reducing_order(elements)
     free = np.zeros((2, elements.size), dtype=bool)
     free[0], free[1, conducts] = True, True
     free[0, ends] = free[1, contact_nodes[wiring.swept]] = False

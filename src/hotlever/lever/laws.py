@@ -276,31 +276,22 @@ class LawsAtPoints:
 
         Thickness included, at temperatures (K), (points, n).
         """
-        held, by = self._enthalpy(T)
-        return held - self._cold_heat, by
+        held, by = self.enthalpy(T)
+        return held - self._cold_heat, by["T"]
 
-    def _enthalpy(self, T: Array) -> tuple[Array, Array]:
-        """Return the enthalpy (nJ/µm²) at temperatures (K), (points, n), and its slope by T."""
-        held, by_T = np.zeros(T.shape), np.zeros(T.shape)
-        for film in self.films:
-            points, sheet = film.film.points, PER_CM3_TO_NANO_PER_UM3 * film.film.counted_um
-            enthalpy, by = film.kind.enthalpy(T[points])
+    def enthalpy(self, T: Array, names: Sequence[str] = ("T",)) -> Evaluated:
+        """Return the enthalpy (nJ/µm²) at temperatures (K), (points, n), and its derivatives."""
+        held, by = np.zeros(T.shape), {name: np.zeros(T.shape) for name in names}
+        for laws in self.films:
+            points, sheet = laws.film.points, PER_CM3_TO_NANO_PER_UM3 * laws.film.counted_um
+            enthalpy, by_own = laws.kind.enthalpy(T[points])
             held[points] += sheet * enthalpy
-            by_T[points] += sheet * by["T"]
-        return held, by_T
-
-    def enthalpy_by(self, T: Array, names: Sequence[str]) -> Array:
-        """Return the derivatives of the enthalpy by parameters, (points, n, k)."""
-        changes = np.zeros((*T.shape, len(names)))
-        for film in self.films:
-            points, sheet = film.film.points, PER_CM3_TO_NANO_PER_UM3 * film.film.counted_um
-            _, by = film.kind.enthalpy(T[points])
-            for number, name in enumerate(names):
-                if film.own.get(name) in by:
-                    changes[points, :, number] += sheet * by[film.own[name]]
-        return changes
+            for name, change in by.items():
+                if laws.own.get(name) in by_own:
+                    change[points] += sheet * by_own[laws.own[name]]
+        return held, by
 
     @cached_property
     def _cold_heat(self) -> Array:
         """The enthalpy at the base temperature (nJ/µm²), (points, 1)."""
-        return self._enthalpy(np.full_like(self.space.weights, self.base_temperature_K))[0]
+        return self.enthalpy(np.full_like(self.space.weights, self.base_temperature_K))[0]

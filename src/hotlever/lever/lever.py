@@ -21,8 +21,8 @@ from hotlever.lever.discretisation import chosen_space, flat_space, surrounded
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.observables import sensitivities_of
-from hotlever.lever.parametrisation import state_at_bias
 from hotlever.lever.readings import Reading
+from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP, Constraint
 from hotlever.materials import Material
 from hotlever.probe import Circuit, MeshOptions, Probe

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
 
-from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.probe import Probe
@@ -47,7 +46,12 @@ class MonitorMap:
 
     def __init__(self, probe: Probe, equations: LeverEquations) -> None:
         space, full = equations.space, equations.space.full
-        every = {f"{name}_V": _of_contact(full, name) for name in _sensed(probe)}
+        every = {}
+        for name in _sensed(probe):
+            nodes = full.contact_nodes[name]
+            row = np.full(nodes.size, 1.0 / nodes.size), nodes, [0, nodes.size]
+            mean = csr_matrix(row, shape=(1, full.elements.size))
+            every[f"{name}_V"] = _Weights(mean, np.ones(1, dtype=bool))
         for name, monitor in probe.monitors.items():
             every |= {f"{name}_{unit}": _weights(full, monitor, unit) for unit in _SHOWN}
         self._sizes = {name: weights.there.size for name, weights in every.items()}
@@ -111,29 +115,19 @@ def _sensed(probe: Probe) -> list[str]:
     return [name for name in probe.wiring.measurable if name != "reader"]
 
 
-def _of_contact(full: FullSpace, name: str) -> _Weights:
-    nodes = full.contact_nodes[name]
-    row = np.full(nodes.size, 1.0 / nodes.size), nodes, [0, nodes.size]
-    return _Weights(csr_matrix(row, shape=(1, full.elements.size)), np.ones(1, dtype=bool))
-
-
 def _weights(full: FullSpace, monitor: Monitor, unit: str) -> _Weights:
     """Return the weights for the temperature or the potential that a monitor shows."""
     elements, layout = full.elements, full.mesh.layout
     counts = full.conducting if unit == "V" else np.ones(full.conducting.shape, dtype=bool)
     if monitor.region is not None:
+        # the mean over some elements
         here = counts & np.isin(full.mesh.region, layout.named(monitor.region))
-        return _mean(elements, here)
+        weights = elements.weights * np.repeat(here, elements.per_element)
+        row = csr_matrix(weights / max(weights.sum(), np.finfo(float).tiny))
+        return _Weights(row @ elements.sampling[: weights.size], np.array([here.any()]))
     there = on_lever(layout, monitor.positions)
     at, element = elements.interpolation(monitor.positions[there])
     # rows without weights where there is no lever
     rows = at.data, at.indices, np.append(0, np.cumsum(there)) * elements.dofs.shape[1]
     there[there] = counts[element]
     return _Weights(csr_matrix(rows, shape=(there.size, elements.size)), there)
-
-
-def _mean(elements: FiniteElements, here: Mask) -> _Weights:
-    """Return the weights for a mean over some elements."""
-    weights = elements.weights * np.repeat(here, elements.per_element)
-    row = csr_matrix(weights / max(weights.sum(), np.finfo(float).tiny))
-    return _Weights(row @ elements.sampling[: weights.size], np.array([here.any()]))

@@ -189,7 +189,7 @@ class Linearised:
     """A branch, and how it changes with some parameters at fixed places of it.
 
     Places are rises of the tip, or other constraints; see
-    `hotlever.lever.parametrisation`.
+    `hotlever.lever.solved_states`.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.dataset import dataset_of_branch, dataset_of_states
 from hotlever.lever.lever import Lever, State
 from hotlever.lever.newton import NewtonOptions
-from hotlever.lever.parametrisation import solve_at
+from hotlever.lever.solved_states import solve_at
 from hotlever.piecewise import Piecewise
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress

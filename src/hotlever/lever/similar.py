@@ -17,7 +17,7 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever
 from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.observables import Linearised
-from hotlever.lever.parametrisation import solve_at
+from hotlever.lever.solved_states import solve_at
 from hotlever.lever.transport import Motion
 from hotlever.probe import Probe
 from hotlever.probe.layout import BorderTaper, Layout, Taper

@@ -32,7 +32,7 @@ from hotlever.lever import Lever, State
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.laws import LawsAtPoints
-from hotlever.lever.parametrisation import state_at_bias
+from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP
 from hotlever.lever.transport import Fluxes, Properties, dot
 from hotlever.materials import HIGH_DOPED, LOW_DOPED

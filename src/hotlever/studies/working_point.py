@@ -22,9 +22,9 @@ from hotlever.lever.continuation import continued
 from hotlever.lever.lever import COARSE, Lever, State
 from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.observables import by_parameter
-from hotlever.lever.parametrisation import solve_at
 from hotlever.lever.reader import Reader, Signal
 from hotlever.lever.similar import SimilarLevers
+from hotlever.lever.solved_states import solve_at
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.probe import Circuit, Probe
 from hotlever.types import Array

@@ -106,7 +106,7 @@ class Controller(Waveform):
         return self.limit_V
 
     @property
-    def usual_end(self) -> float:
+    def usual_end(self) -> float:  # type: ignore[override]
         """Time (µs) for which it is simulated if nobody says."""
         return _SETTLING
 

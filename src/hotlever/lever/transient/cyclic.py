@@ -34,7 +34,8 @@ class Cycle:
     start : State
     history : xarray.Dataset
     states : list of State
-        At the times of the history; the last one is the end of the period.
+        At the times of the history; the last one is the end of the period, at which the next one
+        begins.
     change_K, remaining_K : float
         By how much the temperatures at its end differ from those at its start, and by how much
         those of all later periods do.
@@ -46,32 +47,21 @@ class Cycle:
     change_K: float
     remaining_K: float
 
-    @property
-    def end(self) -> State:
-        """The state at which the next period begins."""
-        return self.states[-1]
+    @classmethod
+    def integrated(
+        cls,
+        lever: Lever,
+        waveform: Waveform,
+        period: float,
+        start: State,
+        at: ArrayLike | None,
+        last_change_K: float,
+        **options: Any,
+    ) -> Cycle:
+        """Integrate a period (µs) from a state, about where the one before ended.
 
-
-class Cycles:
-    """Integrates periods of a lever, each of which begins about where the one before ended.
-
-    Parameters
-    ----------
-    lever : Lever
-    waveform : Waveform
-        One period of it, or more.
-    period : float
-        µs.
-    **options
-        Of `hotlever.lever.transient.history.integrate`.
-    """
-
-    def __init__(self, lever: Lever, waveform: Waveform, period: float, **options: Any) -> None:
-        self._lever, self._waveform, self._period = lever, waveform, period
-        self._options, self._last_change_K = options, 0.0
-
-    def integrate(self, start: State, at: ArrayLike | None = None) -> Cycle:
-        """Integrate the next period from a state.
+        That one changed by `last_change_K`; 0 if there is none. Options are those of
+        `hotlever.lever.transient.history.integrate`.
 
         Raises
         ------
@@ -80,23 +70,20 @@ class Cycles:
         """
         states: list[State] = []
         history = integrate(
-            self._lever,
-            self._waveform,
-            self._period,
+            lever,
+            waveform,
+            period,
             at,
             start=start,
             callback=lambda t, state: states.append(state),
-            **self._options,
+            **options,
         )
-        rises = self._lever.space.rises(states[-1].x - start.x)
-        change, last = float(np.abs(rises).max()), self._last_change_K
-        remaining = change**2 / (last - change) if change < last else np.inf
-        self._last_change_K = change
-        return Cycle(start, history, states, change, remaining)
-
-    def restart(self) -> None:
-        """Forget the last change: the next period begins somewhere else."""
-        self._last_change_K = 0.0
+        rises = lever.space.rises(states[-1].x - start.x)
+        change = float(np.abs(rises).max())
+        remaining = np.inf
+        if change < last_change_K:
+            remaining = change**2 / (last_change_K - change)
+        return cls(start, history, states, change, remaining)
 
 
 def cyclic_steady_state(
@@ -144,16 +131,17 @@ def cyclic_steady_state(
     What is left of the beginning decays with the slowest modes. From a few periods it is
     extrapolated away by reduced rank extrapolation (Sidi, J. Comput. Appl. Math. 36, 305 (1991)).
     """
-    cycles = Cycles(lever, waveform, period, tolerance_K=tolerance_K, **options)
-    starts = [initial_state(lever, waveform) if start is None else start]
+    options["tolerance_K"] = tolerance_K
+    starts, last_K = [initial_state(lever, waveform) if start is None else start], 0.0
     for _ in range(_MOST):
-        cycle = cycles.integrate(starts[-1], at)
+        cycle = Cycle.integrated(lever, waveform, period, starts[-1], at, last_K, **options)
+        last_K = cycle.change_K
         if cycle.change_K < 0.1 * tolerance_K or cycle.remaining_K < 0.3 * tolerance_K:
             return cycle.history, cycle.start
         starts.append(_with_steady_air(cycle, period))
         if len(starts) > _KNOWN:
-            starts = [_extrapolated(starts[-_KNOWN:], lever)]
-            cycles.restart()
+            # the next period begins somewhere else
+            starts, last_K = [_extrapolated(starts[-_KNOWN:], lever)], 0.0
     raise ComputationError(
         f"after {_MOST} periods of {period:g} µs one is still not like the last: the tip's state "
         f"at the beginning changes by {cycle.change_K:.2g} K"
@@ -165,9 +153,10 @@ def _with_steady_air(cycle: Cycle, period: float) -> State:
 
     Air far away takes milliseconds to get warm, but hardly matters to the lever.
     """
-    begin, end = cycle.start.unknowns, cycle.end.unknowns
-    own, air = len(cycle.end.x), cycle.end.lever.equations.heat_in_air
-    return State(cycle.end.lever, end[:own], air.cyclic(begin[own:], end[own:], period))
+    last = cycle.states[-1]
+    begin, end, own = cycle.start.unknowns, last.unknowns, len(last.x)
+    in_air = last.lever.equations.heat_in_air.cyclic(begin[own:], end[own:], period)
+    return State(last.lever, end[:own], in_air)
 
 
 def _extrapolated(starts: list[State], lever: Lever) -> State:

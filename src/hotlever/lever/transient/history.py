@@ -56,44 +56,6 @@ _AIR_NOTE = (
 Callback = Callable[[float, State], None]
 
 
-class _Observer:
-    """Reads off the ends of steps, one after the other, what is `_REPORTED`."""
-
-    def __init__(self, lever: Lever) -> None:
-        self.monitors = MonitorMap(lever.probe, lever.equations)
-        self._space, base = lever.space, lever.equations.base_temperature_K
-        self._zero = np.array([0.0, 0.0, 0.0, base, base])[:, None]
-        self._at_ends: float | None = None
-        self._added = np.zeros((2, 1))
-
-    def read(self, step: Step) -> tuple[Array, Array]:
-        """Return values and slopes (per µs) at both ends of the next step, each (9 + rows, 2).
-
-        Behind what is `_REPORTED` come the rows of the monitors.
-        """
-        shown, flows, held, at_ends = np.split(step.monitored, _PARTS_MONITORED)
-        moving, _, held_by, at_ends_by = np.split(step.monitored_slopes, _PARTS_MONITORED)
-        if self._at_ends is None:
-            self._at_ends = float(at_ends[0, 0])
-        added = self._added + np.outer(step.added[_FLOWS], [0.0, 1.0])
-        self._added = added[:, 1:]
-        # what is held at the leg ends leaves without a flux at rest
-        left, left_by = added[1:] - (at_ends - self._at_ends), flows[1:] - at_ends_by
-        own = self._space.size + 1
-        x, slopes = step.x[:own], step.slopes[:own]
-        highest, highest_by = self._highest(x, slopes)
-        values = np.concatenate([shown, highest, added[:1], held, left, self.monitors.values(x)])
-        values[: len(self._zero)] += self._zero
-        by_time = [moving, highest_by, flows[:1], held_by, left_by, self.monitors.changes(slopes)]
-        return values, np.concatenate(by_time)
-
-    def _highest(self, x: Array, slopes: Array) -> tuple[Array, Array]:
-        """Return the highest rise (K) at both ends, and its slopes, each (1, 2)."""
-        ends, rises, slopes = np.arange(2), self._space.rises(x), self._space.rises(slopes)
-        hottest = rises.argmax(axis=0)
-        return rises[None, hottest, ends], slopes[None, hottest, ends]
-
-
 def time_steps(
     lever: Lever,
     waveform: Waveform,
@@ -228,14 +190,18 @@ class _Recorder:
         self, lever: Lever, asked: Array | None, per_step: int, callback: Callback | None
     ) -> None:
         self._lever, self._asked, self._per_step, self._callback = lever, asked, per_step, callback
-        self.observer = _Observer(lever)
+        self.monitors = MonitorMap(lever.probe, lever.equations)
+        base = lever.equations.base_temperature_K
+        self._zero = np.array([0.0, 0.0, 0.0, base, base])[:, None]
+        self._at_ends: float | None = None
+        self._added = np.zeros((2, 1))
         self.time: list[float] = []
         self.bias: list[float] = []
         self.values: list[Array] = []
 
     def add(self, piece: Piece, step: Step) -> float | None:
         """Add the rows of a step; return when silicon melts, if it does."""
-        values, slopes = self.observer.read(step)
+        values, slopes = self._read(step)
         if not self.time and (self._asked is None or self._asked[0] == 0.0):
             self._add(piece, step, values, slopes, 0.0)
         melts = _melts(step, values, slopes, self._lever.equations.laws.limit[0])
@@ -257,6 +223,29 @@ class _Recorder:
             both = own + self._lever.equations.heat_in_air.size
             x, in_air, _ = np.split(step.between(t), [own, both])
             self._callback(t, State(self._lever, x, in_air))
+
+    def _read(self, step: Step) -> tuple[Array, Array]:
+        """Return values and slopes (per µs) at both ends of the next step, each (9 + rows, 2).
+
+        Behind what is `_REPORTED` come the rows of the monitors.
+        """
+        shown, flows, held, at_ends = np.split(step.monitored, _PARTS_MONITORED)
+        moving, _, held_by, at_ends_by = np.split(step.monitored_slopes, _PARTS_MONITORED)
+        if self._at_ends is None:
+            self._at_ends = float(at_ends[0, 0])
+        added = self._added + np.outer(step.added[_FLOWS], [0.0, 1.0])
+        self._added = added[:, 1:]
+        # what is held at the leg ends leaves without a flux at rest
+        left, left_by = added[1:] - (at_ends - self._at_ends), flows[1:] - at_ends_by
+        space = self._lever.space
+        x, slopes = step.x[: space.size + 1], step.slopes[: space.size + 1]
+        ends, rises, rises_by = np.arange(2), space.rises(x), space.rises(slopes)
+        hottest = rises.argmax(axis=0)
+        highest, highest_by = rises[None, hottest, ends], rises_by[None, hottest, ends]
+        values = np.concatenate([shown, highest, added[:1], held, left, self.monitors.values(x)])
+        values[: len(self._zero)] += self._zero
+        by_time = [moving, highest_by, flows[:1], held_by, left_by, self.monitors.changes(slopes)]
+        return values, np.concatenate(by_time)
 
 
 def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | None:
@@ -289,8 +278,8 @@ def checked_times(at: ArrayLike) -> Array:
 
 
 def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Dataset:
-    observer, count = recorder.observer, len(_REPORTED)
-    values = np.array(recorder.values).reshape(len(recorder.time), count + observer.monitors.size)
+    monitors, count = recorder.monitors, len(_REPORTED)
+    values = np.array(recorder.values).reshape(len(recorder.time), count + monitors.size)
     columns = dict(zip(_REPORTED, values[:, :count].T, strict=True))
     for name, of in (("reader_V", "lever_V"), ("lever_V", "lever_V"), ("current_mA", "current_mA")):
         noise = _ROUNDING * np.abs(columns[of]).max()
@@ -301,7 +290,7 @@ def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Datase
     variables |= waveform.shown(lever.circuit, columns, np.array(recorder.bias))
     more = ("max_K", "supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
-    variables |= observer.monitors.columns(values[:, count:])
+    variables |= monitors.columns(values[:, count:])
     return history_dataset(lever, waveform, variables)
 
 

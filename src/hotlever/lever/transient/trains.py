@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError
 from hotlever.lever.lever import State
-from hotlever.lever.transient.cyclic import Cycles
+from hotlever.lever.transient.cyclic import Cycle
 from hotlever.lever.transient.history import (
     ENERGIES,
     Callback,
@@ -212,31 +212,32 @@ class Train:
         if asked is not None:
             ends = period * np.arange(1, self.whole + (1 if self._cut_off else 0))
             self._asked = np.split(asked, np.searchsorted(asked, ends, side="right"))
-        options: Any = {"tolerance_K": tolerance_K, "per_step": per_step}
-        cycles = Cycles(lever, waveform, period, **options)
-        start = initial_state(lever, waveform)
+        over = partial(
+            Cycle.integrated, lever, waveform, tolerance_K=tolerance_K, per_step=per_step
+        )
+        start, last_K = initial_state(lever, waveform), 0.0
         for number in range(self.whole):
             self._starts.append(start)
-            cycle = cycles.integrate(start, self._phases(number, number + 1))
-            self._add(number, cycle.history, cycle.states)
-            start = cycle.end
+            cycle = over(period, start, self._phases(number, number + 1), last_K)
+            self._add(number, cycle)
+            start, last_K = cycle.states[-1], cycle.change_K
             if progress is not None:
                 progress(int(_PARTS * (number + 1) * period / end), _PARTS)
             if cycle.remaining_K < _ALIKE * tolerance_K:
                 self._starts.append(start)
                 self.cyclic_from = number + 1
-                cycle = cycles.integrate(start, self._phases(number + 1, self.whole))
+                cycle = over(period, start, self._phases(number + 1, self.whole), last_K)
                 for copy in range(number + 1, self.whole):
-                    self._add(copy, cycle.history, cycle.states)
+                    self._add(copy, cycle)
                 break
         if self._cut_off:
             # beyond the last pulse the bias stays
             volts = float(waveform.bias(np.array([end]))[0])
             flat = Polyline(waveform.text, (0.0,), (volts,), self._cut_off, volts)
             wave = flat if self.whole == waveform.count else waveform
-            cycles = Cycles(lever, wave, self._cut_off, **options)
-            cycle = cycles.integrate(start, self._phases(self.whole, self.whole + 1))
-            self._add(self.whole, cycle.history, cycle.states)
+            phases = self._phases(self.whole, self.whole + 1)
+            over = partial(Cycle.integrated, lever, wave, **over.keywords)
+            self._add(self.whole, over(self._cut_off, start, phases, 0.0))
         columns = {
             name: np.concatenate([part[name] for part in self._columns])
             for name in self._columns[0]
@@ -262,9 +263,9 @@ class Train:
         phases = [self._within(number, times) for number, times in enumerate(asked, first)]
         return np.unique(np.concatenate([*phases, [self._length(first)]]))
 
-    def _add(self, number: int, history: xr.Dataset, states: list[State]) -> None:
+    def _add(self, number: int, cycle: Cycle) -> None:
         """Add the rows of a period, and its energies to those before."""
-        time = history.time.values
+        history, time = cycle.history, cycle.history.time.values
         if self._asked is None:
             # the first row of a later period is the last one of that before
             rows = np.arange(min(number, 1), time.size)
@@ -278,4 +279,4 @@ class Train:
             columns[name] = before + columns[name]
             self._added[name] = before + float(history[name].values[-1])
         self._columns.append(columns)
-        self.states += [(t, states[row]) for t, row in zip(shown.tolist(), rows, strict=True)]
+        self.states += [(t, cycle.states[row]) for t, row in zip(shown.tolist(), rows, strict=True)]

@@ -11,6 +11,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -67,6 +68,8 @@ class Waveform(ABC):
         What it is, in words.
     before_V : float
         Bias (V) at which the lever rests before it begins.
+    usual_end : float
+        Time (µs) for which it is simulated if nobody says.
     period : float or None
         Of pulses that are repeated (µs),
     count : int
@@ -75,6 +78,7 @@ class Waveform(ABC):
 
     text: str
     before_V: float
+    usual_end: float
     period: float | None = None
     count: int = 1
 
@@ -82,11 +86,6 @@ class Waveform(ABC):
     @abstractmethod
     def highest_V(self) -> float:
         """Largest bias (V) of either sign."""
-
-    @property
-    @abstractmethod
-    def usual_end(self) -> float:
-        """Time (µs) for which it is simulated if nobody says."""
 
     @abstractmethod
     def pieces(self, until: float) -> Iterator[Piece]:
@@ -121,7 +120,7 @@ class Polyline(Waveform):
     text: str
     times: tuple[float, ...]
     volts: tuple[float, ...]
-    end: float
+    usual_end: float
     before_V: float = 0.0
     period: float | None = None
     count: int = 1
@@ -130,11 +129,6 @@ class Polyline(Waveform):
     def highest_V(self) -> float:
         """Largest bias (V) of either sign."""
         return max(map(abs, (self.before_V, *self.volts)))
-
-    @property
-    def usual_end(self) -> float:
-        """Time (µs) for which it is simulated if nobody says."""
-        return self.end
 
     def pieces(self, until: float) -> Iterator[Piece]:
         """Give the smooth parts up to a time (µs); after the last corner the bias stays."""
@@ -145,19 +139,13 @@ class Polyline(Waveform):
             if start >= until:
                 return
             if end > start:
-                line = _Line(start, low, (high - low) / (end - start))
+                line = partial(_on_a_line, start, low, (high - low) / (end - start))
                 yield Piece(start, min(end, until), line, low != last)
                 last = high
 
 
-@dataclass(frozen=True)
-class _Line:
-    start: float
-    volts: float
-    slope: float
-
-    def __call__(self, t: float) -> float:
-        return self.volts + self.slope * (t - self.start)
+def _on_a_line(start: float, volts: float, slope: float, t: float) -> float:
+    return volts + slope * (t - start)
 
 
 @dataclass(frozen=True)
@@ -175,7 +163,7 @@ class Sine(Waveform):
         return abs(self.before_V) + abs(self.amplitude_V)
 
     @property
-    def usual_end(self) -> float:
+    def usual_end(self) -> float:  # type: ignore[override]
         """Ten periods (µs)."""
         return _PERIODS * 1e6 / self.frequency_Hz
 
