@@ -212,9 +212,8 @@ class Train:
         if asked is not None:
             ends = period * np.arange(1, self.whole + (1 if self._cut_off else 0))
             self._asked = np.split(asked, np.searchsorted(asked, ends, side="right"))
-        over = partial(
-            Cycle.integrated, lever, waveform, tolerance_K=tolerance_K, per_step=per_step
-        )
+        options: Any = {"tolerance_K": tolerance_K, "per_step": per_step}
+        over = partial(Cycle.integrated, lever, waveform, **options)
         start, last_K = initial_state(lever, waveform), 0.0
         for number in range(self.whole):
             self._starts.append(start)
@@ -236,8 +235,8 @@ class Train:
             flat = Polyline(waveform.text, (0.0,), (volts,), self._cut_off, volts)
             wave = flat if self.whole == waveform.count else waveform
             phases = self._phases(self.whole, self.whole + 1)
-            over = partial(Cycle.integrated, lever, wave, **over.keywords)
-            self._add(self.whole, over(self._cut_off, start, phases, 0.0))
+            cycle = Cycle.integrated(lever, wave, self._cut_off, start, phases, 0.0, **options)
+            self._add(self.whole, cycle)
         columns = {
             name: np.concatenate([part[name] for part in self._columns])
             for name in self._columns[0]
