@@ -212,12 +212,19 @@ class Train:
         if asked is not None:
             ends = period * np.arange(1, self.whole + (1 if self._cut_off else 0))
             self._asked = np.split(asked, np.searchsorted(asked, ends, side="right"))
-        options: Any = {"tolerance_K": tolerance_K, "per_step": per_step}
-        over = partial(Cycle.integrated, lever, waveform, **options)
         start, last_K = initial_state(lever, waveform), 0.0
+
+        def integrated(wave: Waveform, length: float, first: int, last: int) -> Cycle:
+            """Go on from where the last period ended, over one that stands for some."""
+            return Cycle.integrated(
+                *(lever, wave, length, start, self._phases(first, last), last_K),
+                tolerance_K=tolerance_K,
+                per_step=per_step,
+            )
+
         for number in range(self.whole):
             self._starts.append(start)
-            cycle = over(period, start, self._phases(number, number + 1), last_K)
+            cycle = integrated(waveform, period, number, number + 1)
             self._add(number, cycle)
             start, last_K = cycle.states[-1], cycle.change_K
             if progress is not None:
@@ -225,7 +232,7 @@ class Train:
             if cycle.remaining_K < _ALIKE * tolerance_K:
                 self._starts.append(start)
                 self.cyclic_from = number + 1
-                cycle = over(period, start, self._phases(number + 1, self.whole), last_K)
+                cycle = integrated(waveform, period, number + 1, self.whole)
                 for copy in range(number + 1, self.whole):
                     self._add(copy, cycle)
                 break
@@ -234,9 +241,7 @@ class Train:
             volts = float(waveform.bias(np.array([end]))[0])
             flat = Polyline(waveform.text, (0.0,), (volts,), self._cut_off, volts)
             wave = flat if self.whole == waveform.count else waveform
-            phases = self._phases(self.whole, self.whole + 1)
-            cycle = Cycle.integrated(lever, wave, self._cut_off, start, phases, 0.0, **options)
-            self._add(self.whole, cycle)
+            self._add(self.whole, integrated(wave, self._cut_off, self.whole, self.whole + 1))
         columns = {
             name: np.concatenate([part[name] for part in self._columns])
             for name in self._columns[0]
