@@ -119,11 +119,7 @@ def test_where_nothing_conducts_there_is_no_potential(film_lever):
     assert inside.size > 100
     temperatures = int(space.is_temperature.sum())
     potentials = space.size - temperatures
-    held = np.unique(
-        np.concatenate(
-            [space.elements.facet_nodes(edges) for edges in space.mesh.terminal_facets.values()]
-        )
-    )
+    held = np.unique(np.concatenate(list(space.end_nodes.values())))
     conducts = np.unique(dofs[space.conducting])
     assert temperatures == space.elements.size - held.size
     assert potentials == conducts.size - np.intersect1d(held, conducts).size

@@ -23,12 +23,14 @@ from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.solved_states import PseudoArclength, in_plane, solve_at, state_at_bias
 from hotlever.lever.space import LEVER
 from hotlever.piecewise import hermite_weights
-from hotlever.types import Array
+from hotlever.types import Array, Progress
 
 #: Far below what the curves between the states are off by.
 _OPTIONS = NewtonOptions(tolerance=1e-5)
 #: States that the next one is predicted from, and how many a branch has at most.
 _BEHIND, _MOST = 3, 2000
+#: States that a branch has, more or less, for a progress bar to fill.
+_USUAL_STATES = 20
 #: In the natural parameter: steps in u (K^½) where it is cold, in the tip temperature (K) where it
 #: is hot.
 _STEP_U, _STEP_K = 4.0, 60.0
@@ -52,11 +54,12 @@ def continued(
     equations: LeverEquations,
     enough: Enough,
     start: Branch | None = None,
-    seen: Callable[[Branch], None] = lambda branch: None,
+    progress: Progress | None = None,
 ) -> Branch:
     """Follow a lever until its branch is long enough or something melts, or on from a branch of it.
 
-    A reach may ask for biases of the other polarity too. Each longer branch is shown to `seen`.
+    A reach may ask for biases of the other polarity too. Progress is called with the states done
+    and how many there usually are.
 
     Raises
     ------
@@ -65,7 +68,8 @@ def continued(
     """
 
     def far_enough(branch: Branch) -> bool | np.bool_:
-        seen(branch)
+        if progress is not None:
+            progress(branch.u.size, max(_USUAL_STATES, branch.u.size + 1))
         return enough(branch)
 
     follow = NaturalContinuation if equations.circuit.starts_cold else ArclengthContinuation

@@ -5,6 +5,7 @@ Linear maps lead from the unknowns of a lever to fields at points, and back to t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -15,6 +16,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
 from hotlever.errors import InputError
+from hotlever.probe.circuit import Wiring
 from hotlever.types import Array, Index
 
 if TYPE_CHECKING:
@@ -113,17 +115,13 @@ class FiniteElements:
         # slopes in space are these combinations of those on the reference element
         self.inverse = np.moveaxis(np.asarray(self.basis.mapping.invA), -1, 0)
         self._metric = np.einsum("era,esa->rse", self.inverse, self.inverse)
-        self.sampling = self._sampled()
-
-    def _sampled(self) -> csr_matrix:
-        nodes = self.dofs.shape[1]
         slopes = np.einsum("era,rqn->aeqn", self.inverse, self._shape[1:])
         values = np.broadcast_to(self._shape[0], (1, *slopes.shape[1:]))
         data = np.concatenate([values, slopes])
         columns = np.broadcast_to(self.dofs[:, None], data.shape)
-        rows = data.size // nodes
-        starts = np.arange(0, data.size + 1, nodes)
-        return csr_matrix((data.ravel(), columns.ravel(), starts), shape=(rows, self.size))
+        starts = np.arange(0, data.size + 1, len(nodes))
+        rows = data.ravel(), columns.ravel(), starts
+        self.sampling = csr_matrix(rows, shape=(starts.size - 1, self.size))
 
     def matrices(
         self,
@@ -191,10 +189,6 @@ class FiniteElements:
         corner = self.basis.mesh.p[:, self.basis.mesh.t[0, element]]
         return np.einsum("...ra,a...->r...", self.inverse[element], (point - corner.T).T)
 
-    def facet_nodes(self, facets: Index) -> Index:
-        """Return the numbers of the nodes on some facets of the mesh."""
-        return np.asarray(self.basis.get_dofs(facets).flatten(), dtype=np.intp)
-
     def on_facets(self, facets: Index) -> FacetPoints:
         """Return quadrature points on some facets of the mesh, facet by facet."""
         from skfem import FacetBasis  # see `hotlever.probe.mesh`
@@ -258,7 +252,55 @@ class FiniteElements:
         return elements, values, np.einsum("nra,rnk->ank", self.inverse[elements], slopes)
 
 
-def fill_reducing_order(elements: FiniteElements) -> Index:
+def numbered(
+    elements: FiniteElements,
+    ends: Index,
+    conducts: Index,
+    contact_nodes: Mapping[str, Index],
+    wiring: Wiring,
+) -> tuple[Index, Index, int]:
+    """Give every nodal value its unknown, in an order with little fill.
+
+    Values that are held get -1, the potential of the swept supply the number after all others; a
+    held terminal has that of its first node.
+
+    Parameters
+    ----------
+    elements : FiniteElements
+    ends, conducts : ndarray of int
+        Nodes at leg ends, and where a current may flow.
+    contact_nodes : mapping of str to ndarray of int
+        Those of each terminal that conduct.
+    wiring : Wiring
+
+    Returns
+    -------
+    T, V : ndarray of int, shape (nodes,)
+    size : int
+        How many there are, without the lever voltage.
+    """
+    order = _fill_reducing_order(elements)
+    free = np.zeros((2, elements.size), dtype=bool)
+    free[0], free[1, conducts] = True, True
+    free[0, ends] = free[1, contact_nodes[wiring.swept]] = False
+    for name in wiring.grounds:
+        free[1, contact_nodes[name]] = False
+    for name in wiring.held:
+        free[1, contact_nodes[name][1:]] = False
+    flat = free[:, order].T
+    size = int(flat.sum())
+    ordered = np.full(flat.shape, -1, dtype=np.intp)
+    ordered[flat] = np.arange(size)
+    number = np.full((elements.size, 2), -1, dtype=np.intp)
+    number[order] = ordered
+    T, V = number.T.copy()
+    V[contact_nodes[wiring.swept]] = size
+    for name in wiring.held:
+        V[contact_nodes[name]] = V[contact_nodes[name][0]]
+    return T, V, size
+
+
+def _fill_reducing_order(elements: FiniteElements) -> Index:
     """Order nodes for little fill: SuperLU's minimum degree ordering of the nodes' pattern.
 
     It is found once, so that each factorisation can take the natural order.

@@ -19,7 +19,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from hotlever.air.coupling import AirLoss
 from hotlever.air.operator import AirOperator
 from hotlever.air.stores import HeatInAir
-from hotlever.lever.elements import FacetPoints, FiniteElements, LinearMap, fill_reducing_order
+from hotlever.lever.elements import FacetPoints, FiniteElements, LinearMap, numbered
 from hotlever.lever.films import Rim, placed_films
 from hotlever.lever.space import Constraint, Space, SurfaceTangent
 from hotlever.lever.transport import Tangent
@@ -64,7 +64,8 @@ class FullSpace(Space):
         self.wiring = wiring or Circuit().wiring(mesh.terminal_facets)
         self.elements = elements or FiniteElements(mesh.elements)
         self.end_nodes = {
-            name: self.elements.facet_nodes(facets) for name, facets in mesh.terminal_facets.items()
+            name: np.asarray(self.elements.basis.get_dofs(facets).flatten(), dtype=np.intp)
+            for name, facets in mesh.terminal_facets.items()
         }
         ends = np.unique(np.concatenate(list(self.end_nodes.values())))
         insulates = np.array([region.insulates for region in mesh.layout.regions])
@@ -93,16 +94,15 @@ class FullSpace(Space):
             self.reader = self._V[nodes], np.full(nodes.size, 1.0 / nodes.size)
         sampling, points = self.elements.sampling, self.elements.weights.size
         kinds = 1 + len(self.elements.positions)
-        self.temperature = LinearMap(sampling @ self._selection(self._T), kinds)
-        self.potential = LinearMap(sampling[points:] @ self._selection(self._V), kinds - 1)
+        self.temperature = LinearMap(sampling @ _selection(self._T, self.size), kinds)
+        self.potential = LinearMap(sampling[points:] @ _selection(self._V, self.size), kinds - 1)
         self.weights = self.elements.weights[:, None]
-        self.end_test = self._sampled_sum(ends).reshape(kinds, points)
+        self.end_test = _sampled_sum(self.elements, ends)
         self.end_tests = {
-            name: self._sampled_sum(nodes).reshape(kinds, points)
-            for name, nodes in self.end_nodes.items()
+            name: _sampled_sum(self.elements, nodes) for name, nodes in self.end_nodes.items()
         }
         self.charge_tests = {
-            name: self._sampled_sum(nodes).reshape(kinds, points)[1:]
+            name: _sampled_sum(self.elements, nodes)[1:]
             for name, nodes in self.contact_nodes.items()
         }
         region = np.repeat(mesh.region, self.elements.per_element)
@@ -112,19 +112,6 @@ class FullSpace(Space):
         self.parts = {part: np.flatnonzero(parts == part) for part in get_args(Part)}
 
     # --- where things are -------------------------------------------------------------------------
-
-    def _selection(self, unknowns: Index) -> csr_matrix:
-        """Return the matrix from unknowns to nodal values, those held being zero."""
-        nodes = np.flatnonzero(unknowns >= 0)
-        return csr_matrix(
-            (np.ones(nodes.size), (nodes, unknowns[nodes])), shape=(unknowns.size, self.size + 1)
-        )
-
-    def _sampled_sum(self, nodes: Index) -> Array:
-        """Return values and slopes of the sum of some nodes' functions."""
-        indicator = np.zeros(self.elements.size)
-        indicator[nodes] = 1.0
-        return np.asarray(self.elements.sampling @ indicator)
 
     def nodal(
         self, x: Array, base_temperature_K: float, end_rises: Mapping[str, float] | None = None
@@ -167,12 +154,12 @@ class FullSpace(Space):
 
     def combined(self, rises: csr_matrix, potentials: csr_matrix) -> csr_matrix:
         """Return the map from the unknowns to combinations of what is at the nodes, (k, nodes)."""
-        return rises @ self._selection(self._T) + potentials @ self._selection(self._V)
+        return rises @ _selection(self._T, self.size) + potentials @ _selection(self._V, self.size)
 
     @cached_property
     def rim(self) -> Rim:
         """The surface at which the mesh ends."""
-        return Rim.of(self.mesh, self.elements, self._selection(self._T), self.end_nodes)
+        return Rim.of(self.mesh, self.elements, _selection(self._T, self.size), self.end_nodes)
 
     @cached_property
     def footprint(self) -> Rim:
@@ -180,7 +167,7 @@ class FullSpace(Space):
         layout = self.mesh.layout
         if layout.cone is None:
             return Rim.nothing(self.size)
-        return Rim.under_a_cone(layout, self.elements, self._selection(self._T))
+        return Rim.under_a_cone(layout, self.elements, _selection(self._T, self.size))
 
     def _losses_at(self, name: str) -> csr_matrix:
         """Return the matrix from slopes of what leaves at the rim or footprint to the entries."""
@@ -207,9 +194,7 @@ class FullSpace(Space):
         What the air takes up in time is made once it is asked for.
         """
         element, shares, _ = self.elements.at_points(air.sites)
-        losses = self._jacobian.of_losses(element, shares)
-        unknowns = self._T[self.elements.dofs[element]]
-        loss = AirLoss(air, unknowns, shares, losses, self.size + 1)
+        loss = self._loss_to(air, element, shares)
         loss.around = around
         return self.with_air(loss)
 
@@ -222,9 +207,13 @@ class FullSpace(Space):
         _, first = np.unique(self.elements.dofs, return_index=True)
         nodes = self.elements.dofs.shape[1]
         element, node = np.divmod(first[surface], nodes)
-        losses = self._jacobian.of_losses(element, np.eye(nodes)[node])
-        shares = np.ones((surface.size, 1))
-        return self.with_air(AirLoss(air, self._T[surface, None], shares, losses, self.size + 1))
+        return self.with_air(self._loss_to(air, element, np.eye(nodes)[node]))
+
+    def _loss_to(self, air: Any, element: Index, shares: Array) -> AirLoss:
+        """Return the loss to air at sites in elements, with their basis functions there."""
+        unknowns = self._T[self.elements.dofs[element]]
+        losses = self._jacobian.of_losses(element, shares)
+        return AirLoss(air, unknowns, shares, losses, self.size + 1)
 
     def factorised(
         self, tangent: Tangent, surface: SurfaceTangent, constraint: Constraint, conductance: Array
@@ -240,6 +229,20 @@ class FullSpace(Space):
             factors = self._jacobian.factorised(entries, constraint.among(state))
             solvers.append(self.air.solver(factors, kappa, surface.taken_up))
         return SparseFactors(solvers)
+
+
+def _selection(unknowns: Index, size: int) -> csr_matrix:
+    """Return the matrix from unknowns to nodal values, those held being zero."""
+    nodes = np.flatnonzero(unknowns >= 0)
+    entries = np.ones(nodes.size), (nodes, unknowns[nodes])
+    return csr_matrix(entries, shape=(unknowns.size, size + 1))
+
+
+def _sampled_sum(elements: FiniteElements, nodes: Index) -> Array:
+    """Return values and slopes of the sum of some nodes' functions, (kinds, points)."""
+    indicator = np.zeros(elements.size)
+    indicator[nodes] = 1.0
+    return np.asarray((elements.sampling @ indicator).reshape(-1, elements.weights.size))
 
 
 class SparseJacobian:
@@ -362,51 +365,3 @@ class SparseFactors:
         """Return the same factors, those of some states taken from others, in their order."""
         solvers = dict(enumerate(self._solvers)) | dict(zip(states, other._solvers, strict=True))
         return SparseFactors(list(solvers.values()))
-
-
-def numbered(
-    elements: FiniteElements,
-    ends: Index,
-    conducts: Index,
-    contact_nodes: Mapping[str, Index],
-    wiring: Wiring,
-) -> tuple[Index, Index, int]:
-    """Give every nodal value its unknown, in an order with little fill.
-
-    Values that are held get -1, the potential of the swept supply the number after all others; a
-    held terminal has that of its first node.
-
-    Parameters
-    ----------
-    elements : FiniteElements
-    ends, conducts : ndarray of int
-        Nodes at leg ends, and where a current may flow.
-    contact_nodes : mapping of str to ndarray of int
-        Those of each terminal that conduct.
-    wiring : Wiring
-
-    Returns
-    -------
-    T, V : ndarray of int, shape (nodes,)
-    size : int
-        How many there are, without the lever voltage.
-    """
-    order = fill_reducing_order(elements)
-    free = np.zeros((2, elements.size), dtype=bool)
-    free[0], free[1, conducts] = True, True
-    free[0, ends] = free[1, contact_nodes[wiring.swept]] = False
-    for name in wiring.grounds:
-        free[1, contact_nodes[name]] = False
-    for name in wiring.held:
-        free[1, contact_nodes[name][1:]] = False
-    flat = free[:, order].T
-    size = int(flat.sum())
-    ordered = np.full(flat.shape, -1, dtype=np.intp)
-    ordered[flat] = np.arange(size)
-    number = np.full((elements.size, 2), -1, dtype=np.intp)
-    number[order] = ordered
-    T, V = number.T.copy()
-    V[contact_nodes[wiring.swept]] = size
-    for name in wiring.held:
-        V[contact_nodes[name]] = V[contact_nodes[name][0]]
-    return T, V, size

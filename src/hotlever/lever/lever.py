@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,20 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.air.panels import PanelOptions
-from hotlever.errors import ComputationError, InputError, as_far_as_possible
+from hotlever.errors import ComputationError, as_far_as_possible
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, branch_end
 from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.dataset import at_bias, checked_bias, dataset_of_branch, dataset_of_states
-from hotlever.lever.discretisation import chosen_space, flat_space, surrounded
-from hotlever.lever.equations import LeverEquations
-from hotlever.lever.full_space import FullSpace
+from hotlever.lever.discretisation import MeshedProbe
 from hotlever.lever.observables import sensitivities_of
 from hotlever.lever.readings import Reading
 from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP, Constraint
-from hotlever.materials import Material
-from hotlever.probe import Circuit, MeshOptions, Probe
+from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
@@ -38,11 +32,9 @@ HOTTEST = 1300.0
 #: A coarse mesh, with coarse panels for the air: within 2 K of the default one, at a fifth of its
 #: price. For differences between levers, and for fits, which the default one corrects.
 COARSE = MeshOptions(heater=0.5, corner=0.25, lever=0.2, panels=0.5)
-#: States that a branch has, more or less, for a progress bar to fill.
-_USUAL_STATES = 20
 
 
-class Lever:
+class Lever(MeshedProbe):
     """A probe with its mesh, ready to be solved.
 
     Parameters
@@ -65,73 +57,9 @@ class Lever:
     ([0.949, 0.927], 547)
     """
 
-    @one_blas_thread
-    def __init__(
-        self,
-        probe: Probe | str | os.PathLike[str],
-        mesh: MeshOptions | None = None,
-        *,
-        space: FullSpace | None = None,
-        progress: Progress | None = None,
-    ) -> None:
-        self.probe, self._mesh = Probe.coerce(probe), mesh or MeshOptions()
-        if space is None and mesh is None:
-            space = chosen_space(self.probe)
-        self.space = space or flat_space(self.probe.layout(), self._mesh, self.probe.wiring)
-        if self.space.air.medium != self.medium:
-            self.space = self._surrounded(self.space, progress)
-        self._prepare()
-
     def _prepare(self) -> None:
-        self.equations = LeverEquations.of_probe(self.space, self.probe)
+        super()._prepare()
         self._branch: Branch | None = None
-
-    def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
-        """Return a space in the probe's surroundings."""
-        return surrounded(space, self.probe, self.panels, progress)
-
-    @property
-    def panels(self) -> PanelOptions:
-        """How fine the panels of the surface are, where there is air."""
-        return PanelOptions(refinement=self._mesh.panels)
-
-    @property
-    def circuit(self) -> Circuit:
-        """The measuring circuit."""
-        return self.probe.circuit
-
-    @property
-    def medium(self) -> str:
-        """What is around the lever: vacuum or air."""
-        return self.probe.surroundings.medium
-
-    def __repr__(self) -> str:
-        return (
-            f"<{type(self).__name__}: {self.probe.shape.shape} in {self.medium}, "
-            f"{self.space.mesh.elements.nelements} elements, {self.space.size} unknowns>"
-        )
-
-    def with_material(self, material: Material) -> Lever:
-        """Return the same lever of another material; mesh, operators and air are shared."""
-        return self.with_probe(self.probe.model_copy(update={"material": material}))
-
-    def in_medium(self, medium: str) -> Lever:
-        """Return the same lever in vacuum or in air; mesh and operators are shared."""
-        return self.with_probe(self.probe.in_medium(medium))
-
-    def with_probe(self, probe: Probe) -> Lever:
-        """Return the lever of a probe of the same shape and tip; what is the same is shared."""
-        if (probe.layout(), probe.wiring) != (self.probe.layout(), self.probe.wiring):
-            raise InputError("another shape, tip or wiring needs a new Lever")
-        other = copy(self)
-        other.probe = probe
-        if probe.model_copy(update={"monitor": self.probe.monitor}) == self.probe:
-            return other  # its states are the same
-        around, base = probe.surroundings, probe.circuit.base_temperature_K
-        if (around, base) != (self.probe.surroundings, self.circuit.base_temperature_K):
-            other.space = other._surrounded(self.space)
-        other._prepare()
-        return other
 
     @one_blas_thread
     def branch(self, hottest_K: float = HOTTEST, progress: Progress | None = None) -> Branch:
@@ -147,13 +75,8 @@ class Lever:
 
     def _followed(self, enough: Enough, progress: Progress | None = None) -> Branch:
         """Return a branch that is long enough, going on from the one at hand."""
-
-        def told(branch: Branch) -> None:
-            if progress is not None:
-                progress(branch.u.size, max(_USUAL_STATES, branch.u.size + 1))
-
         try:
-            self._branch = continued(self.equations, enough, self._branch, told)
+            self._branch = continued(self.equations, enough, self._branch, progress)
         except ComputationError as error:
             self._branch = error.partial
             raise
@@ -290,8 +213,7 @@ class Lever:
     @one_blas_thread
     def dataset(self, states: Sequence[State], notes: Sequence[str] = ()) -> xr.Dataset:
         """Return what is observed of solved states, as `sweep` does."""
-        nothing = np.zeros((self.space.size + 1, 0))
-        x = np.concatenate([nothing, *(state.x for state in states)], axis=1)
+        x = np.hstack([np.zeros((self.space.size + 1, 0)), *(state.x for state in states)])
         return dataset_of_states(self.probe, self.equations, x, notes)
 
     @one_blas_thread

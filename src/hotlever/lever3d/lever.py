@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
@@ -117,12 +117,11 @@ class SolidLever(Lever):
         """Return the space in the probe's gas: in free space the air is the same at any base."""
         return space.with_air(space.air.in_gas(self.probe.surroundings.gas_conductivity))
 
-    def with_probe(self, probe: Probe) -> Lever:
+    def with_probe(self, probe: Probe) -> Self:
         """Return the lever of a probe of the same shape and tip; another medium is meshed anew."""
         if probe.surroundings.medium != self.medium:
-            return SolidLever(probe, **self._options)
+            return type(self)(probe, **self._options)
         other = super().with_probe(probe)
-        assert isinstance(other, SolidLever)
         other._flat = self._flat.with_probe(probe)
         return other
 
