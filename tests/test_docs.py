@@ -45,7 +45,7 @@ LAWS = (
     "materials",
     "probe/tip.py",
     "calibration",
-    "lever/reduced/error_estimate.py",
+    "lever/reduced/lever.py",
     "estimation/optimiser.py",
     "estimation/noise.py",
 )

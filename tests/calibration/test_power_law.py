@@ -152,7 +152,7 @@ def test_a_lever_that_melts_right_above_its_knee_has_a_law(reference):
     """As that does which comes nearest to a clipped current."""
     knee = reference.knee.power_mW
     melting: Any = SimpleNamespace(
-        highest_power_mW=1.006 * knee,
+        by_power=SimpleNamespace(highest_mW=1.006 * knee),
         base_temperature_K=reference.base_temperature_K,
         tip_temperature=lambda power: np.where(
             power <= 1.006 * knee, reference.tip_temperature(power), np.nan
