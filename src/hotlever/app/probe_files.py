@@ -18,7 +18,7 @@ from hotlever.app.jobs import probe_of
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.errors import InputError
-from hotlever.lever.meshing import chosen_space
+from hotlever.lever.discretisation import chosen_space
 from hotlever.probe import Probe
 from hotlever.probe.file_sections import sections_of
 from hotlever.probe.shapes import DRAWING, PARAMETRIC
