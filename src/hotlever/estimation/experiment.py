@@ -22,12 +22,13 @@ from scipy.interpolate import BSpline
 from hotlever.errors import ComputationError
 from hotlever.estimation.surrogate import CurveSurrogate, Rows, Surrogate
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
-from hotlever.lever.curve import spline_through
 from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.observables import Linearised, by_parameter
+from hotlever.lever.reduced.lever import BranchSolver
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
-from hotlever.lever.sensitivities import Linearised, by_parameter
-from hotlever.lever.similar import BranchSolver, SimilarLevers
+from hotlever.lever.similar import SimilarLevers
 from hotlever.measurands import FITTED
+from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.threads import one_blas_thread

@@ -21,14 +21,12 @@ from typing import Self
 import numpy as np
 
 from hotlever.contact.law import contact_of
-from hotlever.lever.branch import TIP_RISE, Branch, shifted
-from hotlever.lever.curve import crossing, spline_through
+from hotlever.lever.branch import TIP_RISE, Branch, branch_end, shifted
 from hotlever.lever.laws import BASE
-from hotlever.lever.observables import at_fixed_bias, observed, observed_by
+from hotlever.lever.observables import Linearised, at_fixed_bias, observed, observed_by
 from hotlever.lever.reduced.lever import ReducedLever
-from hotlever.lever.sensitivities import Linearised
 from hotlever.measurands import OBSERVABLES
-from hotlever.piecewise import Piecewise
+from hotlever.piecewise import Piecewise, crossing, spline_through
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import parameters_of
 from hotlever.threads import one_blas_thread
@@ -70,7 +68,7 @@ class Rows:
             return self._nearest(branch, circuit)
         reading = branch.read(circuit, self.bias_V)
         if np.isnan(reading.u).any():
-            raise branch.ended(reading)
+            raise branch_end(branch, reading)
         return reading.u, np.ones(reading.u.shape)
 
     def values(self, branch: Branch, circuit: Circuit) -> Array:
@@ -87,7 +85,7 @@ class Rows:
         ----------
         branch : Branch
         by_parameter : ndarray, shape (k, 4, p)
-            How its states change, see `hotlever.lever.sensitivities.by_parameter`.
+            How its states change, see `hotlever.lever.observables.by_parameter`.
         circuit : Circuit
         names : sequence of str
             The parameters.
@@ -244,7 +242,7 @@ class CurveSurrogate:
     branch : Branch
         Of this probe.
     by_parameter : ndarray, shape (k, 4, p)
-        Its derivatives, see `hotlever.lever.sensitivities.by_parameter`.
+        Its derivatives, see `hotlever.lever.observables.by_parameter`.
     rows : Rows
         What is shown of it.
     """
