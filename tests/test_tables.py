@@ -9,7 +9,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.tables import find_tables, read_table, reading
-from hotlever.tables.cells import number, text_lines
+from hotlever.tables.table import number, text_lines
 from hotlever.units import conversion
 
 ADVERSARIAL = [" ", "\t", "(", "[", "a (", "=", ":", "#", '"', "R_s ", "1", "1,", "k", "°", "base "]

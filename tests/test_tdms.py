@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever import InputError, read_measurement
-from hotlever.tables.tdms import SIGNATURE
+from hotlever.tables.binary import TDMS
 
 BIAS = np.array([0.1, 1.0, 2.0 / 3.0, 8.25])
 CURRENT = BIAS / 7e3
@@ -74,7 +74,7 @@ def test_a_damaged_file_is_one_line(tmp_path):
 def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "nptdms", None)
     path = tmp_path / "iv.tdms"
-    path.write_bytes(SIGNATURE + bytes(24))
+    path.write_bytes(TDMS + bytes(24))
     with pytest.raises(InputError, match=r"iv\.tdms: .*pip install 'hotlever\[tdms\]'") as error:
         read_measurement(path)
     assert "\n" not in str(error.value)

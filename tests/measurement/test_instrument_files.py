@@ -7,7 +7,7 @@ import pytest
 
 from hotlever import InputError, read_measurement
 from hotlever.probe import Circuit
-from hotlever.tables.layouts import below_a_header
+from hotlever.tables.headings import below_a_header
 from instrument_files import STYLES, outcome
 
 FILES = {f"{file.style}, {file.name}": file for style in STYLES for file in style()}

@@ -16,7 +16,7 @@ from hotlever.files import read_bytes
 from hotlever.measurands import FITTED, MEASURANDS, PLAIN
 from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
 from hotlever.tables import TextTable, read_table
-from hotlever.tables.cells import text_lines
+from hotlever.tables.table import text_lines
 from hotlever.types import Array
 from hotlever.units import TIMES, amount, conversion, name_and_unit, unknown_unit
 

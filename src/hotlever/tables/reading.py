@@ -13,10 +13,11 @@ import numpy as np
 
 from hotlever.errors import InputError, counted, shown
 from hotlever.files import read_bytes
-from hotlever.tables.cells import Dialect, Line, filled_lines
+from hotlever.tables.binary import lines_of_binary
 from hotlever.tables.headings import (
     begins_number,
     begins_other_lines,
+    below_a_header,
     header_row,
     headings_in,
     is_comment,
@@ -30,15 +31,9 @@ from hotlever.tables.headings import (
     with_units,
     without_marks,
 )
-from hotlever.tables.igor import SIGNATURES, igor_lines
-from hotlever.tables.layouts import below_a_header
-from hotlever.tables.table import TextTable
-from hotlever.tables.tdms import SIGNATURE, tdms_lines
+from hotlever.tables.table import Dialect, Line, TextTable, filled_lines
 from hotlever.types import Array
 from hotlever.units import NUMBER, is_unit, key_and_value
-
-#: What reads the content of a file that begins so, as the lines of a text table.
-_BINARY = {SIGNATURE: tdms_lines, **dict.fromkeys(SIGNATURES, igor_lines)}
 
 # --- a file of one table --------------------------------------------------------------------------
 
@@ -52,8 +47,8 @@ def read_table(
     """Read a table of cells separated by tabs, semicolons, commas or, some, by blanks.
 
     Numbers may have decimal commas unless these separate the cells. Lines that start with ``#``
-    are comments. The channels of a TDMS file are columns too (`hotlever.tables.tdms`), and an Igor
-    wave is a table (`hotlever.tables.igor`).
+    are comments. The channels of a TDMS file are columns too, and an Igor wave is a table
+    (`hotlever.tables.binary`).
 
     Parameters
     ----------
@@ -74,8 +69,7 @@ def read_table(
         If there is no such table; the text names file and line.
     """
     raw = read_bytes(path)
-    binary = next((read for start, read in _BINARY.items() if raw.startswith(start)), None)
-    lines = (binary or filled_lines)(raw, str(path))
+    lines = lines_of_binary(raw, str(path)) or filled_lines(raw, str(path))
     if is_heading is not None and lines:
         lines = below_a_header(lines)
     first = next((i for i, (_, line) in enumerate(lines) if not is_comment(line)), None)

@@ -1,17 +1,194 @@
-"""A table in a text file: named columns, rows of cells, and what is said of them."""
+"""Text as instruments write it: from bytes to lines and cells, and a table of these.
+
+A table has named columns, rows of cells, and what is said of them.
+"""
 
 from __future__ import annotations
 
+import csv
+import math
 import re
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from hotlever.errors import InputError, quoted, shown, unknown_name
-from hotlever.tables.cells import Dialect, Line
 from hotlever.types import Array
-from hotlever.units import conversion, key_and_value, name_and_unit, unknown_unit
+from hotlever.units import (
+    LARGEST_NUMBER,
+    LONGEST_NUMBER,
+    NUMBER,
+    conversion,
+    key_and_value,
+    name_and_unit,
+    unknown_unit,
+)
+
+MOST_LINES = 200_000  #: of a file, unless its reader says otherwise
+LONGEST_LINE = 2**17  #: characters; a spectrometer's map has some 40 000
+
+# A line of a file, and its number.
+Line = tuple[int, str]
+
+#: Lines by which a file's dialect is told.
+_SAMPLE_LINES = 40
+#: A line of nothing but numbers, in any dialect.
+_PLAIN = re.compile(r"[-+.0-9eE\s;,|]*", re.ASCII)
+_MISSING = {"", "nan", "-", "--", "n/a", "na"}
+#: What SCPI instruments write for "not a number".
+_NOT_A_NUMBER = 9.91e37
+
+
+def decode(raw: bytes, where: str) -> str:
+    """Decode UTF-8 (with or without mark), UTF-16 or, failing those, Windows' Latin-1.
+
+    Raises
+    ------
+    InputError
+        If the bytes are no text.
+
+    Examples
+    --------
+    >>> decode("µm".encode("utf-16"), ""), decode(b"\\xb5m", "")
+    ('µm', 'µm')
+    """
+    head = raw[:4096]
+    marked = head.startswith((b"\xff\xfe", b"\xfe\xff"))
+    encoding = "utf-16" if marked else "utf-8-sig"
+    if b"\x00" in head and not marked:
+        # UTF-16 without its mark: every other byte of western text is zero
+        zeros = {"utf-16-le": head[1::2], "utf-16-be": head[0::2]}
+        encoding = next((e for e, part in zeros.items() if part.count(0) > 0.8 * len(part)), "")
+    try:
+        if encoding:
+            return raw.decode(encoding)
+    except UnicodeDecodeError:
+        control = sum(byte < 9 or 13 < byte < 32 for byte in head)
+        if not marked and control <= 0.02 * len(head):
+            return raw.removeprefix(b"\xef\xbb\xbf").decode("cp1252", errors="replace")
+    raise InputError(f"{where}: a binary file, not a text file")
+
+
+def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
+    """Decode a file's content, and split it into at most as many lines.
+
+    Raises
+    ------
+    InputError
+        If it is no text, or has too many lines or too long a line.
+    """
+    lines = decode(raw, where).splitlines()
+    if len(lines) > most:
+        raise InputError(f"{where}: {len(lines)} lines, expected at most {most}")
+    for number, line in enumerate(lines, start=1):
+        if len(line) > LONGEST_LINE:
+            raise InputError(
+                f"{where}: line {number}: {len(line)} characters, expected at most {LONGEST_LINE}"
+            )
+    return lines
+
+
+def filled_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[Line]:
+    """Return the lines of `text_lines` that hold more than separators, with their numbers."""
+    numbered = enumerate(text_lines(raw, where, most), start=1)
+    return [(number, line) for number, line in numbered if line.strip(' \t,;"\u00a0').strip()]
+
+
+def number(cell: str, decimal_comma: bool = False) -> float | None:
+    """Return a cell's number: NaN where it says that there is none, None if it is something else.
+
+    Examples
+    --------
+    >>> number("1.5e3"), number("1,5", decimal_comma=True), number("--"), number("1_000")
+    (1500.0, 1.5, nan, None)
+    """
+    if len(cell) <= LONGEST_NUMBER and NUMBER.fullmatch(cell):
+        sign, other = (",", ".") if decimal_comma else (".", ",")
+        if other in cell:
+            return None
+        value = float(cell.replace(sign, ".").lower().replace("d", "e"))
+        if value == _NOT_A_NUMBER:
+            return math.nan
+        return value if abs(value) <= LARGEST_NUMBER else None
+    return math.nan if cell.lower() in _MISSING else None
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How lines are cells and cells numbers."""
+
+    separator: str | None  #: None is any run of blanks
+    decimal_comma: bool = False
+    grouped: bool = False  #: whether the other sign may stand between thousands
+
+    @classmethod
+    def of(cls, lines: Sequence[Line]) -> Dialect:
+        """Return what makes the most of a sample of lines rows of numbers; two columns beat one."""
+        tail = lines[len(lines) // 4 :] if len(lines) > 8 else lines
+        sample = [line for _, line in tail[:: max(len(tail) // _SAMPLE_LINES, 1)]]
+
+        def fit(dialect: Dialect) -> tuple[int, int]:
+            rows = [row for line in sample if (row := dialect.row(line)) is not None]
+            return sum(int(np.count_nonzero(~np.isnan(row)) >= 2) for row in rows), len(rows)
+
+        best = max(DIALECTS, key=fit)
+        grouped = [replace(dialect, grouped=True) for dialect in DIALECTS]
+        # 1,234 is a number with a decimal comma before it is one in the thousands
+        return replace(best, grouped=True) if fit(best)[0] else max(grouped, key=fit)
+
+    def cells(self, line: str) -> list[str] | None:
+        """Return a line's cells, None if quotes do not end."""
+        line = line.strip(" ")
+        if self.separator is None:
+            return [cell.strip('"') for cell in line.split()]
+        if '"' not in line:
+            return [cell.strip() for cell in line.split(self.separator)]
+        quotes = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
+        try:
+            return [cell.strip() for cell in next(quotes)]
+        except csv.Error:
+            return None
+
+    def number(self, cell: str) -> float | None:
+        """Return a cell's number as `number` does, with marks of thousands if they are grouped."""
+        value = number(cell, self.decimal_comma)
+        if value is not None or not self.grouped:
+            return value
+        sign, other = ",." if self.decimal_comma else ".,"
+        grouped = rf"[+-]?[1-9]\d{{0,2}}([{other}'’\s]\d{{3}})+([{sign}]\d*)?"
+        if not re.fullmatch(grouped, cell[:LONGEST_NUMBER]):
+            return None
+        return number(re.sub(rf"[^\d{sign}+-]", "", cell), self.decimal_comma)
+
+    def row(self, line: str) -> Array | None:
+        """Return the numbers of a line, NaN for blank cells, None if it holds anything else."""
+        # nearly every line has nothing but numbers, and maps have millions
+        if _PLAIN.fullmatch(line) and not (self.decimal_comma and "." in line):
+            cells = (line.replace(",", ".") if self.decimal_comma else line).split(self.separator)
+            for read in (float, _number_or_blank):
+                with suppress(ValueError):
+                    row = np.array(list(map(read, cells)))
+                    # fmax leaves NaN out
+                    return row if np.fmax.reduce(np.abs(row)) <= LARGEST_NUMBER else None
+        values = [self.number(cell) for cell in self.cells(line) or []]
+        row = np.array(values, dtype=float)
+        return None if None in values or np.isnan(row).all() else row
+
+
+def _number_or_blank(cell: str) -> float:
+    return float(cell) if cell.strip() else math.nan
+
+
+#: In the order in which they are tried.
+DIALECTS = [
+    Dialect(separator, decimal_comma)
+    for separator in ("\t", ";", ",", "|", None)
+    for decimal_comma in (False, True)
+    if (separator, decimal_comma) != (",", True)
+]
 
 #: A number with a mark of thousands, or with three decimals; and a small whole number.
 _GROUPED, _SMALL = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}"), re.compile(r"[+-]?[1-9]\d{0,2}")
