@@ -39,8 +39,8 @@ from hotlever.contact.law import INTERFACE, ContactLaw
 from hotlever.lever import Lever
 from hotlever.lever.contact import sweep_in_contact
 from hotlever.probe import Probe
-from hotlever.probe.contact import OUT_OF_CONTACT
 from hotlever.probe.mesh import face_of
+from hotlever.probe.tip import OUT_OF_CONTACT
 from problems import table
 
 #: Contact radius (nm), height (µm), half-angle (°), sample, interface (K/mW), bias (V).

@@ -15,7 +15,7 @@ from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.silicon import thermal_conductivity
 from hotlever.materials.thin_silicon import thermal_conductivity_of_wire
 from hotlever.probe import Probe, Tip
-from hotlever.probe.contact import OUT_OF_CONTACT, interface_of
+from hotlever.probe.tip import OUT_OF_CONTACT, interface_of
 
 SHARP = Tip(height_um=0.7, half_angle_deg=20.0, apex_radius_um=0.005)
 BLUNT = Tip(height_um=0.5, half_angle_deg=50.0, apex_radius_um=0.1)

@@ -25,9 +25,9 @@ from hotlever.lever.transient import pulse, simulate, step
 from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe
-from hotlever.probe.contact import OUT_OF_CONTACT
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.tip import OUT_OF_CONTACT
 from hotlever.tasks.contacting import what_the_current_tells
 
 TIP = {"tip.height_um": 0.7, "tip.half_angle_deg": 20.0, "tip.apex_radius_um": 0.1}

@@ -28,8 +28,8 @@ from hotlever.lever.space import LEVER, TIP
 from hotlever.lever3d import SolidLever
 from hotlever.materials import PARAMETERS, published
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.physics import Physics
 from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.surroundings import Physics
 from of_materials import metal_film_probe, p_type_probe
 
 MATERIAL = published("option III").material

@@ -16,8 +16,8 @@ from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever3d import SolidLever
 from hotlever.materials import radiation
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.physics import Physics
 from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.surroundings import Physics
 from of_materials import metal_film_probe, p_type_probe
 
 BASE, LENGTH = 293.0, 40.0

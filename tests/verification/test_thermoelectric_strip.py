@@ -18,7 +18,7 @@ from hotlever.lever.solved_states import Constrained
 from hotlever.lever.space import LEVER
 from hotlever.materials.film_kinds import MetalFilm
 from hotlever.probe import Circuit, Layout, ProbeMesh, Region, Terminal
-from hotlever.probe.physics import Physics
+from hotlever.probe.surroundings import Physics
 from hotlever.studies.thermoelectric_shift import SIDES, Heats
 
 LENGTH, THICK = 12.0, 0.4

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, Field
 
-from hotlever.probe.physics import Physics
+from hotlever.probe.surroundings import Physics
 
 #: What a measurement was made in; empty for what its file says.
 Medium = Literal["", "vacuum", "air", "unknown"]

@@ -22,8 +22,7 @@ from hotlever.lever import Lever
 from hotlever.lever.contact import state_in_contact, sweep_in_contact
 from hotlever.lever.lever import COARSE, State
 from hotlever.probe import Probe
-from hotlever.probe.contact import OUT_OF_CONTACT
-from hotlever.probe.tip import EXAMPLE
+from hotlever.probe.tip import EXAMPLE, OUT_OF_CONTACT
 from hotlever.tasks.contacting import notes_of, probe_in_contact
 from hotlever.tasks.probes import make_lever
 from hotlever.threads import one_blas_thread

@@ -13,7 +13,7 @@ import numpy as np
 
 from hotlever.contact.law import contact_of
 from hotlever.probe import Probe
-from hotlever.probe.contact import SampleContact
+from hotlever.probe.tip import SampleContact
 from hotlever.types import Array
 
 #: Slices of the cone and of what is under it; height of the lever's bar in the picture.

@@ -40,8 +40,8 @@ from hotlever.measurement import (
     Measurement,
     with_measured_circuit,
 )
+from hotlever.measurement.data import check_sample
 from hotlever.measurement.rows import averaged, note_on_averages
-from hotlever.measurement.sample import check_sample
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
 from hotlever.probe.priors import (

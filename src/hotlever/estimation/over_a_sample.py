@@ -19,7 +19,7 @@ from hotlever.estimation.experiment import TIP, ExperimentAtRest, PredictionAtRe
 from hotlever.estimation.surrogate import CurveSurrogate
 from hotlever.lever.equations import GAP
 from hotlever.probe import Probe
-from hotlever.probe.contact import OUT_OF_CONTACT
+from hotlever.probe.tip import OUT_OF_CONTACT
 from hotlever.types import Array
 
 #: Distances that are solved in air where more were measured.

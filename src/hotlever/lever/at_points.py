@@ -46,7 +46,7 @@ from hotlever.materials.air import kirchhoff_variable
 from hotlever.materials.laws import Evaluated
 from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
-from hotlever.probe.physics import THE_PAPERS, Physics
+from hotlever.probe.surroundings import THE_PAPERS, Physics
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 

@@ -17,7 +17,7 @@ from hotlever.lever.lever import Lever, State
 from hotlever.lever.observables import sensitivities_of
 from hotlever.lever.transient import Waveform, simulate
 from hotlever.probe import Probe
-from hotlever.probe.contact import OUT_OF_CONTACT
+from hotlever.probe.tip import OUT_OF_CONTACT
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 

@@ -22,7 +22,7 @@ from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.materials.laws import Evaluated
 from hotlever.materials.silicon import Carrier
-from hotlever.probe.physics import Physics
+from hotlever.probe.surroundings import Physics
 from hotlever.types import Array
 from hotlever.units import (
     PER_CM2_TO_MILLI_PER_UM2,

@@ -79,7 +79,7 @@ def observed_by(circuit: Circuit, shown: Array, slopes: Array, names: Sequence[s
         "current": current_mA,
         "reader": reader_V,
         "bridge": circuit.bridge_change(lever_V, 0.0) + of_divider,
-        "tip": rise_K + [circuit.base_by(name) for name in names],
+        "tip": rise_K + [float(name == "base_temperature_K") for name in names],
     }
     return np.stack([values[name] for name in OBSERVABLES])
 
@@ -101,7 +101,7 @@ def at_fixed_bias(
         Derivatives of V_l, I_h, V_r and the rise of the tip, see
         `by_parameter`.
     of_circuit : ndarray, shape (n, p)
-        Derivatives of the bias for a given state, see `hotlever.probe.supply.SweptSupply.bias_by`.
+        Derivatives of the bias for a given state, see `hotlever.probe.circuit.SweptSupply.bias_by`.
 
     Returns
     -------

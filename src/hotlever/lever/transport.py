@@ -20,7 +20,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from hotlever.probe.physics import Physics
+from hotlever.probe.surroundings import Physics
 from hotlever.types import Array
 
 

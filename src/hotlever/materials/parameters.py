@@ -60,7 +60,7 @@ class Parameter(NamedTuple):
     relative : bool
         Whether that is a share of the value: a standard deviation of the logarithm.
     counts : str
-        With what it counts alone: `IN_TIME`, or an effect of `hotlever.probe.physics`.
+        With what it counts alone: `IN_TIME`, or an effect of `hotlever.probe.surroundings`.
     exact : bool
         Whether no value outside the bounds has a meaning.
     usual : bool

@@ -73,6 +73,27 @@ def material_of(
     return made.from_values({**usual, **stated}, where)
 
 
+def remade(
+    material: Kind | Material, made: type[Record], values: Mapping[str, Any], name: str
+) -> Record:
+    """Return a material as one of a class of one's own; see `Probe.with_material`.
+
+    Raises
+    ------
+    InputError
+        If the class is none for it, or a value is impossible.
+    """
+    base = KINDS[material.kind] if isinstance(material, Kind) else Material
+    if not issubclass(made, base):
+        raise InputError(f"{name}: found {made.__name__}, expected a class made of {base.__name__}")
+    own = {**material.model_dump(exclude_none=True), **values}
+    if not issubclass(made, Kind):
+        return made.from_values(own, f"[{name}]")
+    useless = {*made.without_use(own)} - values.keys()
+    own = {key: value for key, value in own.items() if key not in useless}
+    return material_of(own, f"[{name}]", made=made)
+
+
 def materials_of(
     sections: Mapping[str, Any],
     where: str,

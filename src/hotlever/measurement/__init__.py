@@ -2,13 +2,18 @@
 
 `columns` knows the names and units of the columns, `settings` the comments that give circuit and
 surroundings, `bias` completes the rows, `contents` knows what no lever can show, `rows` polarities
-and the order of the rows; `preview` shows the columns of a file that may be none yet.
+and the order of the rows; `reading` takes these together.
 """
 
 from hotlever.measurement.columns import parse_columns
 from hotlever.measurement.data import MEASURED, Measurement, with_measured_circuit
-from hotlever.measurement.preview import FileColumn, file_columns
-from hotlever.measurement.reading import given_measurement, read_measurement, read_measurement_of
+from hotlever.measurement.reading import (
+    FileColumn,
+    file_columns,
+    given_measurement,
+    read_measurement,
+    read_measurement_of,
+)
 
 __all__ = [
     "MEASURED",

@@ -1,9 +1,11 @@
-"""Measurement files, from their text to what a fit takes."""
+"""Measurement files, from their text to what a fit takes; and their columns as they are."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,14 +21,18 @@ from hotlever.measurement.columns import (
     note_on_bias,
     note_on_unused,
     parse_columns,
+    quantity_of,
 )
 from hotlever.measurement.contents import Contents, check
 from hotlever.measurement.data import DISTANCE, MEASURED, OPTIONAL, TIME, Measurement
 from hotlever.measurement.rows import described, disagreements, sweeps_of
 from hotlever.measurement.settings import Settings
 from hotlever.probe import Circuit, Probe
+from hotlever.units import name_and_unit
 
 _MOST_NOTES = 20
+#: Cells of a column that are shown, and columns.
+_CELLS, _MOST = 3, 60
 
 
 def read_measurement(
@@ -84,7 +90,7 @@ def read_measurement(
     if TIME in quantities:
         waveform, order = _complete_in_time(contents, circuit, waveform)
     else:
-        signed = signed or (circuit is not None and circuit.lowest_bias_V < 0.0)
+        signed = signed or (circuit is not None and not circuit.starts_cold)
         # behind the probe's resistor a lever's own voltage, taken for the bias, leaves none
         assumed = circuit is not None and is_taken_as_bias(quantities, assigned)
         series_ohm = circuit.series_resistance_ohm if circuit and assumed else 0.0
@@ -196,3 +202,70 @@ def given_measurement(
     raise InputError(
         f"found {type(measurement).__name__}, expected a Measurement or a measurement file"
     )
+
+
+# --- the columns of a file that may be no measurement yet ---------------------------------------
+
+
+@dataclass(frozen=True)
+class FileColumn:
+    """One column of a file.
+
+    Attributes
+    ----------
+    heading, unit : str
+        As they stand in the file; empty where there is none.
+    name : str
+        By which ``--column`` finds it: its heading, or its number where that is not its alone.
+    cells : tuple of str
+        The first ones.
+    symbol : str
+        The quantity that it is used as; empty if it is not used.
+    """
+
+    heading: str
+    unit: str
+    name: str
+    cells: tuple[str, ...]
+    symbol: str
+
+
+def file_columns(
+    path: str | os.PathLike[str], columns: Mapping[str, str] | None = None, *, driven: bool = False
+) -> list[FileColumn]:
+    """Return the columns of a measurement file, which may lack what a measurement needs.
+
+    Parameters
+    ----------
+    path : path
+    columns : mapping of str to str, optional
+        See `read_measurement`.
+    driven : bool
+        Whether a wave form is given, so that no column of the bias is needed.
+
+    Raises
+    ------
+    InputError
+        If the file holds no table.
+    """
+    assigned = dict(columns or {})
+    table = measured_table(path, assigned)
+    symbols = dict[int, str]()
+    try:
+        used = find_columns(table, assigned, driven=driven)
+        symbols = {column.index: symbol for symbol, column in used.items()}
+    except InputError:
+        # what is missing or stands twice is for the user to say
+        symbols = {i: quantity_of(name) or "" for i, name in enumerate(table.names)}
+        for told, heading in assigned.items():
+            with suppress(InputError):
+                symbols[table.index(heading)] = quantity_of(told, assigned=True) or ""
+    headings = [name.casefold() for name in table.names]
+    shown_columns = []
+    for index, heading in enumerate(table.names[:_MOST]):
+        is_alone = bool(heading) and headings.count(heading.casefold()) == 1 and "=" not in heading
+        cells = tuple(shown(row[index]) for row in table.rows[:_CELLS])
+        name = heading if is_alone and not heading.isdecimal() else str(index + 1)
+        unit = name_and_unit(heading)[1] or ""
+        shown_columns.append(FileColumn(heading, unit, name, cells, symbols.get(index, "")))
+    return shown_columns

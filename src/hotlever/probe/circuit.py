@@ -3,11 +3,15 @@
 The swept supply drives the heater current through a series resistor. Other terminals are at
 ground, are sensed without a current, or are held: by a supply of their own, of a voltage behind a
 resistor or of a current.
+
+Resistor and lever may be one arm of a Wheatstone bridge, whose other arm divides the same voltage.
+An amplifier that draws no current shows V_bridge = gain (V_l − V_b lower / (upper + lower)) +
+offset. With a divider like the cold lever and its resistor that is what heat does to the
+resistance, so that a lock-in or an amplifier sees more of it.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Self
@@ -16,15 +20,127 @@ import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.probe.supply import SweptSupply, resistance
 from hotlever.records import Record
+from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array
 
+#: Largest resistance of a circuit (Ω), smallest of a bridge, and the largest gain.
+_MOST_OHM, _LEAST_OHM, _MOST_GAIN = 1e7, 1e-3, 1e6
+#: Largest offset of an amplifier (V).
+MOST_OFFSET_V = 10.0
 #: Resistance (kΩ) behind which a voltage is held where none is given: ten nano-ohm, far less than
 #: any contact has.
 _NEARLY_NONE = 1e-11
 #: Largest voltage (V) and current (mA) of a held supply.
 _MOST = 1000.0
+
+
+def resistance(meaning: str, default: float) -> Any:
+    """Return the field of a resistor (Ω) that may be none."""
+    return Field(default=default, ge=0, le=_MOST_OHM, description=meaning)
+
+
+def _of_bridge(meaning: str) -> Any:
+    return Field(default=None, ge=_LEAST_OHM, le=_MOST_OHM, description=f"of a bridge, {meaning}")
+
+
+class SweptSupply(Record):
+    """What drives a lever: V_b = V_l + R_s I_h, and what a bridge shows of it."""
+
+    series_resistance_ohm: float = resistance("between the bias source and the lever, R_s", 5600.0)
+    base_temperature_K: float = Field(
+        default=BASE_TEMPERATURE_K, ge=250, le=1000, description="of the leg ends"
+    )
+    bridge_upper_ohm: float | None = _of_bridge("from the bias source to what V_l is compared with")
+    bridge_lower_ohm: float | None = _of_bridge("from there to ground")
+    bridge_gain: float | None = Field(
+        default=None,
+        ge=-_MOST_GAIN,
+        le=_MOST_GAIN,
+        description="of the bridge's amplifier; 1 if left out",
+    )
+    bridge_offset_V: float = Field(
+        default=0.0,
+        ge=-MOST_OFFSET_V,
+        le=MOST_OFFSET_V,
+        description="that the bridge's amplifier shows of no voltage",
+    )
+
+    @model_validator(mode="after")
+    def _bridge_is_whole(self) -> Self:
+        arms = {name: getattr(self, name) for name in ("bridge_upper_ohm", "bridge_lower_ohm")}
+        missing = [name for name, ohm in arms.items() if ohm is None]
+        amplified = self.bridge_gain is not None or self.bridge_offset_V != 0.0
+        if len(missing) == 1 or (missing and amplified):
+            raise ValueError(f"a bridge needs {missing[0]}")
+        if not missing and not self.series_resistance_ohm:
+            raise ValueError(
+                "series_resistance_ohm = 0: a bridge needs a resistor in series with the lever, "
+                "for without one V_l is V_b"
+            )
+        if self.bridge_gain == 0.0:
+            raise ValueError("bridge_gain = 0: expected the gain of an amplifier")
+        return self
+
+    @property
+    def series_kohm(self) -> float:
+        """R_s in kΩ, which makes volts of milliamperes."""
+        return self.series_resistance_ohm / 1000.0
+
+    def bias(self, lever_V: Any, current_mA: Any) -> Any:
+        """Return the bias V_b (V) of a lever voltage (V) and a current (mA), or its change."""
+        return lever_V + self.series_kohm * current_mA
+
+    def bias_by(self, name: str, current_mA: Any) -> Any:
+        """Return how the bias (V) changes with a value of the circuit, the lever being the same."""
+        return current_mA / 1000.0 if name == "series_resistance_ohm" else 0.0 * current_mA
+
+    def lever_voltage(self, bias_V: Any, current_mA: Any) -> Any:
+        """Return the lever voltage V_l (V) of a bias (V) and a current (mA)."""
+        return bias_V - self.series_kohm * current_mA
+
+    def power(self, bias_V: Any, current_mA: Any) -> Any:
+        """Return the power P_l = V_l I_h (mW) of a bias (V) and a current (mA)."""
+        return self.lever_voltage(bias_V, current_mA) * current_mA
+
+    @property
+    def has_bridge(self) -> bool:
+        """Whether the lever is part of a Wheatstone bridge."""
+        return self.bridge_upper_ohm is not None
+
+    @property
+    def _arms(self) -> tuple[float, float, float]:
+        """Gain, and upper and lower resistor of the divider (Ω), NaN without a bridge."""
+        upper, lower = self.bridge_upper_ohm, self.bridge_lower_ohm
+        if upper is None or lower is None:
+            return (float("nan"),) * 3
+        return 1.0 if self.bridge_gain is None else self.bridge_gain, upper, lower
+
+    def bridge_voltage(self, lever_V: Any, bias_V: Any) -> Any:
+        """Return the voltage V_bridge (V) of a lever voltage and a bias (V); NaN without one."""
+        return self.bridge_change(lever_V, bias_V) + self.bridge_offset_V
+
+    def bridge_change(self, lever_V: Any, bias_V: Any) -> Any:
+        """Return how V_bridge (V) changes where the lever voltage and the bias change (V)."""
+        gain, upper, lower = self._arms
+        return gain * (lever_V - lower / (upper + lower) * bias_V)
+
+    def bridge_by(self, name: str, bias_V: Array) -> Array:
+        """Return how V_bridge (V) changes with a value of the circuit, V_l and V_b being the same.
+
+        The gain is no such value: its error is that of the scale of what is shown.
+        """
+        gain, upper, lower = self._arms
+        if name == "bridge_offset_V":
+            return np.full_like(bias_V, 1.0)
+        by = {"bridge_upper_ohm": lower, "bridge_lower_ohm": -upper}.get(name, 0.0)
+        return np.asarray(gain * by / (upper + lower) ** 2 * bias_V)
+
+    def current_of_bridge(self, bridge_V: Array, bias_V: Array) -> Array:
+        """Return the current I_h (mA) at which the bridge shows a voltage (V); NaN without one."""
+        gain, upper, lower = self._arms
+        difference_V = (bridge_V - self.bridge_offset_V) / gain
+        return np.asarray((upper / (upper + lower) * bias_V - difference_V) / self.series_kohm)
 
 
 class Contact(Record):
@@ -135,20 +251,21 @@ class Circuit(SweptSupply):
     @classmethod
     def from_values(cls, values: dict[str, Any], where: str) -> Self:
         """Check `values` and make a circuit; `where` names their origin in an error."""
-        parts = contacts_apart(values)
-        given = parts.get("contacts", {}).items()
-        inside = {
-            name: contact
-            if isinstance(contact, Contact)
-            else Contact.from_values(contact, f"{where[:-1]}.{name}]")
-            for name, contact in given
+        contacts = {
+            name: Contact.from_values(section, f"{where[:-1]}.{name}]")
+            for name, section in _contacts_of(values).items()
+            if not isinstance(section, Contact)
         }
-        return super().from_values({**parts, "contacts": inside}, where)
+        return super().from_values({**values, **contacts}, where)
 
     @model_validator(mode="before")
     @classmethod
     def _sections_are_contacts(cls, values: Any) -> Any:
-        return contacts_apart(values) if isinstance(values, Mapping) else values
+        contacts = _contacts_of(values) if isinstance(values, Mapping) else {}
+        if not contacts:
+            return values
+        own = {name: value for name, value in values.items() if name not in contacts}
+        return {**own, "contacts": contacts}
 
     @model_validator(mode="after")
     def _one_supply_is_swept(self) -> Self:
@@ -182,8 +299,6 @@ class Circuit(SweptSupply):
         own = (getattr(self, name) for name in type(self).model_fields if name != "contacts")
         return hash((*own, *self.contacts.items()))
 
-    # --- the other terminals ----------------------------------------------------------------------
-
     def contact(self, name: str) -> Contact:
         """Return what is wired to a terminal."""
         usual: dict[str, Literal["supply", "ground"]] = {self.swept: "supply", "ground": "ground"}
@@ -208,16 +323,16 @@ class Circuit(SweptSupply):
                 "expected [circuit.supply] with what is wired to it"
             )
         others = {name: self.contact(name) for name in names if name != self.swept}
-        bare = [
-            name
-            for name, contact in others.items()
-            if contact.kind == "ground" and not contact.series_resistance_ohm
-        ]
         senses = tuple(name for name, contact in others.items() if contact.kind == "sense")
-        if not any(contact.norton[0] for name, contact in others.items() if name not in senses):
+        wired = {name: contact for name, contact in others.items() if name not in senses}
+        if not any(contact.norton[0] for contact in wired.values()):
             raise InputError(f"{where}: [circuit]: no terminal is at ground, expected one")
-        held = tuple(name for name in others if name not in (*bare, *senses))
-        return Wiring(self.swept, tuple(bare), held, senses)
+        bare = tuple(
+            name
+            for name, contact in wired.items()
+            if contact.kind == "ground" and not contact.series_resistance_ohm
+        )
+        return Wiring(self.swept, bare, tuple(name for name in wired if name not in bare), senses)
 
     def check(self, terminals: Iterable[str], medium: str, where: str) -> None:
         """Refuse what does not fit some terminals in a medium.
@@ -243,20 +358,15 @@ class Circuit(SweptSupply):
 
     def end_rises(self) -> dict[str, float]:
         """Return by how much leg ends are warmer than the base temperature (K), if they are."""
-        given = {name: contact.base_temperature_K for name, contact in self.contacts.items()}
-        rises = {name: T - self.base_temperature_K for name, T in given.items() if T is not None}
-        return {name: rise for name, rise in rises.items() if rise}
+        base = self.base_temperature_K
+        ends = {name: contact.base_temperature_K for name, contact in self.contacts.items()}
+        return {name: end - base for name, end in ends.items() if end not in (None, base)}
 
     @property
     def starts_cold(self) -> bool:
         """Whether all of the lever is at the base temperature until the swept supply heats it."""
         held = any(contact.norton[1] for contact in self.contacts.values())
         return not held and not self.end_rises()
-
-    @property
-    def lowest_bias_V(self) -> float:
-        """Bias (V) above which the lever is heated: any, −∞, where more than this heats it."""
-        return 0.0 if self.starts_cold else -math.inf
 
     @property
     def is_plain(self) -> bool:
@@ -271,21 +381,19 @@ class Circuit(SweptSupply):
         InputError
             Naming the terminal.
         """
-        if not self.starts_cold:
-            warm = self.end_rises()
-            name = next(n for n, contact in self.contacts.items() if contact.norton[1] or n in warm)
-            raise InputError(
-                f"[circuit.{name}]: {what} takes a lever that only the swept supply heats, found "
-                f"{'a held supply' if self.contacts[name].norton[1] else 'a warmer leg end'}"
-            )
+        warm = self.end_rises()
+        for name, contact in self.contacts.items():
+            if contact.norton[1] or name in warm:
+                raise InputError(
+                    f"[circuit.{name}]: {what} takes a lever that only the swept supply heats, "
+                    f"found {'a held supply' if contact.norton[1] else 'a warmer leg end'}"
+                )
 
 
-def contacts_apart(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of ``[circuit]`` with the sections inside it under ``contacts``."""
-    inner = {
+def _contacts_of(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the sections inside ``[circuit]``, by the names of their terminals."""
+    return {
         name: value
         for name, value in values.items()
         if name not in Circuit.model_fields and isinstance(value, Mapping | Contact)
     }
-    own = {name: value for name, value in values.items() if name not in inner}
-    return {**own, "contacts": inner} if inner else own

@@ -1,19 +1,29 @@
-"""Probe files: their sections read, and written with what each value is."""
+"""Probe files: their sections read, and changed by the names that their values have."""
 
 from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hotlever.errors import InputError, unknown_name
+from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text
-from hotlever.materials import Kind
-from hotlever.materials.sections import LAWS
-from hotlever.probe.parts import MATERIALS, ProbeParts
-from hotlever.probe.physics import Physics
+from hotlever.materials import REFERENCE, Kind
+from hotlever.materials.sections import LAWS, classes_at_hand, materials_of
+from hotlever.materials.stated import names_stated
+from hotlever.probe.circuit import Contact
+from hotlever.probe.parts import (
+    MATERIAL,
+    MATERIALS,
+    PARTS,
+    SECTIONS,
+    PriorTexts,
+    ProbeParts,
+    with_values,
+)
+from hotlever.probe.priors import priors_of
 from hotlever.probe.shapes import (
     DRAWING,
     PARAMETRIC,
@@ -22,14 +32,11 @@ from hotlever.probe.shapes import (
     SHAPES,
     Shape,
 )
-from hotlever.probe.tip import EXAMPLE
-from hotlever.text import as_toml
+from hotlever.records import Record
 
 #: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
 #: gigabytes to read.
 _LARGEST, _LONGEST_LINE = 1_000_000, 1000
-#: Column in which comments begin.
-_COMMENTS = 32
 
 
 def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -65,15 +72,6 @@ def sections_of(text: str, path: str) -> dict[str, Any]:
         reason = str(error).partition(";")[0]
         raise InputError(f"{path}: not valid TOML: {reason}") from None
     return values
-
-
-def with_values(section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a section without the keys that have no value."""
-    return {
-        key: with_values(value) if isinstance(value, Mapping) else value
-        for key, value in section.items()
-        if value is not None
-    }
 
 
 def shape_of(
@@ -127,77 +125,144 @@ def shape_of(
     return PARAMETRIC[name].from_values(values, here)
 
 
-# --- as text --------------------------------------------------------------------------------------
-
-
-def commented(entry: str, text: str | None) -> str:
-    """Return a line of a probe file with a comment, if there is one."""
-    return f"{entry:<{_COMMENTS - 2}}  # {text}" if text else entry
-
-
-def section_lines(
-    name: str,
-    section: Mapping[str, Any],
-    meaning: Mapping[str, str],
-    *,
-    optional: bool = False,
-    start: str = "",
-) -> list[str]:
-    """Return the lines of a section, after an empty one, each with what its value is.
-
-    Keys that have no value are left out, or with `optional` named in a comment. Sections inside it
-    come last. The `start` of each line may make all of it a comment.
-    """
-    inner = {key: value for key, value in section.items() if isinstance(value, Mapping)}
-    lines = [] if inner and len(inner) == len(section) else ["", f"{start}[{name}]"]
-    for key, value in section.items():
-        if key in inner or (value is None and not optional):
-            continue
-        written = f"{value:.12g}" if isinstance(value, float) else as_toml(value)
-        entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
-        lines.append(commented(entry, meaning.get(key)))
-    for key, values in inner.items():
-        lines += section_lines(f"{name}.{key}", values, {})
-    return lines
-
-
-def file_text(
-    probe: ProbeParts, shape: Mapping[str, Any], meaning: Mapping[str, str], heading: str = ""
-) -> str:
-    """Return the probe file of a probe.
+def parts_of(
+    values: Mapping[str, Any], where: str, folder: Path | None, like: ProbeParts | None
+) -> dict[str, Any]:
+    """Make the parts of a probe, each for itself, of the sections of a probe file.
 
     Parameters
     ----------
-    probe : ProbeParts
-    shape : mapping
-        The sections of its shape.
-    meaning : mapping of str to str
-        What the values of these are, by key.
-    heading : str
-        Lines above them.
+    values : mapping
+        Sections by name.
+    where, folder, like
+        See `hotlever.probe.probe.Probe.from_sections`.
+
+    Raises
+    ------
+    InputError
+        Naming the section and key, what was found and what is expected.
     """
-    lines = ["# A hotlever probe file: lengths in µm, temperatures in K."]
-    for name, section in shape.items():
-        lines += section_lines(name, section, meaning)
-    return f"{lines[0]}\n{heading}" + "\n".join(lines[1:]) + "\n" + other_sections(probe)
+    classes = classes_at_hand(values.get(LAWS, {}), where) if like is None else like.classes
+    values = {name: section for name, section in values.items() if name != LAWS}
+    for name, section in values.items():
+        if name not in SECTIONS:
+            raise unknown_name("section", name, SECTIONS, where)
+        if not isinstance(section, dict):
+            raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
+    if "probe" not in values:
+        raise InputError(f"{where}: section [probe] is missing")
+    materials = materials_of(values.get(MATERIALS, {}), where, SECTIONS, folder, classes)
+    drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
+    shape = shape_of(drawn, where, folder, materials, None if like is None else like.shape)
+    for name in materials:
+        if name not in shape.materials:
+            raise InputError(
+                f"{where}: [{MATERIALS}.{name}]: no layer is made of it, expected [layers.…] "
+                f'with material = "{name}"'
+            )
+    parts: dict[str, Any] = {"shape": shape, MATERIALS: materials}
+    for name in (name for name in PARTS if name in values):
+        usual = REFERENCE.model_dump() if name == MATERIAL else {}
+        made = classes.get(name, PARTS[name])
+        parts[name] = made.from_values({**usual, **values[name]}, f"{where}: [{name}]")
+    return parts
 
 
-def other_sections(probe: ProbeParts, without: Container[str] = ()) -> str:
-    """Return the sections of a probe's file beside those of its shape, some of them left out."""
-    lines = []
-    named = {f"{MATERIALS}.{name}": kind for name, kind in probe.materials.items()}
-    for name, part in (named | probe.parts).items():
-        if name in without:
-            continue
-        lines += section_lines(name, part.model_dump(), part.description(), optional=True)
-    if probe.tip is None:
-        lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
-        values, meaning = EXAMPLE.model_dump(), EXAMPLE.description()
-        lines += section_lines("tip", values, meaning, start="# ")[1:]
-    if not probe.physics:
-        lines += ["", "# Without a section [physics] the physics is the paper's. Beyond it:"]
-        effects = dict.fromkeys(Physics.model_fields, True)
-        lines += section_lines("physics", effects, Physics.description(), start="# ")[1:]
-    if probe.laws:
-        lines += section_lines(LAWS, probe.laws, {})
-    return "\n".join(lines) + "\n"
+def check_together(probe: ProbeParts, stated: Mapping[str, Any], where: str) -> None:
+    """Refuse sections that do not fit the others; those `stated` are by name.
+
+    Raises
+    ------
+    InputError
+        Naming the section, what was found and what is expected.
+    """
+    layout = probe.layout()
+    probe.circuit.check(layout.terminal_names, probe.surroundings.medium, where)
+    if MATERIAL in stated and not probe.has_plain_silicon:
+        raise InputError(
+            f"{where}: [{MATERIAL}]: no layer is made of it, expected no "
+            "such section, or a layer without a material of its own"
+        )
+    if probe.monitor is not None:
+        probe.monitor.check(layout, f"{where}: [monitor]")
+    priors_of(probe.stated_priors, probe, f"{where}: [prior]")
+
+
+# --- by name --------------------------------------------------------------------------------------
+
+
+def field_of(probe: ProbeParts, name: str) -> tuple[str, str, type[Record]]:
+    """Return section, key and record of a name such as ``n_d`` or ``tip.height_um``.
+
+    Raises
+    ------
+    InputError
+        If it is no key of a probe file; the nearest one is given.
+    """
+    section, dot, key = name.rpartition(".")
+    named = {material: type(kind) for material, kind in probe.materials.items()}
+    wired = {f"circuit.{name}": Contact for name in probe.layout().terminal_names}
+    records: dict[str, type[Record]] = {
+        "probe": type(probe.shape),
+        **named,
+        **PARTS,
+        MATERIAL: type(probe.material),
+        **wired,
+        **{f"layers.{key}": layer for key, layer in probe.shape.layer_records().items()},
+    }
+    if dot and section not in records:
+        raise unknown_name("section", section, [*SECTIONS, *named, *wired])
+    keys = {part: [*record.model_fields] for part, record in records.items()}
+    # and the numbers that formulas name
+    for material, kind in probe.materials.items():
+        keys[material] += kind.model_extra or {}
+    # in [probe] those of all shapes, its own first
+    keys["probe"] += [key for shape in PARAMETRIC.values() for key in shape.model_fields]
+    own = [part for part in PARTS if getattr(probe, part)]
+    # those of a named material have its name before them
+    for part in [section] if dot else ["probe", *own, *PARTS]:
+        if key in keys[part] or (dot and records[part] is PriorTexts):
+            return part, key, records[part]
+    # a prior has the name of what it is of
+    dotted = {*named, *wired}
+    full = [f"{part}.{key}" if part in dotted else key for part in keys for key in keys[part]]
+    choices = keys[section] if dot else full
+    raise unknown_name("name", key, dict.fromkeys(choices))
+
+
+def changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the sections of a probe with some values changed, each named as in `field_of`.
+
+    Raises
+    ------
+    InputError
+        If a name exists in no section, or counts while a drawing is read only.
+    """
+    sections = probe.sections()
+    # numbers that formulas name are keys too
+    named = {
+        f"{section}.{own}": (section, own)
+        for name, value in changes.items()
+        for section in [name.rpartition(".")[0]]
+        if section in probe.materials
+        for own in names_stated({name: value})
+    }
+    keys = {name: named.get(name) or field_of(probe, name)[:2] for name in changes}
+    for name, value in changes.items():
+        section, key = keys[name]
+        if key in probe.shape.read_with:
+            raise InputError(f"{name} counts when a drawing is read, expected it in the probe file")
+        inside, (*above, last) = sections, section.split(".")
+        for part in [MATERIALS] if section in probe.materials else above:
+            inside = inside.setdefault(part, {})
+        inside.setdefault(last, {})[key] = value
+        if section in probe.materials:
+            useless = type(probe.materials[section]).without_use(inside[last])
+            for other in {*useless} - {own for _, own in keys.values()}:
+                inside[last].pop(other, None)
+    sections = {name: with_values(section) for name, section in sections.items()}
+    shape = PARAMETRIC.get(str(sections["probe"]["shape"]))
+    if shape is not None and not isinstance(probe.shape, shape):
+        own = sections["probe"].items()
+        sections["probe"] = {key: value for key, value in own if key in shape.model_fields}
+    return sections

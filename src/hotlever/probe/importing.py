@@ -23,10 +23,10 @@ from hotlever.probe.drawing.sheet import (
     read_sheet,
     sensible_unit,
 )
-from hotlever.probe.file_sections import commented, other_sections, section_lines
 from hotlever.probe.layout import Point, ring_area
 from hotlever.probe.parts import MATERIAL
 from hotlever.probe.probe import Probe
+from hotlever.probe.text import commented, other_sections, section_lines
 from hotlever.text import aligned, as_toml
 
 #: Layers that are listed.

@@ -11,10 +11,10 @@ import math
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
 from hotlever.materials.parameters import IN_TIME, parameter_named
-from hotlever.probe.contact import OUT_OF_CONTACT
+from hotlever.probe.circuit import MOST_OFFSET_V
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
-from hotlever.probe.supply import MOST_OFFSET_V
+from hotlever.probe.tip import OUT_OF_CONTACT
 
 #: Shares of a dimension or a resistance, of a base temperature, and of what a gas conducts, within
 #: which a fit stays.

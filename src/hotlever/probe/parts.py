@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 from pydantic import ConfigDict, Field, SerializeAsAny, model_validator
 
-from hotlever.errors import unknown_name
 from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, REFERENCE, Kind, Material, full_name
 from hotlever.materials.kind import class_name
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
+from hotlever.materials.sections import LAWS
 from hotlever.measurands import OBSERVABLES
-from hotlever.probe.circuit import Circuit, Contact, Wiring
-from hotlever.probe.contact import SampleContact
+from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Layout
 from hotlever.probe.monitors import Monitor, Monitors
-from hotlever.probe.physics import THE_PAPERS, Physics
-from hotlever.probe.shapes import PARAMETRIC, SHAPE_SECTIONS, Shape
-from hotlever.probe.surroundings import Surroundings
-from hotlever.probe.tip import Tip
+from hotlever.probe.shapes import SHAPE_SECTIONS, Shape
+from hotlever.probe.surroundings import THE_PAPERS, Physics, Surroundings
+from hotlever.probe.tip import SampleContact, Tip
 from hotlever.records import Record
 from hotlever.types import Array
 
@@ -50,6 +48,15 @@ MATERIAL, MATERIALS = "material", "materials"
 SECTIONS = (*SHAPE_SECTIONS, MATERIALS, *PARTS)
 
 
+def with_values(section: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a section without the keys that have no value."""
+    return {
+        key: with_values(value) if isinstance(value, Mapping) else value
+        for key, value in section.items()
+        if value is not None
+    }
+
+
 class ProbeParts(Record):
     """Everything that a solve needs of one lever, and what is known before it is measured."""
 
@@ -65,7 +72,7 @@ class ProbeParts(Record):
     monitor: Monitors | None = None
 
     @model_validator(mode="after")
-    def _tip_stands_on_the_heater(self) -> Self:
+    def _tip_fits(self) -> Self:
         if self.tip is not None:
             room = self.shape.layout().heater.narrow_um / 2
             if not self.tip.base_radius_um < room:
@@ -73,15 +80,9 @@ class ProbeParts(Record):
                     f"the tip's base has a radius of {self.tip.base_radius_um:.4g} µm, expected "
                     f"less than {room:.4g} µm, half the heater's narrow side"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _contact_is_the_tips(self) -> Self:
-        if self.contact is None:
-            return self
-        if self.tip is None:
+        elif self.contact is not None:
             raise ValueError("[contact] means nothing without a section [tip]")
-        if self.surroundings.medium == "air":
+        if self.tip and self.contact and self.surroundings.medium == "air":
             gap, height = self.surroundings.surface_gap_um, self.tip.height_um
             if gap is None or not math.isclose(gap, height, rel_tol=1e-6):
                 raise ValueError(
@@ -93,24 +94,20 @@ class ProbeParts(Record):
         return self
 
     @model_validator(mode="after")
-    def _low_doped_parts_are_the_lower(self) -> Self:
+    def _materials_make_sense(self) -> Self:
+        kinds = self.kinds
         for region in self.layout().regions:
-            low, high = region.material, region.dopant_from
-            of_low, of_high = self.kinds[low], self.kinds[high]
+            low, high = kinds[region.material], kinds[region.dopant_from]
             if (
                 region.taper is not None
-                and isinstance(of_low, LowDopedSilicon)
-                and isinstance(of_high, HighDopedSilicon)
-                and of_low.n_d >= of_high.n_hd
+                and isinstance(low, LowDopedSilicon)
+                and isinstance(high, HighDopedSilicon)
+                and low.n_d >= high.n_hd
             ):
                 raise ValueError(
-                    f"{full_name(low, 'n_d')} = {of_low.n_d:g} must be below "
-                    f"{full_name(high, 'n_hd')} = {of_high.n_hd:g}"
+                    f"{full_name(region.material, 'n_d')} = {low.n_d:g} must be below "
+                    f"{full_name(region.dopant_from, 'n_hd')} = {high.n_hd:g}"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _laws_make_sense_at_the_base(self) -> Self:
         for name, kind in self.made_of.items():
             if reason := kind.impossible(self.circuit.base_temperature_K):
                 of = f"{name}: " if name in self.materials else ""
@@ -190,7 +187,8 @@ class ProbeParts(Record):
 
         There is none, −∞, with held supplies or thermoelectricity: there the polarity counts.
         """
-        return -math.inf if self.physics.thermoelectric else self.circuit.lowest_bias_V
+        counts = self.physics.thermoelectric or not self.circuit.starts_cold
+        return -math.inf if counts else 0.0
 
     @property
     def wiring(self) -> Wiring:
@@ -210,69 +208,50 @@ class ProbeParts(Record):
         """Return the regions, terminals and tip."""
         return dataclasses.replace(self.shape.layout(), cone=self.tip)
 
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """Return the sections as plain values: what `Probe.from_sections` takes, or refuses."""
+        sections: dict[str, dict[str, Any]] = self.shape.sections()
+        if self.materials:
+            sections[MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
+        sections |= {name: part.model_dump() for name, part in self.parts.items()}
+        if self.laws:
+            sections[LAWS] = dict(self.laws)
+        return {name: with_values(section) for name, section in sections.items()}
+
+    def _owner(self, name: str) -> tuple[str, Record | None]:
+        """Return the section with a value, by its name in a probe file, and what that holds."""
+        material, dot, _ = name.partition(".")
+        if dot:
+            return material, self.materials[material]
+        parts = [("probe", self.shape), *((part, getattr(self, part)) for part in PARTS)]
+        owners = ((part, own) for part, own in parts if own and name in type(own).model_fields)
+        return next(owners, ("", None))
+
     def values(self, names: Sequence[str]) -> Array:
         """Return some of its values by their names in a probe file, shape (len(names),)."""
-        return np.array([self._value(name) for name in names], dtype=float)
-
-    def _value(self, name: str) -> Any:
-        material, dot, own = name.partition(".")
-        if dot:
-            return getattr(self.materials[material], own)
-        parts = (self.shape, *(getattr(self, part) for part in PARTS))
-        return next(
-            getattr(part, name) for part in parts if part and name in type(part).model_fields
-        )
+        found = [getattr(self._owner(name)[1], name.rpartition(".")[2]) for name in names]
+        return np.array(found, dtype=float)
 
     def replace(self, values: Mapping[str, float]) -> Self:
         """Return a copy with some values changed, as `with_` does but unchecked and fast."""
-        parts: dict[str, Any] = {}
-        for field in ("shape", *PARTS):
-            part = getattr(self, field)
-            own = {
-                name: values[name] for name in values if part and name in type(part).model_fields
-            }
-            parts[field] = part.model_copy(update=own) if own else part
-        kinds = dict(self.materials)
-        for full, value in values.items():
-            name, dot, key = full.partition(".")
-            if dot:
-                kinds[name] = kinds[name].model_copy(update={key: value})
-        return self.model_copy(update={**parts, "materials": kinds})
+        changed = dict[str, tuple[Record, dict[str, float]]]()
+        for name, value in values.items():
+            section, record = self._owner(name)
+            if record is not None:
+                changed.setdefault(section, (record, {}))[1][name.rpartition(".")[2]] = value
+        copies: dict[str, Any] = {
+            section: record.model_copy(update=own) for section, (record, own) in changed.items()
+        }
+        materials = {name: copies.pop(name, kind) for name, kind in self.materials.items()}
+        shape = copies.pop("probe", self.shape)
+        return self.model_copy(update={**copies, "shape": shape, MATERIALS: materials})
 
-    def field(self, name: str) -> tuple[str, str, type[Record]]:
-        """Return section, key and record of a name such as ``n_d`` or ``tip.height_um``.
+    def with_physics(self, effects: Iterable[str], where: str = "physics") -> Self:
+        """Return the probe with some effects beyond the paper, and no others.
 
         Raises
         ------
         InputError
-            If it is no key of a probe file; the nearest one is given.
+            If there is no such effect.
         """
-        section, dot, key = name.rpartition(".")
-        named = {material: type(kind) for material, kind in self.materials.items()}
-        wired = {f"circuit.{name}": Contact for name in self.layout().terminal_names}
-        records: dict[str, type[Record]] = {
-            "probe": type(self.shape),
-            **named,
-            **PARTS,
-            MATERIAL: type(self.material),
-            **wired,
-            **{f"layers.{key}": layer for key, layer in self.shape.layer_records().items()},
-        }
-        if dot and section not in records:
-            raise unknown_name("section", section, [*SECTIONS, *named, *wired])
-        keys = {part: [*record.model_fields] for part, record in records.items()}
-        # and the numbers that formulas name
-        for material, kind in self.materials.items():
-            keys[material] += kind.model_extra or {}
-        # in [probe] those of all shapes, its own first
-        keys["probe"] += [key for shape in PARAMETRIC.values() for key in shape.model_fields]
-        own = [part for part in PARTS if getattr(self, part)]
-        # those of a named material have its name before them
-        for part in [section] if dot else ["probe", *own, *PARTS]:
-            if key in keys[part] or (dot and records[part] is PriorTexts):
-                return part, key, records[part]
-        # a prior has the name of what it is of
-        dotted = {*named, *wired}
-        full = [f"{part}.{key}" if part in dotted else key for part in keys for key in keys[part]]
-        choices = keys[section] if dot else full
-        raise unknown_name("name", key, dict.fromkeys(choices))
+        return self.model_copy(update={"physics": Physics.of(effects, where)})

@@ -1,14 +1,17 @@
-"""What is around a lever (section ``[surroundings]`` of a probe file).
+"""What is around a lever, and the physics that counts.
 
-Everything outside the lever that takes up heat is at the base temperature.
+These are the sections ``[surroundings]`` and ``[physics]`` of a probe file. Everything outside the
+lever that takes up heat is at the base temperature.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal
 
 from pydantic import Field, model_validator
 
+from hotlever.errors import unknown_name
 from hotlever.materials.air import ATMOSPHERE, temperature_jump_length
 from hotlever.records import Record
 
@@ -100,3 +103,45 @@ class Surroundings(Record):
             return 0.0
         length, _ = temperature_jump_length(temperature_K, self.pressure_mbar, self.accommodation)
         return float(length)
+
+
+class Physics(Record):
+    """Effects that the paper leaves out; off unless they are asked for.
+
+    Examples
+    --------
+    >>> Physics(thermoelectric=True).effects
+    ('thermoelectric',)
+    """
+
+    thermoelectric: bool = Field(
+        default=False, description="heat that the current carries: Seebeck, Peltier and Thomson"
+    )
+    radiation: bool = Field(default=False, description="heat that the lever's surface radiates")
+
+    @classmethod
+    def of(cls, effects: Iterable[str], where: str) -> Physics:
+        """Return the physics with some effects on; no more are.
+
+        Raises
+        ------
+        InputError
+            If there is no such effect; the nearest name is given.
+        """
+        effects = tuple(effects)
+        for name in effects:
+            if name not in cls.model_fields:
+                raise unknown_name("effect", name, cls.model_fields, where)
+        return cls(**dict.fromkeys(effects, True))
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Those that are on."""
+        return tuple(name for name, on in self if on)
+
+    def __bool__(self) -> bool:
+        return bool(self.effects)
+
+
+#: The physics of the paper.
+THE_PAPERS = Physics()

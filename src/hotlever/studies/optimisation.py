@@ -20,6 +20,7 @@ from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
+from hotlever.probe.file_sections import field_of
 from hotlever.probe.parameters import parameters_of
 from hotlever.studies.working_point import (
     OF_THE_READER,
@@ -180,7 +181,7 @@ def _check(probe: Probe, quantity: str, bounds: Mapping[str, Bounds]) -> None:
             raise InputError(f"{name}: found {low:g} to {high:g}, expected a rising range")
         for end in (low, high) if name in numbers else ():
             if end is not None:
-                _, key, record = probe.field(name)
+                _, key, record = field_of(probe, name)
                 record.check_value(key, end, f"{name} = {end:g}")
     if not any(name not in QUANTITIES for name in bounds):
         raise InputError("found no number that may change, expected bounds of one at least")

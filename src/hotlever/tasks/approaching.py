@@ -8,8 +8,8 @@ import numpy as np
 
 from hotlever.datasets import csv_text, write_dataset
 from hotlever.errors import ComputationError, InputError, shown
-from hotlever.probe.contact import length_um
 from hotlever.probe.surroundings import Surroundings
+from hotlever.probe.tip import length_um
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
 from hotlever.tasks.ranges import parse_bias, parse_distances, parse_pressures

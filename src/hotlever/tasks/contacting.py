@@ -9,8 +9,7 @@ import numpy as np
 
 from hotlever.datasets import csv_text, write_dataset
 from hotlever.errors import InputError, as_far_as_possible, shown
-from hotlever.probe.contact import interface_of, length_um, parsed_layers
-from hotlever.probe.tip import EXAMPLE
+from hotlever.probe.tip import EXAMPLE, interface_of, length_um, parsed_layers
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import make_lever
 from hotlever.tasks.ranges import parse_bias

@@ -9,7 +9,7 @@ from hotlever.lever.discretisation import chosen_space
 from hotlever.materials.catalogue import curves, listing
 from hotlever.probe import Probe
 from hotlever.probe.drawing.outlines import DrawingError
-from hotlever.probe.summary import probe_text
+from hotlever.probe.text import probe_text
 from hotlever.tasks.design_requests import NEW_PROBES, NewRequest, ShowRequest
 from hotlever.tasks.files import draw
 from hotlever.tasks.probes import read_probe

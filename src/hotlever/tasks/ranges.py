@@ -93,7 +93,7 @@ def parse_distances(text: str) -> Array:
     >>> parse_distances("300nm:3um:4").round(6).tolist()
     [0.3, 1.2, 2.1, 3.0]
     """
-    from hotlever.probe.contact import length_um
+    from hotlever.probe.tip import length_um
 
     where = f"--distance {shown(text)}"
 

@@ -91,10 +91,12 @@ def parse_settings(texts: Sequence[str] | None, probe: Probe) -> dict[str, Any]:
     >>> parse_settings(["a0=9e-4", "chip=true", "medium=air", "tip.height_um=0.7"], probe)
     {'a0': 0.0009, 'chip': True, 'medium': 'air', 'tip.height_um': 0.7}
     """
+    from hotlever.probe.file_sections import field_of
+
     values: dict[str, Any] = {}
     keys = set[tuple[str, str]]()
     for name, text in parse_pairs("--set", texts).items():
-        section, key, record = probe.field(name)
+        section, key, record = field_of(probe, name)
         if (section, key) in keys:
             raise InputError(f"--set {name}: given twice, expected once")
         keys.add((section, key))

@@ -24,7 +24,7 @@ from hotlever.app.pages.plots import LivePlots, redraw
 from hotlever.errors import HotleverError, InputError
 from hotlever.lever.set_points import HELD
 from hotlever.materials.parameters import label
-from hotlever.probe.physics import Physics
+from hotlever.probe.surroundings import Physics
 from hotlever.tasks.ranges import parse_set_points
 
 #: Numbers of a state, those of the lever beside too.

@@ -15,7 +15,7 @@ from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.lever.space import Space
 from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind
-from hotlever.probe.physics import Physics
+from hotlever.probe.surroundings import Physics
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
