@@ -12,8 +12,7 @@ from hotlever.errors import InputError
 from hotlever.probe.drawing.layer_inference import FILM, Drawn, LayerInference, infer_layers
 from hotlever.probe.drawing.layers import BODY, DRAWN, HEATER, REQUIRED, SILICON, terminal_part
 from hotlever.probe.drawing.outlines import Ring
-from hotlever.probe.drawing.saving import relative
-from hotlever.probe.drawing.shape import TOLERANCE_UM
+from hotlever.probe.drawing.shape import TOLERANCE_UM, relative
 from hotlever.probe.drawing.sheet import (
     UNITS,
     Sheet,

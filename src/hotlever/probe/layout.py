@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from hotlever.materials import HIGH_DOPED
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from shapely import MultiPolygon, Polygon
 
 Point = tuple[float, float]
 
@@ -127,6 +130,13 @@ class Region:
     def rings(self) -> tuple[tuple[Point, ...], ...]:
         """The outline and the holes."""
         return (self.outline, *self.holes)
+
+    @property
+    def polygon(self) -> Polygon:
+        """It as a polygon of shapely."""
+        from shapely import Polygon  # not every process has a use for it
+
+        return Polygon(self.outline, self.holes)
 
     @property
     def edges(self) -> Array:
@@ -259,7 +269,9 @@ class Layout:
     @property
     def outline(self) -> list[list[Point]]:
         """The outer rings, and those of the holes, of all regions together (µm)."""
-        parts = getattr(self._polygon, "geoms", [self._polygon])
+        from shapely import get_parts
+
+        parts = get_parts(self.polygon)
         rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
         return [list(ring.coords) for ring in rings]
 
@@ -267,13 +279,14 @@ class Layout:
         """Return which of some points (µm), shape (n, 2), lie inside, and not on the edge."""
         from shapely import contains_xy
 
-        return np.asarray(contains_xy(self._polygon, points))
+        return np.asarray(contains_xy(self.polygon, points))
 
     @property
-    def _polygon(self) -> Any:
-        from shapely import Polygon, union_all
+    def polygon(self) -> Polygon | MultiPolygon:
+        """All of it as a polygon of shapely, or several."""
+        from shapely import union_all
 
-        return union_all([Polygon(region.outline, region.holes) for region in self.regions])
+        return union_all([region.polygon for region in self.regions])
 
     @property
     def terminal_names(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
@@ -14,9 +14,6 @@ from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.probe.layout import Layout
 from hotlever.records import Record
 from hotlever.types import Array, Mask
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
 #: Points that a line has unless it is said, and at most.
 _POINTS, _MOST_POINTS = 101, 1000
@@ -93,17 +90,16 @@ class Monitor(Record):
         if self.region is not None and not layout.named(self.region):
             names = dict.fromkeys(name for region in layout.regions for name in region.names)
             raise unknown_name("region", self.region, names, where)
-        if not on_lever(layout, np.reshape(self._ends, (-1, 2))).all():
-            import shapely
+        for x, y in self._ends:
+            if not on_lever(layout, [(x, y)]).all():
+                import shapely
 
-            for x, y in self._ends:
-                line = shapely.shortest_line(_seen_from_above(layout), shapely.Point(x, y))
-                if line.length > _ON_IT:
-                    near_x, near_y = line.coords[0]
-                    raise InputError(
-                        f"{where}: ({x:g}, {y:g}) µm lies off the lever, expected a place on it; "
-                        f"the nearest is ({near_x:.6g}, {near_y:.6g})"
-                    )
+                line = shapely.shortest_line(layout.polygon, shapely.Point(x, y))
+                near_x, near_y = line.coords[0]
+                raise InputError(
+                    f"{where}: ({x:g}, {y:g}) µm lies off the lever, expected a place on it; "
+                    f"the nearest is ({near_x:.6g}, {near_y:.6g})"
+                )
 
 
 class Monitors(Record):
@@ -152,17 +148,10 @@ class Monitors(Record):
             monitor.check(layout, f"{where}: {name}")
 
 
-def _seen_from_above(layout: Layout) -> BaseGeometry:
-    import shapely  # not every probe has monitors
-
-    return shapely.union_all(
-        [shapely.Polygon(region.outline, region.holes) for region in layout.regions]
-    )
-
-
 def on_lever(layout: Layout, points: Array | Sequence[Place]) -> Mask:
     """Return which points (n, 2) are on a lever, as far as rounding tells, (n,)."""
-    import shapely
+    import shapely  # not every probe has monitors
 
-    away = shapely.distance(_seen_from_above(layout), shapely.points(np.asarray(points)))
-    return np.asarray(away <= _ON_IT)
+    return np.asarray(
+        shapely.distance(layout.polygon, shapely.points(np.asarray(points))) <= _ON_IT
+    )

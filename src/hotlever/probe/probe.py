@@ -217,11 +217,12 @@ class Probe(ProbeParts):
         """
         if drawing is None:
             return write_text(path, self.to_toml())
-        from hotlever.probe.drawing.saving import save_drawing
-        from hotlever.probe.drawing.shape import DrawnShape
+        from hotlever.probe.drawing.parametric import drawn_shape
+        from hotlever.probe.drawing.shape import save_drawing
 
-        shape = save_drawing(self.shape, drawing, Path(path).parent)
-        return write_text(path, file_text(self, shape, DrawnShape.description()))
+        drawn = drawn_shape(self.shape)
+        sections = save_drawing(drawn, drawing, Path(path).parent)
+        return write_text(path, file_text(self, sections, drawn.description()))
 
     def draw(self, title: str = "") -> Figure:
         """Return a figure of the probe from above, with its heater, terminals and tip."""

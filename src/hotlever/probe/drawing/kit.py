@@ -20,8 +20,8 @@ from shapely import box as rectangle
 
 from hotlever.errors import InputError, quoted
 from hotlever.materials import LOW_DOPED
-from hotlever.probe.drawing.layers import AREA, DRAWN, SILICON, Rings
-from hotlever.probe.drawing.outlines import GRID, DrawingError, Ring, polygons
+from hotlever.probe.drawing.layers import AREA, DRAWN, SILICON
+from hotlever.probe.drawing.outlines import GRID, DrawingError, Ring, polygons, rings_of
 from hotlever.probe.layout import Layout, Point
 from hotlever.types import Array
 
@@ -229,7 +229,7 @@ def fillet(
         corners = corners[np.linalg.norm(points - corners, axis=2).argmin(axis=1)]
     rounded = []
     for part in shapely.get_parts(whole):
-        outline, *holes = (_rounded(ring, corners, radius_um, quarter) for ring in _rings(part))
+        outline, *holes = (_rounded(ring, corners, radius_um, quarter) for ring in rings_of(part))
         rounded.append(Polygon(outline, holes))
     return union(*rounded)
 
@@ -278,7 +278,7 @@ def _area(area: Any, what: str) -> Polygon | MultiPolygon:
         if area.is_valid:
             return area
         # says where, if it is one outline that is wrong
-        outlines = polygons(what, _rings(area), 0.0)
+        outlines = polygons(what, rings_of(area), 0.0)
         raise DrawingError("outlines that cross or touch each other", what, place=outlines[0])
     try:
         ring = tuple((float(x), float(y)) for x, y in area)
@@ -292,13 +292,4 @@ def _area(area: Any, what: str) -> Polygon | MultiPolygon:
 
 def _drawn(area: Any) -> Any:
     """Return outlines and holes of an area; the name of a layer, or a list of points, as it is."""
-    return _rings(area) if isinstance(area, Polygon | MultiPolygon) else area
-
-
-def _rings(area: Polygon | MultiPolygon) -> Rings:
-    """Return the outlines of an area, each with its holes after it."""
-    return tuple(
-        tuple((x, y) for x, y in ring.coords[:-1])
-        for part in shapely.get_parts(area)
-        for ring in (part.exterior, *part.interiors)
-    )
+    return rings_of(area) if isinstance(area, Polygon | MultiPolygon) else area

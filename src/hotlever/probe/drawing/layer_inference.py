@@ -11,11 +11,10 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.probe.drawing.contacts import outline_edges, terminal_edges
+from hotlever.probe.drawing.edges import outline_edges, terminal_edges
 from hotlever.probe.drawing.layers import BODY, HEATER, SILICON, terminal_part
 from hotlever.probe.drawing.outlines import DrawingError, Ring, healed, parts_of, polygons, snapped
 from hotlever.probe.drawing.partition import Partition, partitioned
-from hotlever.probe.drawing.shape import rings_of
 from hotlever.probe.drawing.sheet import Layer, Sheet
 from hotlever.probe.layout import Point
 
@@ -94,7 +93,7 @@ def _shapes(sheet: Sheet, tolerance: float, doubts: list[str]) -> dict[str, Base
         if not layer.rings:
             continue
         try:
-            areas = polygons(name, rings_of(sheet, layer), tolerance)
+            areas = polygons(name, sheet.rings(layer), tolerance)
             shapes[name] = healed(name, areas, tolerance)
         except DrawingError as error:
             doubts.append(f"layer {error}")
@@ -157,13 +156,11 @@ class _Silicon:
     def ends_of(self, name: str, sheet: Sheet, layer: Layer) -> bool:
         """Whether a layer touches the outline along an edge."""
         try:
-            return bool(terminal_edges(self.shape, {name: _terminal(sheet, layer)}, self.tolerance))
+            return bool(
+                terminal_edges(self.shape, {name: sheet.rings(layer, lines=True)}, self.tolerance)
+            )
         except DrawingError:
             return False
-
-
-def _terminal(sheet: Sheet, layer: Layer) -> tuple[Ring, ...]:
-    return rings_of(sheet, layer, lines=True)
 
 
 def _body_and_film(best: _Silicon, judged: list[_Silicon]) -> tuple[_Silicon, _Silicon | None]:
@@ -227,7 +224,7 @@ def _terminals(best: _Silicon, sheet: Sheet, inferred: LayerInference) -> None:
     given: dict[str, Drawn] = {name: name for name in best.touching}
     if len(given) == 1:
         (only,) = given
-        rings = _terminal(sheet, sheet.layers[only])
+        rings = sheet.rings(sheet.layers[only], lines=True)
         if len(rings) > 1:
             # several contacts on one layer
             given = {f"polygon {n} of {only}": (ring,) for n, ring in enumerate(rings, start=1)}
@@ -242,7 +239,7 @@ def _terminals(best: _Silicon, sheet: Sheet, inferred: LayerInference) -> None:
         inferred.doubts.append("no edges that could be terminals: supply and ground are missing")
         return
     rings_by = {
-        name: _terminal(sheet, sheet.layers[drawn]) if isinstance(drawn, str) else drawn
+        name: sheet.rings(sheet.layers[drawn], lines=True) if isinstance(drawn, str) else drawn
         for name, drawn in given.items()
     }
     try:

@@ -9,12 +9,12 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.probe.drawing.contacts import (
+from hotlever.probe.drawing.edges import (
+    Etching,
     check_apart,
     cut_away,
     terminal_edges,
 )
-from hotlever.probe.drawing.etching import Etching
 from hotlever.probe.drawing.layers import HEATER, REQUIRED, DrawnLayer, DrawnTerminal, terminal_part
 from hotlever.probe.drawing.outlines import (
     NARROWEST,
@@ -25,6 +25,7 @@ from hotlever.probe.drawing.outlines import (
     one_piece,
     parts_of,
     polygons,
+    rings_of,
     snapped,
 )
 from hotlever.probe.drawing.partition import Partition, Piece, partitioned
@@ -71,7 +72,7 @@ def build_layout(
     ------
     DrawingError
         If the drawing is at fault: an outline (`hotlever.probe.drawing.outlines`), a part
-        (`hotlever.probe.drawing.partition`) or a terminal (`hotlever.probe.drawing.contacts`).
+        (`hotlever.probe.drawing.partition`) or a terminal (`hotlever.probe.drawing.edges`).
     """
     by_name = {layer.name: layer for layer in layers}
     narrowest = NARROWEST * tolerance_um
@@ -210,10 +211,7 @@ def _regions(
         if layers[own].is_body:
             name = " at ".join([name, *([", ".join(here)] if here else [])])
         counts[name] = counts.get(name, 0) + 1
-        outline, *holes = (
-            tuple((float(x), float(y)) for x, y in ring.coords[:-1])
-            for ring in (piece.shape.exterior, *piece.shape.interiors)
-        )
+        outline, *holes = rings_of(piece.shape)
         taper, dopant_from = _taper(partition, layers, number, tolerance)
         made = Region(
             name if counts[name] == 1 else f"{name} {counts[name]}",

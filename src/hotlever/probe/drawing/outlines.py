@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
+from typing import Any
 
 import numpy as np
 import shapely
@@ -30,6 +32,8 @@ NARROWEST = 5.0
 _MOST_CORNERS = 2000
 #: Share of the tolerance by which a corner must stand out.
 STANDS_OUT = 0.25
+#: Angle (rad) of a corner below which nothing is meshed.
+_SHARPEST = math.radians(1.0)
 
 
 class DrawingError(InputError):
@@ -77,21 +81,19 @@ class DrawingError(InputError):
         start = f"{where}: " if where else ""
         super().__init__(f"{start}{', '.join(words)}: {what}")
 
-    def drawn_at(self, scale: float) -> DrawingError:
-        """Return the same with its place on the drawing, of which the lever is `scale` times."""
-        place = None if self.place is None else (self.place[0] / scale, self.place[1] / scale)
-        return DrawingError(self.what, self.part, self.polygon, place)
+    def again(self, **changes: Any) -> DrawingError:
+        """Return the same with another place, or with the file and all that is drawn in it."""
+        same = {name: getattr(self, name) for name in ("what", "part", "polygon", "place")}
+        return DrawingError(**{**same, **changes})
 
-    def of_file(
-        self, where: str, drawn: Mapping[str, str], outlines: Mapping[str, tuple[Ring, ...]]
-    ) -> DrawingError:
-        """Return the same with the file's name, the layers' names and all that is drawn."""
-        return DrawingError(
-            *(self.what, self.part, self.polygon, self.place),
-            outlines=outlines,
-            where=where,
-            drawn=drawn.get(self.part),
-        )
+
+def rings_of(shape: BaseGeometry) -> tuple[Ring, ...]:
+    """Return the outlines of a polygon or several, each with its holes after it."""
+    return tuple(
+        tuple((float(x), float(y)) for x, y in ring.coords[:-1])
+        for part in shapely.get_parts(shape)
+        for ring in (part.exterior, *part.interiors)
+    )
 
 
 def polygons(part: str, rings: Iterable[Ring], tolerance: float) -> list[Polygon]:
@@ -206,44 +208,33 @@ def one_piece(part: str, shape: BaseGeometry, drawn: list[Polygon]) -> Polygon:
         If it is in several pieces, with the place where the two nearest nearly touch.
     """
     pieces = sorted(parts_of(shape), key=lambda piece: -piece.area)
-    if len(pieces) == 1:
-        return pieces[0]
     if not pieces:
         raise DrawingError("no area", part)
-    others = pieces[1:]
-    apart = [pieces[0].distance(other) for other in others]
-    nearest = others[int(np.argmin(apart))]
-    point = shapely.shortest_line(nearest, pieces[0]).coords[0]
-    raise DrawingError(
-        f"{len(pieces)} pieces, {min(apart):.3g} µm apart, expected one piece",
-        part,
-        drawn,
-        point,
-    )
+    largest, *others = pieces
+    if others:
+        nearest = min(others, key=largest.distance)
+        apart = f"{len(pieces)} pieces, {largest.distance(nearest):.3g} µm apart"
+        point = shapely.shortest_line(nearest, largest).coords[0]
+        raise DrawingError(f"{apart}, expected one piece", part, drawn, point)
+    return largest
 
 
 def snapped(shape: BaseGeometry, outline: BaseGeometry, distance: float) -> BaseGeometry:
     """Return a shape whose corners and edges lie on an outline where they are near it."""
     near = shapely.snap(shape, outline, distance)
-    lines = outline if "Polygon" not in outline.geom_type else outline.boundary
+    lines = shapely.get_parts(outline.boundary if "Polygon" in outline.geom_type else outline)
 
     def onto(coordinates: Array) -> Array:
         points = shapely.points(coordinates)
-        along = shapely.line_locate_point(lines_of(lines), points[:, None])
-        feet = shapely.line_interpolate_point(lines_of(lines), along)
+        along = shapely.line_locate_point(lines, points[:, None])
+        feet = shapely.line_interpolate_point(lines, along)
         away = shapely.distance(feet, points[:, None])
-        best = away.argmin(axis=1)
-        rows = np.arange(len(points))
+        best, rows = away.argmin(axis=1), np.arange(len(points))
         moved = shapely.get_coordinates(feet[rows, best])
         return np.where((away[rows, best] < distance)[:, None], moved, coordinates)
 
     moved = shapely.transform(near, onto)
     return moved if moved.is_valid else shapely.make_valid(moved)
-
-
-def lines_of(shape: BaseGeometry) -> Array:
-    """Return the single lines of a line or several, shape (n,)."""
-    return np.asarray(shapely.get_parts(shape))
 
 
 def check_widths(part: str, shape: Polygon, drawn: list[Polygon], narrowest: float) -> None:
@@ -254,7 +245,7 @@ def check_widths(part: str, shape: Polygon, drawn: list[Polygon], narrowest: flo
     DrawingError
         With the place where it does.
     """
-    for ring, other in _ring_pairs(shape):
+    for ring, other in product((shape.exterior, *shape.interiors), repeat=2):
         starts = np.array(ring.coords)[:-1]
         ends = np.array(other.coords)
         edges = shapely.linestrings(np.stack([ends[:-1], ends[1:]], axis=1))
@@ -283,22 +274,10 @@ def check_widths(part: str, shape: Polygon, drawn: list[Polygon], narrowest: flo
     _check_angles(part, shape, drawn)
 
 
-def _ring_pairs(shape: Polygon) -> list[tuple[BaseGeometry, BaseGeometry]]:
-    rings = [shape.exterior, *shape.interiors]
-    return [(ring, other) for ring in rings for other in rings]
-
-
-#: Angle (rad) of a corner below which nothing is meshed.
-_SHARPEST = math.radians(1.0)
-
-
 def _check_angles(part: str, shape: Polygon, drawn: list[Polygon]) -> None:
     for ring in (shape.exterior, *shape.interiors):
         corners = np.array(ring.coords)[:-1]
-        before, after = (
-            np.roll(corners, 1, axis=0) - corners,
-            np.roll(corners, -1, axis=0) - corners,
-        )
+        before, after = (np.roll(corners, way, axis=0) - corners for way in (1, -1))
         cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
         angle = np.abs(np.arctan2(cross, (before * after).sum(axis=1)))
         if angle.min() < _SHARPEST:

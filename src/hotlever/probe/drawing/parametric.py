@@ -198,3 +198,12 @@ def _drawn(shape: ParametricDrawing) -> DrawnShape:
     sections = drawing.sections()
     sections["probe"][EDGE_BIAS] = shape.edge_bias_um
     return DrawnShape.read(sections, name, None, dict(shape.kinds))
+
+
+def drawn_shape(shape: Shape) -> DrawnShape:
+    """Return any shape as it would be drawn."""
+    if isinstance(shape, DrawnShape):
+        return shape
+    if isinstance(shape, ParametricDrawing):
+        return shape.drawn
+    return DrawnShape.read(Drawing.of_layout(shape.layout()).sections(), shape.shape)

@@ -12,7 +12,7 @@ from shapely import LineString, MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from hotlever.probe.drawing.contacts import outline_edges
+from hotlever.probe.drawing.edges import line_of, outline_edges
 from hotlever.probe.drawing.outlines import GRID, DrawingError, parts_of
 from hotlever.probe.layout import BorderTaper, Point, Taper, Terminal
 from hotlever.types import Array
@@ -77,7 +77,7 @@ class Partition:
         """Return the numbers of the pieces that each terminal touches."""
         pieces: dict[str, set[int]] = {}
         for end in ends:
-            edge = LineString([end.start, end.end])
+            edge = line_of(end)
             along = [piece.shape.boundary.intersection(edge).length for piece in self.pieces]
             touched = {number for number, length in enumerate(along) if length > tolerance}
             middle = edge.interpolate(0.5, normalized=True)

@@ -1,19 +1,20 @@
-"""The shape of a probe file that is drawn in a file."""
+"""The shape of a probe file that is drawn in a file, read and written."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
 from hotlever.errors import InputError, quoted
-from hotlever.probe.drawing.contacts import covered
+from hotlever.files import whole_file
+from hotlever.probe.drawing.edges import covered
 from hotlever.probe.drawing.layers import (
+    AREA,
     DRAWN,
     DrawnLayer,
     DrawnTerminal,
@@ -23,10 +24,9 @@ from hotlever.probe.drawing.layers import (
     terminal_values,
 )
 from hotlever.probe.drawing.layout_builder import build_layout
-from hotlever.probe.drawing.outlines import DrawingError, Ring, without_nested
+from hotlever.probe.drawing.outlines import DrawingError, Ring, parts_of, polygons, together
 from hotlever.probe.drawing.sheet import (
     FARTHEST_UM,
-    Layer,
     Sheet,
     doubt,
     extent_of,
@@ -40,6 +40,11 @@ from hotlever.records import Record
 
 #: What is nearer is the same (µm), unless a probe file says otherwise.
 TOLERANCE_UM = 0.002
+#: Steps of the coordinates (µm), and how many of them a file counts.
+GRID_UM, _MOST_STEPS = 1e-4, 2**31 - 1
+_CELL = "LEVER"
+#: Number of the layer of the first terminal, if there are not more of others.
+_TERMINALS = 10
 
 
 #: A place that is drawn, and an outline or a line, as lists or tuples (µm).
@@ -147,7 +152,8 @@ class DrawnShape(DrawingFile, Shape):
         try:
             layout = build_layout(layers, terminals, tip, self.tolerance_um, self.edge_bias_um)
         except DrawingError as error:
-            raise error.drawn_at(self.scale) from None
+            place = error.place and (error.place[0] / self.scale, error.place[1] / self.scale)
+            raise error.again(place=place) from None
         return replace(layout, thickness_um=self.thickness_um)
 
     def notes(self) -> list[str]:
@@ -218,7 +224,8 @@ class DrawnShape(DrawingFile, Shape):
         except DrawingError as error:
             file = where if sheet is None else sheet.file
             outlines = {part.part: part.drawn for part in (*made, *ends)}
-            raise error.of_file(file, named, outlines) from None
+            drawn = named.get(error.part)
+            raise error.again(where=file, drawn=drawn, outlines=outlines) from None
 
 
 def _check_unit(sheet: Sheet, body: DrawnLayer) -> None:
@@ -244,26 +251,19 @@ def _section(sections: Mapping[str, Any], name: str, where: str) -> dict[str, An
     return dict(sections[name])
 
 
-def rings_of(sheet: Sheet, layer: Layer, *, lines: bool = False) -> Rings:
-    """Return the outlines of a layer; with `lines` the steps of open ones too."""
-    closed = layer.rings if sheet.kind == "DXF" else without_nested(layer.rings)
-    steps = (step for line in layer.lines for step in pairwise(line))
-    return (*closed, *steps) if lines else closed
-
-
 def _rings(sheet: Sheet | None, given: Any, name: str, where: str, section: str) -> Rings:
     """Return the outlines of a layer, of a list of points or of a list of such lists."""
     if sheet is not None and isinstance(given, str):
         layer = sheet.layer(given, where)
         if section == "terminals":
-            return rings_of(sheet, layer, lines=True)
+            return sheet.rings(layer, lines=True)
         if layer.lines:
             x, y = layer.lines[0][0]
             raise InputError(
                 f"{sheet.file}: {name} (layer {given}), at ({x:.3f}, {y:.3f}) µm: an outline that "
                 "is not closed"
             )
-        return rings_of(sheet, layer)
+        return sheet.rings(layer)
     for outlines in ([given], given) if isinstance(given, list | tuple) and given else ():
         try:
             return tuple(map(_OUTLINE.validate_python, outlines))
@@ -273,3 +273,78 @@ def _rings(sheet: Sheet | None, given: Any, name: str, where: str, section: str)
         f'{where} = {quoted(given)}: expected a layer such as "1/0", or points such as '
         "[[0.0, -1.5], [0.0, 1.5]] (µm)"
     )
+
+
+# --- written --------------------------------------------------------------------------------------
+
+
+def save_drawing(drawn: DrawnShape, path: str | os.PathLike[str], folder: Path) -> dict[str, Any]:
+    """Write a drawing as GDSII, whole or not at all, for mask shops and other programs.
+
+    Parameters
+    ----------
+    drawn : DrawnShape
+    path : path
+    folder : path
+        Where the probe file will stand.
+
+    Returns
+    -------
+    dict
+        Its sections of a probe file, which name the drawing and its layers. Terminals that are
+        lines stay lists of points: a GDSII file has areas only.
+
+    Raises
+    ------
+    DrawingError
+        If it is farther from the origin than such a file can say.
+    """
+    # imported here: it is needed to write only, files are read in processes of their own
+    import gdstk
+
+    library = gdstk.Library("hotlever", unit=1e-6, precision=1e-6 * GRID_UM)
+    cell, sections = library.new_cell(_CELL), drawn.sections()
+    sections["probe"] |= {
+        "file": relative(Path(path), folder),
+        "cell": _CELL,
+        # finer than the steps nothing is the same
+        "tolerance_um": max(drawn.tolerance_um, TOLERANCE_UM),
+    }
+
+    def added(name: str, rings: Rings, number: int) -> str:
+        farthest = max(max(map(abs, point)) for ring in rings for point in ring)
+        if farthest > _MOST_STEPS * GRID_UM:
+            what = f"{farthest:g} µm from the origin, expected {_MOST_STEPS * GRID_UM:.0f} µm"
+            raise DrawingError(f"{what} at most", name)
+        for area in parts_of(together(polygons(name, rings, 0.0))):
+            outline, *holes = (
+                gdstk.Polygon(ring.coords[:-1], layer=number)
+                for ring in (area.exterior, *area.interiors)
+            )
+            if holes:
+                # an outline that runs along itself, around its holes
+                cell.add(*gdstk.boolean(outline, holes, "not", GRID_UM, layer=number))
+            else:
+                cell.add(outline)
+        return f"{number}/0"
+
+    for number, layer in enumerate(drawn.layers, start=1):
+        drawn_as = added(layer.name, layer.drawn, number)
+        whole = sections["layers"][layer.name]
+        sections["layers"][layer.name] = drawn_as if layer.is_plain else whole | {DRAWN: drawn_as}
+    first = max(_TERMINALS, len(drawn.layers) + 1)
+    for number, end in enumerate(drawn.terminals, start=first):
+        if all(len(ring) > 2 for ring in end.drawn):
+            drawn_as = added(end.part, end.drawn, number)
+            sections["terminals"][end.name] = {AREA: drawn_as} if end.by_area else drawn_as
+    with whole_file(path) as temporary:
+        library.write_gds(temporary, max_points=0)
+    return sections
+
+
+def relative(path: Path, folder: Path) -> str:
+    """Return the name of a file as a file in some folder names it."""
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # on another drive
+        return path.resolve().as_posix()

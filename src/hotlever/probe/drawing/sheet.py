@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from shapely import LineString
 
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_bytes
-from hotlever.probe.drawing.outlines import Ring
+from hotlever.probe.drawing.outlines import Ring, rings_of, without_nested
 from hotlever.probe.layout import Point
 
 #: Bytes that a file may have, and of memory and seconds that reading it may take.
@@ -94,6 +95,12 @@ class Sheet:
         if name not in self.layers:
             raise unknown_name("layer", name, sorted(self.layers), where)
         return self.layers[name]
+
+    def rings(self, layer: Layer, *, lines: bool = False) -> tuple[Ring, ...]:
+        """Return the outlines of a layer; with `lines` the steps of open ones too."""
+        closed = layer.rings if self.kind == "DXF" else without_nested(layer.rings)
+        steps = (step for line in layer.lines for step in pairwise(line))
+        return (*closed, *steps) if lines else closed
 
 
 def read_sheet(
@@ -208,10 +215,7 @@ def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...]
     met = [(next(ends), *line[1:-1], next(ends)) for line in lines]
     some = [LineString(line) for line in met if len(set(line)) > 1]
     closed, cuts, dangles, _ = shapely.polygonize_full(some)
-    rings = tuple(
-        tuple((x, y) for x, y in polygon.exterior.coords[:-1])
-        for polygon in shapely.get_parts(closed)
-    )
+    rings = tuple(rings_of(polygon)[0] for polygon in shapely.get_parts(closed))
     rest = [line for group in (cuts, dangles) for line in shapely.get_parts(group)]
     return rings, tuple(tuple((x, y) for x, y in line.coords) for line in rest)
 
