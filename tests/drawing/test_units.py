@@ -58,7 +58,7 @@ def test_a_drawing_in_mm_that_states_no_unit_is_doubted_and_read_in_mm(run, tmp_
     assert (status, err) == (0, "")
     assert "one unit of the file is 1000 µm" in out
     # the unit is in the probe file, so that the drawing is read in it again
-    assert "unit_um = 1000.0" in (tmp_path / "own.toml").read_text(encoding="utf-8")
+    assert "unit_um = 1000 " in (tmp_path / "own.toml").read_text(encoding="utf-8")
     assert area(Probe.from_file(tmp_path / "own.toml")) == pytest.approx(lever_um2, rel=1e-6)
     assert run("sweep", "own.toml", "--bias", "4:4:1")[0] == 0
 

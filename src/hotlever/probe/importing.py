@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,10 +23,11 @@ from hotlever.probe.drawing.sheet import (
     read_sheet,
     sensible_unit,
 )
-from hotlever.probe.layout import Point, ring_area
+from hotlever.probe.layout import ring_area
 from hotlever.probe.parts import MATERIAL
 from hotlever.probe.probe import Probe
-from hotlever.probe.text import commented, other_sections, section_lines
+from hotlever.probe.shapes import DRAWING
+from hotlever.probe.text import other_sections, section_lines
 from hotlever.text import aligned, as_toml
 
 #: Layers that are listed.
@@ -36,7 +38,7 @@ _ASSUMED = {
     FILM: {"kind": "metal-film", "preset": "Pd"},
 }
 _FILM_UM = 0.05
-_UNSAID = "assumed: a drawing does not say"
+_UNSAID, _MISSING = "assumed: a drawing does not say", "not found in the drawing, such as {}"
 
 
 @dataclass(frozen=True)
@@ -191,32 +193,28 @@ def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:
 def _probe_file(
     sheet: Sheet, inference: LayerInference, listing: list[str], name: str, unit: str | None
 ) -> str:
-    reference = Probe.reference()
+    reference, reasons = Probe.reference(), inference.reasons
+    probe: dict[str, object] = {"shape": DRAWING, "file": name}
+    if sheet.cell is not None:
+        probe["cell"] = sheet.cell
+    if unit is not None or not sheet.unit_stated:
+        probe["unit_um"] = sheet.unit_um
+    probe |= {"thickness_um": reference.layout().thickness_um, "tip_um": inference.tip}
+    meaning = {
+        "unit_um": "the file does not say" if unit is None else f"as the import was told: {unit}",
+        "thickness_um": "that of the reference probe: a drawing does not say",
+        "tip_um": reasons.get("tip", _MISSING.format("[0.0, 0.0]")),
+    }
     lines = ["# A hotlever probe file: lengths in µm, temperatures in K.", "#"]
     lines += [f"# {line}" for line in listing]
-    lines += ["", "[probe]", 'shape = "drawing"', f"file = {as_toml(name)}"]
-    if sheet.cell is not None:
-        lines.append(f"cell = {as_toml(sheet.cell)}")
-    if unit is not None or not sheet.unit_stated:
-        why = "the file does not say" if unit is None else f"as the import was told: {unit}"
-        lines.append(commented(f"unit_um = {sheet.unit_um}", why))
-    lines.append(
-        f"thickness_um = {reference.layout().thickness_um:<17g}# that of the reference probe: a "
-        "drawing does not say"
-    )
-    lines.append(_entry("tip_um", inference.tip, inference.reasons.get("tip"), (0.0, 0.0)))
-    reasons = inference.reasons
+    lines += section_lines("probe", probe, meaning, optional=True)
     has_film = FILM in inference.layers
     if has_film:
         lines += _film_sections(inference)
     else:
-        lines += ["", "[layers]"]
-        for role in dict.fromkeys((SILICON, HEATER, *inference.layers)):
-            lines.append(_entry(role, inference.layers.get(role), reasons.get(role), "1/0"))
-    lines += ["", "[terminals]"]
-    for role in dict.fromkeys((*REQUIRED, *inference.terminals)):
-        reason = reasons.get(terminal_part(role))
-        lines.append(_entry(role, inference.terminals.get(role), reason, "10/0"))
+        lines += _drawn_lines("layers", (SILICON, HEATER), inference.layers, reasons, "1/0")
+    ends = {role: reasons.get(terminal_part(role), "") for role in inference.terminals}
+    lines += _drawn_lines("terminals", REQUIRED, inference.terminals, ends, "10/0")
     without = (MATERIAL,) if has_film else ()
     return "\n".join(lines) + "\n" + other_sections(reference, without)
 
@@ -235,10 +233,19 @@ def _film_sections(inference: LayerInference) -> list[str]:
     return lines
 
 
-def _entry(key: str, value: Drawn | Point | None, reason: str | None, example: object) -> str:
-    """Return a line of the probe file; where nothing is proposed, a comment in its place."""
-    if value is None:
-        return f"# {key} = {as_toml(example)}    # not found in the drawing"
-    one_outline = isinstance(value, tuple) and len(value) == 1
-    entry = f"{key} = {as_toml(value[0] if one_outline else value)}"
-    return commented(entry, reason)
+def _drawn_lines(
+    section: str,
+    required: tuple[str, ...],
+    found: Mapping[str, Drawn],
+    reasons: Mapping[str, str],
+    example: str,
+) -> list[str]:
+    """Return a section of what was found in a drawing; what is missing stands in a comment."""
+    drawn: dict[str, Drawn | None] = dict.fromkeys(required) | dict(found)
+    values = {
+        role: each[0] if isinstance(each, tuple) and len(each) == 1 else each
+        for role, each in drawn.items()
+    }
+    missing = _MISSING.format(as_toml(example))
+    meaning = {role: reasons.get(role, "") if role in found else missing for role in drawn}
+    return section_lines(section, values, meaning, optional=True)

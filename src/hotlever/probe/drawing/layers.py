@@ -126,22 +126,39 @@ def layer_values(
     InputError
         If the body or a heater is missing, a key is wrong, or a material does not exist.
     """
-    if (SILICON in section) == (BODY in section):
-        if SILICON in section:
-            raise InputError(
-                f"{where}: {SILICON} and {BODY}: expected one of them, the outline of the lever"
-            )
+    if SILICON in section and BODY in section:
+        raise InputError(
+            f"{where}: {SILICON} and {BODY}: expected one of them, the outline of the lever"
+        )
+    body = BODY if BODY in section else SILICON
+    if body not in section:
         raise _missing(SILICON, section, where)
+    named = {name for name, given in section.items() if isinstance(given, Mapping)}
     layers = {}
     for name, given in section.items():
-        if isinstance(given, Mapping):
+        if name in named:
             own = _of_material(given, kinds, f"{where.removesuffix(']')}.{name}]")
-        elif name in (SILICON, BODY):
+        elif name == body:
             own = {DRAWN: given, "material": HIGH_DOPED, "kind": "high-doped-silicon"}
         else:
             own = {DRAWN: given, "material": LOW_DOPED, "kind": "n-silicon"}
         layers[name] = {"name": name, **own}
-    _check_roles(layers, [name for name in section if isinstance(section[name], Mapping)], where)
+    if BODY in section and BODY not in named:
+        raise InputError(
+            f'{where}: {BODY}: expected a section [layers.{BODY}] with drawn = "1/0" and material'
+        )
+    if layers[body].get("thickness_um") is not None:
+        raise InputError(
+            f"{where}: {body}: thickness_um of the body stands in [probe], expected it there only"
+        )
+    if HEATER not in layers and not named:
+        raise InputError(f"{where}: {HEATER} is missing")
+    low_doped = next((name for name in layers if name != body and name not in named), None)
+    if low_doped and not issubclass(KINDS[layers[body]["kind"]], HighDopedSilicon):
+        raise InputError(
+            f"{where}: {low_doped}: without a material it is low-doped silicon, which "
+            f"{body} is not the surroundings of; expected a section [layers.{low_doped}]"
+        )
     return layers
 
 
@@ -171,28 +188,6 @@ def _of_material(given: Mapping[str, Any], kinds: Mapping[str, str], where: str)
     return {**given, "kind": kinds[material]}
 
 
-def _check_roles(layers: Mapping[str, dict[str, Any]], named: list[str], where: str) -> None:
-    """Refuse layers that make no lever; `named` are those of a material of their own."""
-    body = SILICON if SILICON in layers else BODY
-    if body == BODY and BODY not in named:
-        raise InputError(
-            f'{where}: {BODY}: expected a section [layers.{BODY}] with drawn = "1/0" and material'
-        )
-    if layers[body].get("thickness_um") is not None:
-        raise InputError(
-            f"{where}: {body}: thickness_um of the body stands in [probe], expected it there only"
-        )
-    if HEATER not in layers and not named:
-        raise InputError(f"{where}: {HEATER} is missing")
-    if not issubclass(KINDS[layers[body]["kind"]], HighDopedSilicon):
-        for name in layers:
-            if name != body and name not in named:
-                raise InputError(
-                    f"{where}: {name}: without a material it is low-doped silicon, which "
-                    f"{body} is not the surroundings of; expected a section [layers.{name}]"
-                )
-
-
 def terminal_values(section: Mapping[str, Any], where: str) -> dict[str, dict[str, Any]]:
     """Return what ``[terminals]`` says of each terminal, its outlines as they are given.
 
@@ -207,10 +202,10 @@ def terminal_values(section: Mapping[str, Any], where: str) -> dict[str, dict[st
     terminals = {}
     for name, given in section.items():
         by_area, here = isinstance(given, Mapping), f"{where.removesuffix(']')}.{name}]"
-        for key in given if by_area else ():
-            if key != AREA:
-                raise unknown_name("key", key, (AREA,), here)
-        if by_area and AREA not in given:
+        others = [key for key in given if key != AREA] if by_area else []
+        if others:
+            raise unknown_name("key", others[0], (AREA,), here)
+        if by_area and not given:
             raise InputError(f"{here}: {AREA} is missing")
         drawn = given[AREA] if by_area else given
         terminals[name] = {"name": name, DRAWN: drawn, "by_area": by_area}

@@ -201,17 +201,14 @@ class DrawnShape(DrawingFile, Shape):
             _section(sections, "layers", where), kinds or {}, f"{where}: [layers]"
         )
         terminals = terminal_values(_section(sections, "terminals", where), f"{where}: [terminals]")
-        given = {name: part[DRAWN] for name, part in layers.items()} | {
-            terminal_part(name): part[DRAWN] for name, part in terminals.items()
-        }
-        named = {part: layer for part, layer in given.items() if isinstance(layer, str)}
+        parts = layers | {terminal_part(name): end for name, end in terminals.items()}
+        named = {part: own[DRAWN] for part, own in parts.items() if isinstance(own[DRAWN], str)}
         stated = {key: values[key] for key in DrawingFile.model_fields if key in values}
         sheet = DrawingFile.from_values(stated, here).sheet(here, folder) if named else None
-        for section, parts in (("layers", layers), ("terminals", terminals)):
-            for name, part in parts.items():
-                part[DRAWN] = _rings(
-                    sheet, part[DRAWN], name, f"{where}: [{section}] {name}", section
-                )
+        for own in layers.values():
+            own[DRAWN] = _rings(sheet, own, f"{where}: [layers] {own['name']}")
+        for own in terminals.values():
+            own[DRAWN] = _rings(sheet, own, f"{where}: [terminals] {own['name']}", lines=True)
         made = tuple(
             DrawnLayer.from_values(layer, f"{where}: [layers.{name}]")
             for name, layer in layers.items()
@@ -222,10 +219,11 @@ class DrawnShape(DrawingFile, Shape):
                 _check_unit(sheet, next(layer for layer in made if layer.is_body))
             return cls.from_values({**values, "layers": made, "terminals": ends}, here)
         except DrawingError as error:
-            file = where if sheet is None else sheet.file
-            outlines = {part.part: part.drawn for part in (*made, *ends)}
-            drawn = named.get(error.part)
-            raise error.again(where=file, drawn=drawn, outlines=outlines) from None
+            raise error.again(
+                where=where if sheet is None else sheet.file,
+                drawn=named.get(error.part),
+                outlines={part.part: part.drawn for part in (*made, *ends)},
+            ) from None
 
 
 def _check_unit(sheet: Sheet, body: DrawnLayer) -> None:
@@ -236,10 +234,10 @@ def _check_unit(sheet: Sheet, body: DrawnLayer) -> None:
     DrawingError
         With the unit in which it would be a lever.
     """
-    extent, unit_um = extent_of(body.drawn), sheet.unit_um
+    extent = extent_of(body.drawn)
     if not is_lever(extent):
-        unit = sensible_unit(extent, unit_um)
-        words = doubt(extent, unit_um, unit, "unit_um = {unit_um:g} in [probe]")
+        unit = sensible_unit(extent, sheet.unit_um)
+        words = doubt(extent, sheet.unit_um, unit, "unit_um = {unit_um:g} in [probe]")
         raise DrawingError(words, body.name)
 
 
@@ -251,19 +249,20 @@ def _section(sections: Mapping[str, Any], name: str, where: str) -> dict[str, An
     return dict(sections[name])
 
 
-def _rings(sheet: Sheet | None, given: Any, name: str, where: str, section: str) -> Rings:
+def _rings(
+    sheet: Sheet | None, own: Mapping[str, Any], where: str, *, lines: bool = False
+) -> Rings:
     """Return the outlines of a layer, of a list of points or of a list of such lists."""
+    given = own[DRAWN]
     if sheet is not None and isinstance(given, str):
         layer = sheet.layer(given, where)
-        if section == "terminals":
-            return sheet.rings(layer, lines=True)
-        if layer.lines:
+        if layer.lines and not lines:
             x, y = layer.lines[0][0]
             raise InputError(
-                f"{sheet.file}: {name} (layer {given}), at ({x:.3f}, {y:.3f}) µm: an outline that "
-                "is not closed"
+                f"{sheet.file}: {own['name']} (layer {given}), at ({x:.3f}, {y:.3f}) µm: an "
+                "outline that is not closed"
             )
-        return sheet.rings(layer)
+        return sheet.rings(layer, lines=lines)
     for outlines in ([given], given) if isinstance(given, list | tuple) and given else ():
         try:
             return tuple(map(_OUTLINE.validate_python, outlines))
