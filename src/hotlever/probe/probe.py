@@ -12,12 +12,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.files import write_text
 from hotlever.materials import Kind
 from hotlever.materials.sections import remade
-from hotlever.probe.file_sections import (
-    changed_sections,
-    check_together,
-    parts_of,
-    read_sections,
-)
+from hotlever.probe.file_sections import changed_sections, check_together, parts_of, read_sections
 from hotlever.probe.monitors import Monitor, Monitors
 from hotlever.probe.parts import MATERIAL, MATERIALS, ProbeParts
 from hotlever.probe.shapes import ThreeLeg, UShape

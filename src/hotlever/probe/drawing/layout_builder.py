@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections import Counter
 from functools import lru_cache
 
 import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from hotlever.probe.drawing.edges import (
-    Etching,
-    check_apart,
-    cut_away,
-    terminal_edges,
-)
+from hotlever.materials import HIGH_DOPED
+from hotlever.probe.drawing.edges import Etching, check_apart, cut_away, terminal_edges
 from hotlever.probe.drawing.layers import HEATER, REQUIRED, DrawnLayer, DrawnTerminal, terminal_part
 from hotlever.probe.drawing.outlines import (
     NARROWEST,
     DrawingError,
-    Ring,
     check_widths,
     healed,
     one_piece,
@@ -29,17 +24,8 @@ from hotlever.probe.drawing.outlines import (
     snapped,
 )
 from hotlever.probe.drawing.partition import Partition, Piece, partitioned
-from hotlever.probe.drawing.sheet import LARGEST_UM, SMALLEST_UM, extent_of
-from hotlever.probe.layout import (
-    BorderTaper,
-    Film,
-    Layout,
-    Part,
-    Point,
-    Region,
-    Taper,
-    Terminal,
-)
+from hotlever.probe.drawing.sheet import LARGEST_UM, SMALLEST_UM, extent_of, is_lever
+from hotlever.probe.layout import BorderTaper, Film, Layout, Part, Point, Region, Taper, Terminal
 from hotlever.probe.mesh import MOST_SQUARES
 
 #: Outlines nearer than so many tolerances to that of the body are the same.
@@ -75,80 +61,65 @@ def build_layout(
         (`hotlever.probe.drawing.partition`) or a terminal (`hotlever.probe.drawing.edges`).
     """
     by_name = {layer.name: layer for layer in layers}
-    narrowest = NARROWEST * tolerance_um
+    by_area = [end for end in terminals if end.by_area]
+    narrowest, snap = NARROWEST * tolerance_um, _SNAP * tolerance_um
     body = next(layer.name for layer in layers if layer.is_body)
-    _check_extent(body, by_name[body].drawn)
-    drawn = {layer.name: polygons(layer.name, layer.drawn, tolerance_um) for layer in layers}
+    rings = by_name[body].drawn
+    if not is_lever(extent := extent_of(rings)):
+        what = f"{extent:.4g} µm long, expected {SMALLEST_UM:g} to {LARGEST_UM:g} µm"
+        raise DrawingError(f"{what}; are unit and scale right?", body, place=rings[0][0])
+    drawn = {each.part: polygons(each.part, each.drawn, tolerance_um) for each in layers}
     outline = one_piece(body, healed(body, drawn[body], tolerance_um), drawn[body])
     check_widths(body, outline, drawn[body], narrowest)
-    by_area = {terminal.part: terminal for terminal in terminals if terminal.by_area}
-    drawn |= {name: polygons(name, end.drawn, tolerance_um) for name, end in by_area.items()}
-    on_body = {
-        name: healed(name, areas, tolerance_um) for name, areas in drawn.items() if name != body
+    drawn |= {end.part: polygons(end.part, end.drawn, tolerance_um) for end in by_area}
+    shapes = {
+        part: healed(part, areas, tolerance_um) for part, areas in drawn.items() if part != body
     }
-    for name in on_body:
-        _check_on_body(name, drawn[name], body, outline, tolerance_um)
-    contacts = {end.name: on_body.pop(name) for name, end in by_area.items()}
-    shapes = on_body
+    for part in shapes:
+        for number, area in enumerate(drawn[part], start=1):
+            inside = parts_of(area.intersection(outline))
+            if not any(piece.area > tolerance_um**2 for piece in inside):
+                raise DrawingError(f"it lies outside the {body}", part, number, area)
     edges = {end.name: end.drawn for end in terminals if not end.by_area}
     ends = terminal_edges(outline, edges, tolerance_um)
     if edge_bias_um:
         etching = Etching(body, outline, ends, edge_bias_um, tolerance_um)
-        shapes, contacts = (
-            {
-                name: etching.layer(snapped(shape, outline, _SNAP * tolerance_um))
-                for name, shape in group.items()
-            }
-            for group in (shapes, contacts)
-        )
+        for part, shape in shapes.items():
+            shapes[part] = etching.layer(snapped(shape, outline, snap))
         outline, ends = etching.outline, etching.ends
         check_widths(body, outline, drawn[body], narrowest)
+    contacts = {end.name: snapped(shapes.pop(end.part), outline, snap) for end in by_area}
     near = [outline]
     for name, shape in shapes.items():
         for below in near:
-            shape = snapped(shape, below, _SNAP * tolerance_um)
+            shape = snapped(shape, below, snap)
         shapes[name] = shape
         # parts lie apart from each other, films on all that is below
         if by_name[name].is_film:
             near.append(shape)
     borders = {name: shape.boundary for name, shape in shapes.items()}
     if contacts:
-        contacts = {
-            name: snapped(area, outline, _SNAP * tolerance_um) for name, area in contacts.items()
-        }
         borders |= {terminal_part(name): area.boundary for name, area in contacts.items()}
         outline, ends = cut_away(body, outline, contacts, ends, tip)
         check_apart(ends)
     films = {name: shape for name, shape in shapes.items() if by_name[name].is_film}
     parts = {name: shape for name, shape in shapes.items() if name not in films}
-    partition = partitioned((body, _with_corners(outline, ends)), parts, films)
+    # the body has a corner wherever a terminal begins or ends
+    corners = shapely.MultiPoint([point for end in ends for point in (end.start, end.end)])
+    partition = partitioned((body, shapely.snap(outline, corners, 1e-6)), parts, films)
     for piece in partition.pieces:
         _check_piece(piece, borders, drawn, narrowest)
     regions = _regions(partition, by_name, ends, tolerance_um)
-    for region, piece in zip(regions, partition.pieces, strict=True):
+    for region in regions:
         squares = region.area / region.narrow_um**2
-        if HEATER in piece.layers and squares > MOST_SQUARES:
+        if HEATER in region.layers and squares > MOST_SQUARES:
+            what = f"{region.narrow_um:.3g} µm wide and {squares:.0f} times as long, expected at "
             raise DrawingError(
-                f"{region.narrow_um:.3g} µm wide and {squares:.0f} times as long, expected at most "
-                f"{MOST_SQUARES:g}",
-                HEATER,
-                drawn[HEATER],
-                piece.shape,
+                f"{what}most {MOST_SQUARES:g}", HEATER, drawn[HEATER], region.polygon
             )
     if not outline.contains(shapely.Point(tip)):
         raise DrawingError(f"it lies outside the {body}", "tip_um", place=tip)
     return Layout(tuple(regions), tuple(ends), tip, 1.0)
-
-
-def _check_extent(body: str, rings: tuple[Ring, ...]) -> None:
-    extent = extent_of(rings)
-    if not SMALLEST_UM <= extent <= LARGEST_UM:
-        raise DrawingError(
-            f"{extent:.4g} µm long, expected {SMALLEST_UM:g} to {LARGEST_UM:g} µm; are unit and "
-            "scale right?",
-            body,
-            place=rings[0][0],
-        )
 
 
 def _check_piece(
@@ -177,21 +148,6 @@ def _check_piece(
         ) from None
 
 
-def _check_on_body(
-    name: str, areas: list[Polygon], body: str, outline: Polygon, tolerance: float
-) -> None:
-    for number, area in enumerate(areas, start=1):
-        inside = area.intersection(outline)
-        if not any(piece.area > tolerance**2 for piece in parts_of(inside)):
-            raise DrawingError(f"it lies outside the {body}", name, number, area)
-
-
-def _with_corners(silicon: Polygon, ends: list[Terminal]) -> Polygon:
-    """Return the silicon with a corner wherever a terminal begins or ends."""
-    corners = shapely.MultiPoint([point for end in ends for point in (end.start, end.end)])
-    return shapely.snap(silicon, corners, 1e-6)
-
-
 def _regions(
     partition: Partition, layers: dict[str, DrawnLayer], ends: list[Terminal], tolerance: float
 ) -> list[Region]:
@@ -204,34 +160,35 @@ def _regions(
     }
     body = next(layer.name for layer in layers.values() if layer.is_body)
     parts = _parts(partition, body, at, insulates)
-    regions, counts = [], dict[str, int]()
+    regions, counts = [], Counter[str]()
     for number, piece in enumerate(partition.pieces):
-        here = [name for name, numbers in at.items() if number in numbers]
+        here = ", ".join(end for end, numbers in at.items() if number in numbers)
         (own, *films), name = piece.layers, piece.layers[-1]
-        if layers[own].is_body:
-            name = " at ".join([name, *([", ".join(here)] if here else [])])
-        counts[name] = counts.get(name, 0) + 1
+        if layers[own].is_body and here:
+            name = f"{name} at {here}"
+        counts[name] += 1
         outline, *holes = rings_of(piece.shape)
         taper, dopant_from = _taper(partition, layers, number, tolerance)
-        made = Region(
+        region = Region(
             name if counts[name] == 1 else f"{name} {counts[name]}",
             parts[number],
             outline,
             taper,
             tuple(holes),
             material=layers[own].material,
+            dopant_from=dopant_from,
             films=tuple(Film(layers[film].material, layers[film].thickness_um) for film in films),
             insulates=number in insulates,
             layers=tuple(piece.layers),
         )
-        regions.append(made if dopant_from is None else replace(made, dopant_from=dopant_from))
+        regions.append(region)
     return regions
 
 
 def _taper(
     partition: Partition, layers: dict[str, DrawnLayer], number: int, tolerance: float
-) -> tuple[Taper | BorderTaper | None, str | None]:
-    """Return how the doping of a piece is tapered, and from which material; None where it is even.
+) -> tuple[Taper | BorderTaper | None, str]:
+    """Return how the doping of a piece is tapered, None where it is even, and from which material.
 
     Raises
     ------
@@ -241,7 +198,7 @@ def _taper(
     piece = partition.pieces[number]
     own = piece.layers[0]
     if not layers[own].is_low_doped:
-        return None, None
+        return None, HIGH_DOPED
     sources = {name for name in partition.beside(number) if layers[name].is_high_doped}
     materials = {layers[name].material for name in sources}
     if not materials and any(layer.is_body and layer.is_high_doped for layer in layers.values()):
@@ -249,7 +206,7 @@ def _taper(
     if len(materials) > 1:
         what = f"it borders on high-doped silicon of {len(materials)} materials, expected one"
         raise DrawingError(what, own, place=piece.shape)
-    return partition.taper(number, sources, tolerance), next(iter(materials), None)
+    return partition.taper(number, sources, tolerance), next(iter(materials), HIGH_DOPED)
 
 
 def _parts(
