@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import re
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,14 +38,13 @@ _LARGEST = 100_000
 
 @dataclass(frozen=True)
 class Column:
-    """Index of a quantity in a table, its unit, and what this is in the unit inside."""
+    """Index of a quantity in a table, its unit, and factor and offset to the unit inside."""
 
     symbol: str
     index: int
     heading: str
     unit: str
-    factor: float
-    offset: float
+    scale: tuple[float, float]
 
     @property
     def origin(self) -> str:
@@ -56,7 +55,8 @@ class Column:
 
     def values(self, table: TextTable) -> Array:
         """Return the data in the unit used inside; raises InputError (see `TextTable.numbers`)."""
-        return self.factor * table.numbers(self.index, self.symbol) + self.offset
+        factor, offset = self.scale
+        return factor * table.numbers(self.index, self.symbol) + offset
 
 
 def symbol_of(name: str) -> str | None:
@@ -72,6 +72,15 @@ def symbol_of(name: str) -> str | None:
 
 def _bare(name: str) -> str:
     return re.sub(r"[\W_]+", "", name[:40]).lower()
+
+
+class Assignment(NamedTuple):
+    """What a user says of one column: a quantity, or None if it is not used, and its unit."""
+
+    symbol: str | None
+    unit: str | None
+    told: str  #: as it was written
+    heading: str
 
 
 def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
@@ -90,16 +99,24 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     >>> parse_columns(["I_h (uA)=Current", "V_b (V)=2"])
     {'I_h (uA)': 'Current', 'V_b (V)': '2'}
     """
-    headings: dict[str, tuple[str, str]] = {}
-    for where, line in (line for text in texts for line in _lines(text)):
+    return {each.told: each.heading for each in assignments(texts)}
+
+
+def assignments(
+    told: Iterable[str | os.PathLike[str]] | Mapping[str, str] | None,
+) -> list[Assignment]:
+    """Return what is said of columns, in texts or parsed; see `parse_columns`."""
+    if told is None or isinstance(told, Mapping):
+        told = [f"{quantity}={heading}" for quantity, heading in (told or {}).items()]
+    assigned: list[Assignment] = []
+    for where, line in (line for text in told for line in _lines(text)):
         quantity, _, heading = (part.strip(' \t"') for part in line.partition("="))
         if not heading:
             raise InputError(
                 f"{where}: found '{shown(line)}', expected one like 'I_h (uA)=Current'"
             )
-        if _is_unused(quantity):
-            told = f"{UNUSED} {len(headings) + 1}"
-            headings[told] = told, heading
+        if quantity.partition(" ")[0] == UNUSED:
+            assigned.append(Assignment(None, None, f"{UNUSED} {len(assigned) + 1}", heading))
             continue
         symbol, unit = _quantity(quantity, assigned=True)
         if symbol is None:
@@ -107,15 +124,10 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
             raise unknown_name("quantity", name_and_unit(quantity)[0], names, where)
         if unit is not None and conversion(unit, MEASURANDS[symbol].unit) is None:
             raise unknown_unit(unit, MEASURANDS[symbol].unit, f"{where}: {symbol}")
-        if symbol in headings:
+        if any(symbol == each.symbol for each in assigned):
             raise InputError(f"{where}: {symbol} is given twice, expected once")
-        headings[symbol] = quantity, heading
-    return dict(headings.values())
-
-
-def _is_unused(quantity: str) -> bool:
-    """Whether what is assigned to a column says that it is not used."""
-    return quantity.partition(" ")[0] == UNUSED
+        assigned.append(Assignment(symbol, unit, quantity, heading))
+    return assigned
 
 
 def _lines(text: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
@@ -144,7 +156,7 @@ def quantity_of(heading: str, *, assigned: bool = False) -> str | None:
     return _quantity(heading, assigned)[0]
 
 
-def measured_table(path: str | os.PathLike[str], assigned: Mapping[str, str]) -> TextTable:
+def measured_table(path: str | os.PathLike[str], assigned: Sequence[Assignment]) -> TextTable:
     """Read the table of a measurement file, below the row whose headings are known or assigned.
 
     Raises
@@ -152,28 +164,25 @@ def measured_table(path: str | os.PathLike[str], assigned: Mapping[str, str]) ->
     InputError
         If there is none.
     """
-    expected = "one like 'V_b (V),I_h (mA),V_r (mV)'"
-    return read_table(path, expected, is_heading=partial(is_heading, assigned=assigned))
+    headings = {each.heading.casefold() for each in assigned}
 
+    def is_heading(name: str) -> bool:
+        bare = name_and_unit(name)[0]
+        named = symbol_of(bare) is not None or any(_bare(bare) in plain for plain in PLAIN.values())
+        return named or bool({name.casefold(), bare.casefold()} & headings)
 
-def is_heading(name: str, assigned: Mapping[str, str]) -> bool:
-    """Whether a heading is that of a known quantity, or of a column that one is assigned."""
-    bare = name_and_unit(name)[0]
-    headings = {heading.casefold() for heading in assigned.values()}
-    named = symbol_of(bare) is not None or any(_bare(bare) in plain for plain in PLAIN.values())
-    return named or bool({name.casefold(), bare.casefold()} & headings)
+    return read_table(path, "one like 'V_b (V),I_h (mA),V_r (mV)'", is_heading=is_heading)
 
 
 def find_columns(
-    table: TextTable, assigned: Mapping[str, str], *, driven: bool = False
+    table: TextTable, assigned: Sequence[Assignment], *, driven: bool = False
 ) -> dict[str, Column]:
     """Find the column of each quantity, that of the time only in a table of what is in time.
 
     Parameters
     ----------
     table : TextTable
-    assigned : mapping of str to str
-        From `parse_columns`.
+    assigned : sequence of Assignment
     driven : bool
         Whether a wave form is given, so that the table needs times and no bias.
 
@@ -185,19 +194,17 @@ def find_columns(
     """
     where = table.where(-1)
     columns: dict[str, Column] = {}
-    unused = {table.index(name) for told, name in assigned.items() if _is_unused(told)}
-    for quantity, heading in assigned.items():
-        if _is_unused(quantity):
+    unused = {table.index(each.heading) for each in assigned if each.symbol is None}
+    for symbol, unit, _, heading in assigned:
+        if symbol is None:
             continue
-        symbol, unit = _quantity(quantity, assigned=True)
-        assert symbol is not None
         index = table.index(heading)
-        for other, column in columns.items():
-            if column.index == index:
-                raise InputError(
-                    f"{where}: --column says that {shown(heading)} is {other} and {symbol}, "
-                    "expected one of them"
-                )
+        other = next((name for name, column in columns.items() if column.index == index), None)
+        if other is not None:
+            raise InputError(
+                f"{where}: --column says that {shown(heading)} is {other} and {symbol}, "
+                "expected one of them"
+            )
         columns[symbol] = _column(table, symbol, index, unit)
     in_time = driven or TIME in columns
     taken = unused | {column.index for column in columns.values()}
@@ -258,20 +265,15 @@ def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> 
     scale = conversion(unit, inside, difference)
     if scale is None:
         raise unknown_unit(unit, inside, f"{table.where(-1)}: {shown(heading)}")
-    if assigned and written and _contradicts(written, inside, difference, scale):
-        raise InputError(f"{where}: its unit is {written}, expected {assigned} as --column says")
-    return Column(symbol, index, heading, unit, *scale)
-
-
-def _contradicts(written: str, inside: str, difference: bool, scale: tuple[float, float]) -> bool:
-    """Whether the unit of a heading, of any quantity, is not the one that is assigned."""
-    if (own := conversion(written, inside, difference)) is not None:
-        return own != scale
-    return any(conversion(written, measurand.unit) for measurand in MEASURANDS.values())
-
-
-def _told(symbol: str, heading: str) -> str:
-    return f"--column '{symbol}={shown(heading)}'"
+    if assigned and written:
+        own = conversion(written, inside, difference)
+        # the unit of the heading may be that of any quantity
+        known = any(conversion(written, measurand.unit) for measurand in MEASURANDS.values())
+        if own != scale and (own is not None or known):
+            raise InputError(
+                f"{where}: its unit is {written}, expected {assigned} as --column says"
+            )
+    return Column(symbol, index, heading, unit, scale)
 
 
 def _assignment(symbol: str, heading: str = "HEADING") -> str:
@@ -322,15 +324,14 @@ def constant_bias(table: TextTable) -> float | None:
     return None
 
 
-def is_taken_as_bias(columns: Mapping[str, Column], assigned: Mapping[str, str]) -> bool:
+def is_taken_as_bias(columns: Mapping[str, Column], assigned: Sequence[Assignment]) -> bool:
     """Whether the bias is a voltage that nobody calls so."""
-    told = {_quantity(quantity, assigned=True)[0] for quantity in assigned}
-    bias = columns.get("V_b")
-    return bias is not None and "V_b" not in told and _quantity(bias.heading)[0] != "V_b"
+    told = any(each.symbol == "V_b" for each in assigned)
+    return not told and "V_b" in columns and quantity_of(columns["V_b"].heading) != "V_b"
 
 
 def note_on_bias(
-    table: TextTable, columns: Mapping[str, Column], assigned: Mapping[str, str]
+    table: TextTable, columns: Mapping[str, Column], assigned: Sequence[Assignment]
 ) -> list[str]:
     """Say which heading was taken as the bias without naming it."""
     if not is_taken_as_bias(columns, assigned):
@@ -355,7 +356,9 @@ def note_on_unused(table: TextTable, columns: Mapping[str, Column]) -> list[str]
     for heading, unit in unused:
         likely = next((column for column in missing if conversion(unit, column.unit)), None)
         if likely is not None:
-            hints.append(f"if one is {likely.symbol}, say {_told(likely.symbol, heading)}")
+            hints.append(
+                f"if one is {likely.symbol}, say --column '{likely.symbol}={shown(heading)}'"
+            )
     if not unused:
         return []
     names = [f"'{shown(heading)}'" for heading, _ in unused]

@@ -15,12 +15,12 @@ from hotlever.lever.transient.waveform import Waveform
 from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
 from hotlever.measurement.columns import (
+    assignments,
     find_columns,
     is_taken_as_bias,
     measured_table,
     note_on_bias,
     note_on_unused,
-    parse_columns,
     quantity_of,
 )
 from hotlever.measurement.contents import Contents, check
@@ -78,7 +78,7 @@ def read_measurement(
         Naming file, line and column, what was found and what is expected; also for values that
         no lever can have, or whose unit must be wrong.
     """
-    assigned = parse_columns(f"{name}={heading}" for name, heading in (columns or {}).items())
+    assigned = assignments(columns)
     table = measured_table(path, assigned)
     settings = Settings.of(table)
     quantities = find_columns(table, assigned, driven=waveform is not None)
@@ -248,7 +248,7 @@ def file_columns(
     InputError
         If the file holds no table.
     """
-    assigned = dict(columns or {})
+    assigned = assignments(columns)
     table = measured_table(path, assigned)
     symbols = dict[int, str]()
     try:
@@ -257,9 +257,9 @@ def file_columns(
     except InputError:
         # what is missing or stands twice is for the user to say
         symbols = {i: quantity_of(name) or "" for i, name in enumerate(table.names)}
-        for told, heading in assigned.items():
+        for each in assigned:
             with suppress(InputError):
-                symbols[table.index(heading)] = quantity_of(told, assigned=True) or ""
+                symbols[table.index(each.heading)] = each.symbol or ""
     headings = [name.casefold() for name in table.names]
     shown_columns = []
     for index, heading in enumerate(table.names[:_MOST]):
