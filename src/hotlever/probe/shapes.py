@@ -8,7 +8,6 @@ drawing (`hotlever.probe.drawing.shape`).
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -139,17 +138,17 @@ class Parametric(Shape):
         etched._parts_fit()
         layout = self.layout()
         for region in layout.regions:
-            side = region.sides.min()
+            narrow, long = region.sides
             _need(
-                side >= _SMALLEST,
-                f"the {region.name} is {side:.2g} µm long or wide, expected {_SMALLEST} µm or more",
+                narrow >= _SMALLEST,
+                f"the {region.name} is {narrow:.2g} µm long or wide, expected {_SMALLEST} µm or "
+                "more",
             )
-        narrow, long = sorted(layout.heater.sides)
-        _need(
-            long <= _SLENDER * narrow,
-            f"the heater is {long:g} µm by {narrow:g} µm, expected at most {_SLENDER:g} times as "
-            "long as wide",
-        )
+            _need(
+                region is not layout.heater or long <= _SLENDER * narrow,
+                f"the heater is {long:g} µm by {narrow:g} µm, expected at most {_SLENDER:g} times "
+                "as long as wide",
+            )
 
 
 def _need(condition: bool, text: str) -> None:
@@ -232,15 +231,13 @@ class ThreeLeg(Parametric):
         outer = inner + here.outer_leg_width_um
         reader_from = here._reader_centre - here.reader_length_um / 2
         reader_to = reader_from + here.reader_length_um
-        along_x = (1.0, 0.0)
         tip = (heater_from + here.heater_length_um / 2, 0.0)
-        taper = Taper(tip, along_x, here.heater_length_um)
         reader_middle = (here._reader_centre, -(inner + outer) / 2)
-        reader_taper = Taper(reader_middle, along_x, here.reader_length_um)
-
-        def right_leg(name: str, x0: float, x1: float) -> Region:
-            return Region(name, "reader branch", rectangle(x0, -outer, x1, -inner))
-
+        taper = Taper(tip, (1.0, 0.0), here.heater_length_um)
+        reader_taper = Taper(reader_middle, (1.0, 0.0), here.reader_length_um)
+        behind = rectangle(0, -outer, reader_from, -inner)
+        reader = rectangle(reader_from, -outer, reader_to, -inner)
+        before = rectangle(reader_to, -outer, front, -inner)
         heater_outline = rectangle(heater_from, -heater, front, heater)
         return Layout(
             regions=(
@@ -248,13 +245,9 @@ class ThreeLeg(Parametric):
                 Region("heater", "heater", heater_outline, taper, material=LOW_DOPED),
                 Region("bridge", "leg 2", rectangle(front, -outer, here.length_um, outer)),
                 Region("left leg", "leg 2", rectangle(0, inner, front, outer)),
-                right_leg("right leg", 0, reader_from),
-                replace(
-                    right_leg("reader", reader_from, reader_to),
-                    taper=reader_taper,
-                    material=LOW_DOPED,
-                ),
-                right_leg("right leg front", reader_to, front),
+                Region("right leg", "reader branch", behind),
+                Region("reader", "reader branch", reader, reader_taper, material=LOW_DOPED),
+                Region("right leg front", "reader branch", before),
             ),
             terminals=(
                 Terminal("supply", (0, -centre), (0, centre)),

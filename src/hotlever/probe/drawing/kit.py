@@ -20,7 +20,7 @@ from shapely import box as rectangle
 
 from hotlever.errors import InputError, quoted
 from hotlever.materials import LOW_DOPED
-from hotlever.probe.drawing.layers import AREA, DRAWN, SILICON
+from hotlever.probe.drawing.layers import DRAWN, SILICON
 from hotlever.probe.drawing.outlines import GRID, DrawingError, Ring, polygons, rings_of
 from hotlever.probe.layout import Layout, Point
 from hotlever.types import Array
@@ -54,14 +54,6 @@ class Layer:
     drawn: Area | str
     material: str | None = None
     thickness_um: float | None = None
-
-    @property
-    def section(self) -> Any:
-        """Its value in ``[layers]``."""
-        if self.material is None and self.thickness_um is None:
-            return _drawn(self.drawn)
-        own = {"material": self.material, "thickness_um": self.thickness_um}
-        return {DRAWN: _drawn(self.drawn), **{key: own[key] for key in own if own[key] is not None}}
 
 
 @dataclass(frozen=True)
@@ -136,17 +128,11 @@ class Drawing:
         }
         if self.file is None:
             probe.setdefault("tolerance_um", _TOLERANCE_UM)
-        layers = {
-            name: each.section if isinstance(each, Layer) else _drawn(each)
-            for name, each in self.layers.items()
+        return {
+            "probe": {"shape": "drawing", **probe},
+            "layers": {name: _stated(each) for name, each in self.layers.items()},
+            "terminals": {name: _stated(each) for name, each in self.terminals.items()},
         }
-        terminals = {
-            name: {AREA: _drawn(each[AREA])}
-            if isinstance(each, Mapping) and AREA in each
-            else _drawn(each)
-            for name, each in self.terminals.items()
-        }
-        return {"probe": {"shape": "drawing", **probe}, "layers": layers, "terminals": terminals}
 
 
 def union(*areas: Area) -> Polygon | MultiPolygon:
@@ -290,6 +276,13 @@ def _area(area: Any, what: str) -> Polygon | MultiPolygon:
     return polygons(what, [ring], 0.0)[0]
 
 
-def _drawn(area: Any) -> Any:
-    """Return outlines and holes of an area; the name of a layer, or a list of points, as it is."""
-    return rings_of(area) if isinstance(area, Polygon | MultiPolygon) else area
+def _stated(given: Any) -> Any:
+    """Return what a section says of a layer, of an area, or of an area that is all contact."""
+    if isinstance(given, Layer):
+        own = {"material": given.material, "thickness_um": given.thickness_um}
+        own = {key: value for key, value in own.items() if value is not None}
+        return {DRAWN: _stated(given.drawn), **own} if own else _stated(given.drawn)
+    if isinstance(given, Mapping):
+        return {key: _stated(area) for key, area in given.items()}
+    # the name of a layer, or a list of points, stays as it is
+    return rings_of(given) if isinstance(given, Polygon | MultiPolygon) else given

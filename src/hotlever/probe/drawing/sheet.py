@@ -58,12 +58,12 @@ class Sheet:
     file : str
     kind : str
         GDSII, OASIS or DXF.
-    cells, top : tuple of str
+    cells, top : list of str
         All cells, and those that no other refers to.
     cell : str or None
         The one whose layers these are; None in a DXF file.
     layers : dict of str to Layer
-    labels : tuple of (str, str, Point)
+    labels : list of (str, str, Point)
         Layer, text and place of each text.
     unit_um : float
         Of the file's numbers.
@@ -75,11 +75,11 @@ class Sheet:
 
     file: str
     kind: str
-    cells: tuple[str, ...]
-    top: tuple[str, ...]
+    cells: list[str]
+    top: list[str]
     cell: str | None
     layers: dict[str, Layer]
-    labels: tuple[tuple[str, str, Point], ...] = ()
+    labels: list[tuple[str, str, Point]]
     unit_um: float = 1.0
     unit_stated: bool = True
     left_out: dict[str, int] = field(default_factory=dict)
@@ -133,22 +133,20 @@ def read_sheet(
     for name, outlines in sorted(parsed["layers"].items()):
         joined, lines = _joined(_points(outlines["lines"], str(path)), tolerance_um)
         layers[name] = Layer((*_points(outlines["rings"], str(path)), *joined), lines)
-    labels = tuple((layer, text, (x, y)) for layer, text, x, y in parsed["labels"])
-    rest = {name: parsed[name] for name in ("unit_um", "unit_stated", "left_out") if name in parsed}
-    cells, top = tuple(parsed["cells"]), tuple(parsed["top"])
-    sheet = Sheet(str(path), parsed["kind"], cells, top, parsed["cell"], layers, labels, **rest)
+    labels = [(layer, text, (x, y)) for layer, text, x, y in parsed["labels"]]
+    sheet = Sheet(str(path), **{**parsed, "layers": layers, "labels": labels})
     if sheet.kind == "DXF":
         if cell is not None:
             raise InputError(f"{path}: cell = {quoted(cell)}: a DXF file has no cells")
     elif sheet.cell is None:
-        shown = ", ".join(top[:10]) + (", …" if len(top) > 10 else "")
+        if not sheet.top:
+            raise InputError(f"{path}: holds no cell")
+        shown = ", ".join(sheet.top[:10]) + (", …" if len(sheet.top) > 10 else "")
         raise InputError(
-            f"{path}: {len(top)} top cells, expected one or its name as `cell` ({shown})"
-            if top
-            else f"{path}: holds no cell"
+            f"{path}: {len(sheet.top)} top cells, expected one or its name as `cell` ({shown})"
         )
-    elif sheet.cell not in cells:
-        raise unknown_name("cell", sheet.cell, cells, str(path))
+    elif sheet.cell not in sheet.cells:
+        raise unknown_name("cell", sheet.cell, sheet.cells, str(path))
     if not layers:
         raise InputError(f"{path}: holds no outline")
     return sheet
