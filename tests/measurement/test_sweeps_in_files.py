@@ -11,8 +11,8 @@ from test_lab_files import write
 from hotlever.errors import InputError
 from hotlever.estimation import fit, read_measurement
 from hotlever.measurement import parse_columns, with_measured_circuit
+from hotlever.measurement.contents import NITROGEN
 from hotlever.measurement.rows import disagreements, sweeps_of
-from hotlever.measurement.settings import NITROGEN
 from hotlever.probe import Circuit, Probe
 
 IV = "V_b (V),I_h (mA)\n"

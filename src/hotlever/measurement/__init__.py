@@ -1,7 +1,7 @@
 """Measured data of one lever: the record, and the files that it is read from.
 
-`columns` knows the names and units of the columns, `settings` the comments that give circuit and
-surroundings, `bias` completes the rows, `contents` knows what no lever can show, `rows` polarities
+`columns` knows the names and units of the columns, `contents` the comments that give circuit and
+surroundings and what no lever can show, `bias` completes the rows, `rows` polarities
 and the order of the rows; `reading` takes these together.
 """
 

@@ -1,20 +1,256 @@
-"""A measurement file while it is read: what it may hold, and how it is refused or noted."""
+"""A measurement file while it is read: its settings, its rows, and what no lever can show.
+
+Settings are circuit and surroundings, as comments of the file give them.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from hotlever.errors import InputError, shown
+from hotlever.materials.air import ATMOSPHERE
 from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.columns import Column
 from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
-from hotlever.measurement.settings import Settings
 from hotlever.probe import Circuit
 from hotlever.tables import TextTable
 from hotlever.types import Array, Mask
-from hotlever.units import plausible
+from hotlever.units import (
+    amount,
+    conversion,
+    key_and_value,
+    may_be_thousands,
+    name_and_unit,
+    plain_powers,
+    plausible,
+    quantity,
+    unit_behind,
+)
+
+#: Settings: attribute of a `Measurement`, name and unit.
+_SETTINGS = {
+    "series_resistance_ohm": ("R_s", "ohm"),
+    "base_temperature_K": ("T_base", "K"),
+    "medium": ("medium", ""),
+    "pressure_mbar": ("pressure", "mbar"),
+    "gas_conductivity": ("gas conductivity", "of air's"),
+}
+#: Those that the probe gives where a file is silent.
+_OF_THE_PROBE = ("series_resistance_ohm", "base_temperature_K", "medium")
+#: Their names as people write them, without case, blanks and underscores.
+_SPELLINGS = {
+    **dict.fromkeys(
+        ("rs", "rseries", "seriesresistance", "seriesresistor", "vorwiderstand"),
+        "series_resistance_ohm",
+    ),
+    **dict.fromkeys(
+        ("basetemperature", "basetemp", "tbase", "t0", "basistemperatur"), "base_temperature_K"
+    ),
+    **dict.fromkeys(("medium", "gas", "atmosphere", "environment", "surroundings"), "medium"),
+    "p": "pressure_mbar",
+}
+#: Where a comment is split: at ``; ``, and at ``, `` and tabs where another setting follows.
+_BETWEEN = re.compile(r";\s|, (?=(?:[^,=:]|,(?! ))*[=:])|\t(?=[^\t=:]*[=:])")
+#: What seems to be a setting, and is said to be unclear unless it is read as one.
+_LIKE_A_SETTING = re.compile(
+    r"(?:series.?resist|base.?temp|(?:medium|pressure)\b)"
+    r"|(?:(?:r_?s(?:eries)?|t_?(?:base|0))\b(?!-)|t\s*[=:]).*\d"
+    r"|[^=:;\t]*(?:resist(?:or|ance)|widerstand|temp(?:eratur(?:e)?)?)\b.*\d",
+    re.I,
+)
+#: Media by their names; other gases, whose conductivity is another; and all of these.
+_MEDIA = {
+    **dict.fromkeys(("vacuum", "evacuated"), "vacuum"),
+    **dict.fromkeys(("nitrogen", "n2"), "nitrogen"),
+    "air": "air",
+}
+_OTHER_GASES = {
+    *("helium", "he", "argon", "ar", "hydrogen", "h2", "oxygen", "o2", "co2", "neon", "ne"),
+    *("krypton", "kr", "xenon", "xe", "sf6", "methane", "ch4", "steam", "water", "oil"),
+}
+_GASES = {*_MEDIA, *_OTHER_GASES}
+_NOT = {"no", "not", "without", "non", "or"}
+#: Units of pressures, and words beside which gas and pressure alone are clear without a name.
+_PRESSURES = {"mbar", "bar", "hpa", "kpa", "pa", "mpa", "torr", "mtorr", "atm"}
+_PLAIN = {"in", "at", "of", "dry", "lab", "still", "ambient", "e"}
+#: κ of nitrogen over that of air, within 1.3 % from 300 to 1200 K: the dilute gases of Lemmon and
+#: Jacobsen, Int. J. Thermophys. 25, 21 (2004).
+NITROGEN = 0.975
+#: mbar; a gas below it, of free molecules, takes less than 0.2 % of a lever's power.
+VACUUM_MBAR = 0.05
+_LARGEST_MBAR = 1e6
+#: A number with a unit, in text of a limited length.
+_WITH_UNIT = re.compile(r"([-+]?\d[\d.,]*(?:e[-+]?\d+)?)\s*([A-Za-z]+)", re.I | re.ASCII)
+_LONGEST = 200  # characters of a medium
+_LONGEST_COMMENT = 2000
+
+
+@dataclass
+class Settings:
+    """What the comments of a file set.
+
+    `values` has the attributes of a `Measurement`, `origin` for each how it was said and where,
+    `notes` what seems to be a setting but is unclear.
+    """
+
+    values: dict[str, Any] = field(default_factory=dict)
+    origin: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, table: TextTable) -> Settings:
+        """Read the comments that give a setting.
+
+        Raises
+        ------
+        InputError
+            If a setting is impossible, or two of them contradict each other.
+        """
+        settings = cls()
+        mentioned: list[tuple[str, str]] = []
+        for line, text in table.comments:
+            where = f"{table.path}: line {line}"
+            for part in _BETWEEN.split(text):
+                given = _setting(part, where)
+                if given is None:
+                    settings.notes.append(
+                        f"{where}: '{shown(part)}' is not understood and not used, expected a line "
+                        "like '# R_s (kOhm): 5.6', '# base temperature (K): 293' or '# medium: air'"
+                    )
+                elif not given and _words(part) & _GASES:
+                    mentioned.append((where, part))
+                for name, value in (given or {}).items():
+                    first = settings.values.get(name, value)
+                    if first != value:
+                        raise InputError(f"{where}: {name} is {value}, but {first} further up")
+                    settings.put(name, value, settings.origin.get(name, f"line {line}"))
+        settings._settle(table.path)
+        for where, part in mentioned:
+            # a gas beside the medium matters, what else is said of it does not
+            if "medium" not in settings.values or _words(part) & _OTHER_GASES:
+                settings.notes.append(
+                    f"{where}: '{shown(part)}' does not set the medium, expected a line like "
+                    "'# medium: air' or '# medium: vacuum'"
+                )
+                break
+        return settings
+
+    def put(self, name: str, value: Any, origin: str) -> None:
+        """Set a value, and say where it is from."""
+        self.values[name], self.origin[name] = value, origin
+
+    def understood(self) -> Iterator[tuple[str, str, str]]:
+        """Give what is set, to what, and where it was said."""
+        for attribute, (name, unit) in _SETTINGS.items():
+            value = self.values.get(attribute)
+            if value is not None:
+                text = value if isinstance(value, str) else f"{value:g} {unit}"
+                yield name, text, self.origin[attribute]
+            elif attribute in _OF_THE_PROBE:
+                yield name, "not said", "the probe's counts"
+
+    def _settle(self, path: str) -> None:
+        """Bring gas and pressure together."""
+        medium, pressure = self.values.get("medium"), self.values.get("pressure_mbar")
+        if pressure is not None:
+            line = self.origin["pressure_mbar"]
+            where = f"{path}: {line}"
+            plausible(f"{where}: pressure", "mbar", pressure, 0.0, _LARGEST_MBAR)
+            if pressure <= VACUUM_MBAR:
+                if medium != "vacuum":
+                    self.notes.append(f"{where}: {pressure:g} mbar of any gas count as vacuum")
+                # the vacuum of the model has no pressure
+                del self.values["pressure_mbar"]
+                self.put("medium", "vacuum", f"{line}, {pressure:g} mbar")
+            elif medium in (None, "vacuum"):
+                said = "no gas is named" if medium is None else "this is no vacuum"
+                raise InputError(
+                    f"{where}: the pressure is {pressure:g} mbar and {said}, expected a line like "
+                    f"'# medium: air, {pressure:g} mbar', or at most {VACUUM_MBAR:g} mbar"
+                )
+        if self.values.get("medium") == "nitrogen":
+            self.values["medium"] = "air"
+            self.put("gas_conductivity", NITROGEN, f"{self.origin['medium']}, nitrogen")
+
+
+def _setting(text: str, where: str) -> dict[str, Any] | None:
+    """Return what a comment sets, nothing where it is another comment, None where it is unclear."""
+    if len(text) > _LONGEST_COMMENT:
+        return None
+    key, value = key_and_value(text)
+    words = _words(key)
+    if not value and words & {*_MEDIA, *_PRESSURES} and words <= _GASES | _PRESSURES | _PLAIN:
+        return _gas(key, where)  # as in 100 mbar N2
+    if not value:
+        # cells of a file with commas
+        key, value = (part.strip(' ,"') for part in (*key.split(",", 1), "")[:2])
+    name, unit = name_and_unit(key)
+    bare = re.sub(r"[\W_]+", "", name[:40]).lower()
+    attribute = "pressure_mbar" if bare.endswith("pressure") else _SPELLINGS.get(bare)
+    if value and attribute == "medium":
+        return _gas(value, where) if bare == "medium" or _words(value) & _GASES else None
+    if value and attribute:
+        setting, inside = _SETTINGS[attribute]
+        where = f"{where}: {setting}"
+        converted = amount(value[:_LONGEST], unit, inside, where)
+        if converted is None:
+            return None
+        if attribute != "pressure_mbar":
+            Circuit.from_values({attribute: converted}, where)
+        return {attribute: converted}
+    # a resistance, temperature or pressure may be meant for one
+    number, rest = quantity(value or key)
+    units = unit or "", unit_behind(rest)
+    measured = any(conversion(each, inside) for each in units for inside in ("ohm", "K", "mbar"))
+    measured = measured and (number is not None or key[-1:] in (")", "]"))
+    return None if measured or _LIKE_A_SETTING.match(text.strip(' \t#"')) else {}
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"[a-z]+\d?\b", text[:_LONGEST].lower()))
+
+
+def _gas(text: str, where: str) -> dict[str, Any]:
+    """Return medium and pressure that a text names.
+
+    Raises
+    ------
+    InputError
+        If it is another medium than the known ones, unless its pressure is that of a vacuum.
+    """
+    pressure, words = _pressure(text, where), _words(text)
+    media = {_MEDIA[word] for word in words & set(_MEDIA)}
+    given: dict[str, Any] = {} if pressure is None else {"pressure_mbar": pressure}
+    if pressure is not None and pressure <= VACUUM_MBAR:
+        media &= {"vacuum"}
+    else:
+        first = re.match(r"[\W\d_]*([a-z]+\d?)", text[:_LONGEST].lower())
+        denied = words & _NOT and (first is None or first[1] not in _MEDIA)
+        if len(media) > 1 or denied or words & _OTHER_GASES or not (media or given):
+            raise InputError(
+                f"{where}: medium is '{shown(text)}', expected vacuum, air or nitrogen, with its "
+                "pressure; for other gases say air, and gas_conductivity in the probe file"
+            )
+    return {**given, "medium": media.pop()} if media else given
+
+
+def _pressure(text: str, where: str) -> float | None:
+    """Return the pressure (mbar) that a text names, None if there is none."""
+    for number, unit in _WITH_UNIT.findall(plain_powers(text[:_LONGEST])):
+        scale, value = conversion(unit, "mbar"), quantity(number)[0]
+        if scale is not None and value is not None:
+            if may_be_thousands(number):
+                raise InputError(f"{where}: found '{number} {unit}', expected no mark of thousands")
+            return float(scale[0] * value)
+    return ATMOSPHERE if "atmospheric pressure" in text.lower() else None
+
+
+# --- rows -----------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -106,10 +342,9 @@ def colder_than_base(tip_K: Array, error_K: Array, base_K: float) -> Mask:
 def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) -> None:
     """Refuse what no lever can show, and note what it hardly can.
 
-    `series_ohm` is in series with the lever if the file does not say what is.
-
-    What may be of either sign is asked less: in time a current goes on or off before the bias is
-    known to, and other supplies drive a current of their own.
+    `series_ohm` is in series with the lever if the file does not say what is. What may be of either
+    sign is asked less: in time a current goes on or off before the bias is known to, and other
+    supplies drive a current of their own.
 
     Raises
     ------
@@ -141,29 +376,21 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
             f"{symbol} is below the base temperature ({base:g} K), perhaps in another unit",
         )
     if not signed:
-        _check_lever_voltage(contents, series_ohm)
-
-
-def _check_lever_voltage(contents: Contents, series_ohm: float) -> None:
-    """Refuse rows whose series resistor leaves no voltage for the lever."""
-    bias, current = contents.values["V_b"], contents.values["I_h"]
-    ohm = contents.settings.values.get("series_resistance_ohm", series_ohm)
-    lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
-    below = lever < -NOISE * bias.max()
-    if below.any():
-        row = int(np.argmax(below))
-        raise InputError(
-            f"{contents.table.where(row)}: V_b = {bias[row]:g} V and I_h = {current[row]:g} mA "
-            f"leave {lever[row]:.3g} V for the lever behind R_s = {ohm:g} ohm, expected a voltage "
-            f"above 0{_likely_mistakes(bias, current, ohm / 1000.0)}"
-        )
+        bias, current = values["V_b"], values["I_h"]
+        ohm = settings.get("series_resistance_ohm", series_ohm)
+        lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
+        below = lever < -NOISE * bias.max()
+        if below.any():
+            row = int(np.argmax(below))
+            raise InputError(
+                f"{contents.table.where(row)}: V_b = {bias[row]:g} V and I_h = {current[row]:g} mA "
+                f"leave {lever[row]:.3g} V for the lever behind R_s = {ohm:g} ohm, expected a "
+                f"voltage above 0{_likely_mistakes(bias, current, ohm / 1000.0)}"
+            )
 
 
 def _likely_mistakes(bias: Array, current: Array, series_kohm: float) -> str:
-    """Ask after what would leave a lever of some kilo-ohm behind a series resistance; or nothing.
-
-    Of biases (V) and currents (mA) that leave none.
-    """
+    """Ask after what would leave a lever of some kilo-ohm, where biases (V) and currents do not."""
     heated = (bias > 0) & (current > 0)
     if not heated.any():
         return ""

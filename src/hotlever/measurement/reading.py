@@ -23,10 +23,9 @@ from hotlever.measurement.columns import (
     note_on_unused,
     quantity_of,
 )
-from hotlever.measurement.contents import Contents, check
+from hotlever.measurement.contents import Contents, Settings, check
 from hotlever.measurement.data import DISTANCE, MEASURED, OPTIONAL, TIME, Measurement
 from hotlever.measurement.rows import described, disagreements, sweeps_of
-from hotlever.measurement.settings import Settings
 from hotlever.probe import Circuit, Probe
 from hotlever.units import name_and_unit
 

@@ -1,10 +1,10 @@
-"""Probe files: their sections read, and changed by the names that their values have."""
+"""Probe files: their sections read, changed by the names of their values, and written."""
 
 from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +31,19 @@ from hotlever.probe.shapes import (
     SHAPE_SECTIONS,
     SHAPES,
     Shape,
+    ThreeLeg,
 )
+from hotlever.probe.surroundings import Physics
+from hotlever.probe.tip import EXAMPLE
 from hotlever.records import Record
+from hotlever.spieser2017 import DOI
+from hotlever.text import as_toml
 
 #: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
 #: gigabytes to read.
 _LARGEST, _LONGEST_LINE = 1_000_000, 1000
+#: Column in which comments begin.
+_COMMENTS = 32
 
 
 def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -266,3 +273,80 @@ def changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str,
         own = sections["probe"].items()
         sections["probe"] = {key: value for key, value in own if key in shape.model_fields}
     return sections
+
+
+# --- as text --------------------------------------------------------------------------------------
+
+
+def commented(entry: str, text: str | None) -> str:
+    """Return a line of a probe file with a comment, if there is one."""
+    return f"{entry:<{_COMMENTS - 2}}  # {text}" if text else entry
+
+
+def section_lines(
+    name: str,
+    section: Mapping[str, Any],
+    meaning: Mapping[str, str],
+    *,
+    optional: bool = False,
+    start: str = "",
+) -> list[str]:
+    """Return the lines of a section, after an empty one, each with what its value is.
+
+    Keys that have no value are left out, or with `optional` named in a comment. Sections inside it
+    come last. The `start` of each line may make all of it a comment.
+    """
+    inner = {key: value for key, value in section.items() if isinstance(value, Mapping)}
+    lines = [] if inner and len(inner) == len(section) else ["", f"{start}[{name}]"]
+    for key, value in section.items():
+        if key in inner or (value is None and not optional):
+            continue
+        written = f"{value:.12g}" if isinstance(value, float) else as_toml(value)
+        entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
+        lines.append(commented(entry, meaning.get(key)))
+    for key, values in inner.items():
+        lines += section_lines(f"{name}.{key}", values, {})
+    return lines
+
+
+def file_text(probe: ProbeParts, shape: Mapping[str, Any], meaning: Mapping[str, str]) -> str:
+    """Return the probe file of a probe.
+
+    Parameters
+    ----------
+    probe : ProbeParts
+    shape : mapping
+        The sections of its shape.
+    meaning : mapping of str to str
+        What the values of these are, by key.
+    """
+    lines = ["# A hotlever probe file: lengths in µm, temperatures in K."]
+    if shape == ThreeLeg.reference().sections():
+        lines += [
+            "# The reference probe. No drawing of the published lever exists: these dimensions",
+            f"# are inferred from the operating points in doi:{DOI}.",
+        ]
+    for name, section in shape.items():
+        lines += section_lines(name, section, meaning)
+    return "\n".join(lines) + "\n" + other_sections(probe)
+
+
+def other_sections(probe: ProbeParts, without: Container[str] = ()) -> str:
+    """Return the sections of a probe's file beside those of its shape, some of them left out."""
+    lines = []
+    named = {f"{MATERIALS}.{name}": kind for name, kind in probe.materials.items()}
+    for name, part in (named | probe.parts).items():
+        if name in without:
+            continue
+        lines += section_lines(name, part.model_dump(), part.description(), optional=True)
+    if probe.tip is None:
+        lines += ["", "# Without a section [tip] the lever is flat. A cone under the heater:"]
+        values, meaning = EXAMPLE.model_dump(), EXAMPLE.description()
+        lines += section_lines("tip", values, meaning, start="# ")[1:]
+    if not probe.physics:
+        lines += ["", "# Without a section [physics] the physics is the paper's. Beyond it:"]
+        effects = dict.fromkeys(Physics.model_fields, True)
+        lines += section_lines("physics", effects, Physics.description(), start="# ")[1:]
+    if probe.laws:
+        lines += section_lines(LAWS, probe.laws, {})
+    return "\n".join(lines) + "\n"

@@ -23,11 +23,11 @@ from hotlever.probe.drawing.sheet import (
     read_sheet,
     sensible_unit,
 )
+from hotlever.probe.file_sections import other_sections, section_lines
 from hotlever.probe.layout import ring_area
 from hotlever.probe.parts import MATERIAL
 from hotlever.probe.probe import Probe
 from hotlever.probe.shapes import DRAWING
-from hotlever.probe.text import other_sections, section_lines
 from hotlever.text import aligned, as_toml
 
 #: Layers that are listed.

@@ -12,11 +12,16 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.files import write_text
 from hotlever.materials import Kind
 from hotlever.materials.sections import remade
-from hotlever.probe.file_sections import changed_sections, check_together, parts_of, read_sections
+from hotlever.probe.file_sections import (
+    changed_sections,
+    check_together,
+    file_text,
+    parts_of,
+    read_sections,
+)
 from hotlever.probe.monitors import Monitor, Monitors
 from hotlever.probe.parts import MATERIAL, MATERIALS, ProbeParts
 from hotlever.probe.shapes import ThreeLeg, UShape
-from hotlever.probe.text import file_text
 from hotlever.records import Record
 
 if TYPE_CHECKING:
