@@ -174,3 +174,10 @@ def test_a_tip_on_the_axis_is_at_zero_and_not_at_minus_zero(run, tmp_path):
     sections["probe"]["tip_um"] = [56.0, -0.0]
     Probe.from_sections(sections, "test").to_file(tmp_path / "lever.toml")
     assert "tip at (56, 0) µm" in run("probe", "show", tmp_path / "lever.toml")[1]
+
+
+def test_what_no_drawing_has_is_refused_before_one_is_saved(tmp_path):
+    probe = Probe.reference().with_(**{"prior.dimensions": "± 2%"})
+    with pytest.raises(InputError, match=r"lever\.toml: \[prior\]: dimensions: the outline of a"):
+        probe.to_file(tmp_path / "lever.toml", drawing=tmp_path / "lever.gds")
+    assert list(tmp_path.iterdir()) == []

@@ -214,6 +214,11 @@ class Probe(ProbeParts):
 
         With the path of a `drawing` what is drawn is written too, as GDSII, whose layers the probe
         file names. A shape of dimensions is then a drawing with those of now.
+
+        Raises
+        ------
+        InputError
+            If the probe says of dimensions what no drawing has.
         """
         if drawing is None:
             return write_text(path, self.to_toml())
@@ -221,6 +226,8 @@ class Probe(ProbeParts):
         from hotlever.probe.drawing.shape import save_drawing
 
         drawn = drawn_shape(self.shape)
+        # of a drawing less may be said, such as what is known of its dimensions
+        Probe.from_sections({**self.sections(), **drawn.sections()}, str(path), like=self)
         sections = save_drawing(drawn, drawing, Path(path).parent)
         return write_text(path, file_text(self, sections, drawn.description()))
 
