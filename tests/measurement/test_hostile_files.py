@@ -174,4 +174,4 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(tmp_path_factory, name, c
     assert np.all(data.bias_V >= 0)
     for observable in data.observables:
         assert not np.isinf(data.observable(observable)).any()
-        assert not np.any(data.error(observable) <= 0)
+        assert not np.any(data.observable(observable, error=True) <= 0)

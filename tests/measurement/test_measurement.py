@@ -328,7 +328,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(tmp_path_factory, part, p
     assert np.all(data.bias_V >= 0)
     for name in data.observables:
         assert not np.isinf(data.observable(name)).any()
-        assert not np.any(data.error(name) <= 0)
+        assert not np.any(data.observable(name, error=True) <= 0)
 
 
 @pytest.mark.parametrize(

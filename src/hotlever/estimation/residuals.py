@@ -110,7 +110,12 @@ class Residuals:
 
     def _measured_errors(self) -> Array:
         """Return the standard error of every datum; NaN of an observable that has none."""
-        errors = np.stack([self._measurement.error(name)[self._used] for name in self.observables])
+        errors = np.stack(
+            [
+                self._measurement.observable(name, error=True)[self._used]
+                for name in self.observables
+            ]
+        )
         usable = errors > 0
         for row, name in enumerate(self.observables):
             missing = self.along[self.present[row] & ~usable[row]]

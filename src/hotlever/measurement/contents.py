@@ -64,11 +64,8 @@ _LIKE_A_SETTING = re.compile(
     re.I,
 )
 #: Media by their names; other gases, whose conductivity is another; and all of these.
-_MEDIA = {
-    **dict.fromkeys(("vacuum", "evacuated"), "vacuum"),
-    **dict.fromkeys(("nitrogen", "n2"), "nitrogen"),
-    "air": "air",
-}
+_MEDIA = {"vacuum": "vacuum", "evacuated": "vacuum", "air": "air"}
+_MEDIA |= dict.fromkeys(("nitrogen", "n2"), "nitrogen")
 _OTHER_GASES = {
     *("helium", "he", "argon", "ar", "hydrogen", "h2", "oxygen", "o2", "co2", "neon", "ne"),
     *("krypton", "kr", "xenon", "xe", "sf6", "methane", "ch4", "steam", "water", "oil"),
@@ -92,10 +89,9 @@ _LONGEST_COMMENT = 2000
 
 @dataclass
 class Settings:
-    """What the comments of a file set.
+    """What the comments of a file set, by attribute of a `Measurement`, and what is unclear.
 
-    `values` has the attributes of a `Measurement`, `origin` for each how it was said and where,
-    `notes` what seems to be a setting but is unclear.
+    `origin` says of each where it was said, or what it follows from.
     """
 
     values: dict[str, Any] = field(default_factory=dict)
@@ -255,7 +251,7 @@ def _pressure(text: str, where: str) -> float | None:
 
 @dataclass
 class Contents:
-    """Rows and settings of a file, which `bias` and `histories` complete.
+    """Rows and settings of a file, which `hotlever.measurement.bias` completes.
 
     Attributes
     ----------

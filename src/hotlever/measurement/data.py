@@ -113,15 +113,8 @@ class Measurement:
     ) -> Measurement:
         """Return what was measured of a cold lever under a wave form.
 
-        Parameters
-        ----------
-        time_us : array_like, shape (n,)
-            Rising, from 0 on.
-        waveform : Waveform
-        current_mA, reader_V : array_like, shape (n,), optional
-            NaN where nothing was measured.
-        **more
-            Other attributes.
+        Times, (n,), rise from 0 on; of the columns, (n,), one may be left out, and is NaN where
+        nothing was measured. `more` are other attributes.
 
         Raises
         ------
@@ -201,24 +194,19 @@ class Measurement:
             return labelled(columns, "time", {"time": self.time_us})
         return labelled(columns, coordinates={"bias": self.bias_V}).sortby("bias")
 
-    def observable(self, name: str) -> Array:
+    def observable(self, name: str, *, error: bool = False) -> Array:
         """Return the data of one of `hotlever.measurands.FITTED`, NaN where there are none.
+
+        With `error`, their standard errors.
 
         Raises
         ------
         InputError
             If there is no observable of this name.
         """
-        return self._column(name)
-
-    def error(self, name: str) -> Array:
-        """Return the standard errors of an observable's data, NaN where there are none."""
-        return self._column(name, "d")
-
-    def _column(self, observable: str, start: str = "") -> Array:
-        if observable not in FITTED:
-            raise unknown_name("observable", observable, FITTED)
-        symbol = start + FITTED[observable].symbol
+        if name not in FITTED:
+            raise unknown_name("observable", name, FITTED)
+        symbol = f"{'d' * error}{FITTED[name].symbol}"
         values: Array | None = getattr(self, MEASURANDS[symbol].name)
         return np.full(self.bias_V.shape, np.nan) if values is None else values
 

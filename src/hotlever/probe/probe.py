@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 class Probe(ProbeParts):
     """Shape, circuit, material, surroundings and tip of one lever: everything a solve needs.
 
-    Without a `tip` the lever is flat, as in the paper. What is known of it before it is measured
-    counts in fits and calibrations only.
+    Without a `tip` the lever is flat, as in the paper. Priors count in fits and calibrations only.
 
     Examples
     --------
@@ -213,12 +212,7 @@ class Probe(ProbeParts):
         """Write the probe as a commented probe file, whole or not at all.
 
         With the path of a `drawing` what is drawn is written too, as GDSII, whose layers the probe
-        file names. A shape of dimensions is then a drawing with those of now.
-
-        Raises
-        ------
-        InputError
-            If the probe says of dimensions what no drawing has.
+        file names; of the dimensions of its shape nothing can be said any more (`InputError`).
         """
         if drawing is None:
             return write_text(path, self.to_toml())

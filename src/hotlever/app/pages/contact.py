@@ -20,7 +20,7 @@ from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 from hotlever.errors import InputError
 from hotlever.materials.samples import sample_names
-from hotlever.probe.contact import parsed_layers
+from hotlever.probe.tip import parsed_layers
 
 #: Biases of a table that is written.
 _BIASES = 25

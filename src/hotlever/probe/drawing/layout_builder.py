@@ -61,9 +61,9 @@ def build_layout(
         (`hotlever.probe.drawing.partition`) or a terminal (`hotlever.probe.drawing.edges`).
     """
     by_name = {layer.name: layer for layer in layers}
-    by_area = [end for end in terminals if end.by_area]
     narrowest, snap = NARROWEST * tolerance_um, _SNAP * tolerance_um
     body = next(layer.name for layer in layers if layer.is_body)
+    by_area = [end for end in terminals if end.by_area]
     rings = by_name[body].drawn
     if not is_lever(extent := extent_of(rings)):
         what = f"{extent:.4g} µm long, expected {SMALLEST_UM:g} to {LARGEST_UM:g} µm"
@@ -73,13 +73,10 @@ def build_layout(
     check_widths(body, outline, drawn[body], narrowest)
     drawn |= {end.part: polygons(end.part, end.drawn, tolerance_um) for end in by_area}
     shapes = {
-        part: healed(part, areas, tolerance_um) for part, areas in drawn.items() if part != body
+        part: _healed_on(body, outline, part, areas, tolerance_um)
+        for part, areas in drawn.items()
+        if part != body
     }
-    for part in shapes:
-        for number, area in enumerate(drawn[part], start=1):
-            inside = parts_of(area.intersection(outline))
-            if not any(piece.area > tolerance_um**2 for piece in inside):
-                raise DrawingError(f"it lies outside the {body}", part, number, area)
     edges = {end.name: end.drawn for end in terminals if not end.by_area}
     ends = terminal_edges(outline, edges, tolerance_um)
     if edge_bias_um:
@@ -120,6 +117,17 @@ def build_layout(
     if not outline.contains(shapely.Point(tip)):
         raise DrawingError(f"it lies outside the {body}", "tip_um", place=tip)
     return Layout(tuple(regions), tuple(ends), tip, 1.0)
+
+
+def _healed_on(
+    body: str, outline: Polygon, part: str, areas: list[Polygon], tolerance: float
+) -> BaseGeometry:
+    """Return the shape of another layer or contact, all of which lies on the body somewhere."""
+    for number, area in enumerate(areas, start=1):
+        inside = parts_of(area.intersection(outline))
+        if not any(piece.area > tolerance**2 for piece in inside):
+            raise DrawingError(f"it lies outside the {body}", part, number, area)
+    return healed(part, areas, tolerance)
 
 
 def _check_piece(
