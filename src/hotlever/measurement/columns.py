@@ -268,8 +268,8 @@ def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> 
     if assigned and written:
         own = conversion(written, inside, difference)
         # the unit of the heading may be that of any quantity
-        known = any(conversion(written, measurand.unit) for measurand in MEASURANDS.values())
-        if own != scale and (own is not None or known):
+        measures = any(conversion(written, measurand.unit) for measurand in MEASURANDS.values())
+        if own != scale and (own is not None or measures):
             raise InputError(
                 f"{where}: its unit is {written}, expected {assigned} as --column says"
             )

@@ -236,16 +236,16 @@ def _film_sections(inference: LayerInference) -> list[str]:
 def _drawn_lines(
     section: str,
     required: tuple[str, ...],
-    found: Mapping[str, Drawn],
+    inferred: Mapping[str, Drawn],
     reasons: Mapping[str, str],
     example: str,
 ) -> list[str]:
-    """Return a section of what was found in a drawing; what is missing stands in a comment."""
-    drawn: dict[str, Drawn | None] = dict.fromkeys(required) | dict(found)
+    """Return a section of what was inferred in a drawing; what is missing stands in a comment."""
+    drawn: dict[str, Drawn | None] = dict.fromkeys(required) | dict(inferred)
     values = {
         role: each[0] if isinstance(each, tuple) and len(each) == 1 else each
         for role, each in drawn.items()
     }
     missing = _MISSING.format(as_toml(example))
-    meaning = {role: reasons.get(role, "") if role in found else missing for role in drawn}
+    meaning = {role: reasons.get(role, "") if role in inferred else missing for role in drawn}
     return section_lines(section, values, meaning, optional=True)

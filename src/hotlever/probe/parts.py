@@ -229,8 +229,8 @@ class ProbeParts(Record):
 
     def values(self, names: Sequence[str]) -> Array:
         """Return some of its values by their names in a probe file, shape (len(names),)."""
-        found = [getattr(self._owner(name)[1], name.rpartition(".")[2]) for name in names]
-        return np.array(found, dtype=float)
+        numbers = [getattr(self._owner(name)[1], name.rpartition(".")[2]) for name in names]
+        return np.array(numbers, dtype=float)
 
     def replace(self, values: Mapping[str, float]) -> Self:
         """Return a copy with some values changed, as `with_` does but unchecked and fast."""
