@@ -20,7 +20,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from hotlever.lever import Lever
-from hotlever.materials.film_kinds import Dielectric, MetalFilm
+from hotlever.materials.kinds import Dielectric, MetalFilm
 from hotlever.materials.films import wiedemann_franz
 from hotlever.probe import Probe
 from problems import processor_seconds, table

@@ -22,7 +22,7 @@ _ROUNDING = 1e-10
 _SAMPLES, _NEWTON_STEPS = 8, 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Piecewise:
     """Polynomials between nodes; the outer ones go on beyond the ends.
 

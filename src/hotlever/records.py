@@ -90,7 +90,7 @@ class Record(BaseModel):
 
     @classmethod
     def from_values(cls, values: dict[str, Any], where: str) -> Self:
-        """Check `values` and make a record; `where` names their origin in an error."""
+        """Check `values` and make a record; `where`, if any, names their origin in an error."""
         try:
             return cls.model_validate(values)
         except ValidationError as error:
@@ -128,10 +128,11 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
     # where a number or a word may stand, pydantic adds which of them it has tried
     path = [part for part in first["loc"] if part not in ("float", "constrained-float")]
     key = shown(".".join(map(str, path)), _LONGEST_KEY)
+    place = f"{where}: " if where else ""
     if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
         return unknown_name("key", key, record.model_fields, where)
     if first["type"] == "missing":
-        return InputError(f"{where}: {key} is missing")
+        return InputError(f"{place}{key} is missing")
     message = first["msg"].removeprefix("Value error, ")
     for of_pydantic, words in _WORDS.items():
         message = message.replace(of_pydantic, words)
@@ -139,7 +140,7 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
         (limit,) = first["ctx"].values()
         message = f"expected {_LIMITS[first['type']]} {limit:g}"
     if not key:
-        return InputError(f"{where}: {message}")
+        return InputError(f"{place}{message}")
     given = first["input"]
     value = f"{given:.12g}" if isinstance(given, float) else quoted(given)
-    return InputError(f"{where}: {key} = {value}: {message[0].lower()}{message[1:]}")
+    return InputError(f"{place}{key} = {value}: {message[0].lower()}{message[1:]}")

@@ -13,8 +13,8 @@ from hotlever.estimation import Measurement, fit, read_fit
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse, simulate
-from hotlever.materials.film_kinds import Dielectric, MetalFilm
 from hotlever.materials.films import dielectric_conductivity, metal_conductivity
+from hotlever.materials.kinds import Dielectric, MetalFilm
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
 from of_materials import FILM, NITRIDE, metal_film_probe, metal_film_sections

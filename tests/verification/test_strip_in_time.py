@@ -14,7 +14,7 @@ from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper
 from hotlever.materials import published
-from hotlever.materials.film_kinds import MetalFilm
+from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Terminal
 
 MATERIAL = published("option III").material

@@ -16,7 +16,7 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.lever.newton import NewtonOptions, find_roots
 from hotlever.lever.solved_states import Constrained
 from hotlever.lever.space import LEVER
-from hotlever.materials.film_kinds import MetalFilm
+from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Layout, ProbeMesh, Region, Terminal
 from hotlever.probe.surroundings import Physics
 from hotlever.studies.thermoelectric_shift import SIDES, Heats

@@ -9,7 +9,7 @@ from skfem import MeshTri
 
 from hotlever.lever.transient.frequency_domain import HarmonicBalance
 from hotlever.materials import published
-from hotlever.materials.film_kinds import MetalFilm
+from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Terminal
 
 LENGTH, WIDTH = 10.0, 1.0

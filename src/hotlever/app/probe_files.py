@@ -211,8 +211,8 @@ def _card(path: Section, section: Mapping[str, Any]) -> dict[str, Any]:
     from hotlever.materials.kinds import KINDS
     from hotlever.materials.parameters import STATED
     from hotlever.materials.presets import PRESETS, usual_values
+    from hotlever.materials.sections import with_tables
     from hotlever.materials.stated import names_stated
-    from hotlever.materials.table_files import with_tables
 
     kind = KINDS.get(str(section.get("kind")))
     words = [str(section.get(key)).replace("-", " ") for key in ("kind", "preset")]

@@ -1,4 +1,7 @@
-"""All kinds of material, all presets and a probe's own materials, in words and as curves."""
+"""All kinds of material, all presets and a probe's own materials, in words and as curves.
+
+And what samples are made of, by name: materials of levers by their laws and presets, and others.
+"""
 
 from __future__ import annotations
 
@@ -7,22 +10,46 @@ from typing import Any
 
 import numpy as np
 
+from hotlever.errors import InputError, shown, unknown_name
 from hotlever.materials.kind import Kind
 from hotlever.materials.kinds import KINDS
 from hotlever.materials.laws import Law
 from hotlever.materials.parameters import STATED, Parameter
 from hotlever.materials.presets import PRESETS
 from hotlever.materials.sections import material_of
+from hotlever.materials.silicon import thermal_conductivity
 from hotlever.materials.stated import StatedLaw
 from hotlever.spieser2017 import DOI
 from hotlever.text import aligned
 from hotlever.types import Array
+from hotlever.units import product_conversion, quantity
 
 #: Temperatures of curves (K), and of a layer whose κ follows from its thickness (µm).
 _FROM_K, _TO_K, _STEPS, _LAYER_UM = 250.0, 1300.0, 106, 0.4
 #: A preset for the kinds that have no values of their own.
 _THIN = f"n-silicon, {_LAYER_UM:g} µm by thickness"
 _EXAMPLES = {"metal-film": "Pt", "dielectric": "SiN"}
+
+#: Of samples alone: κ (W m⁻¹ K⁻¹), and where it is from.
+_OTHERS = {
+    "polymer": (
+        0.2,
+        "amorphous macromolecules have 0.06 to 0.67: X. Xie et al., Phys. Rev. B 95, 035406 (2017)",
+    ),
+    "glass": (1.14, "borosilicate with 80.6 % SiO₂ at 20 °C: makers' data (0.96 to 1.2)"),
+    "quartz": (
+        (10.7 * 6.2) ** 0.5,
+        "z-cut, as heat spreads: makers' data, 10.7 along the axis and 6.2 across at 25 °C",
+    ),
+    "sapphire": (
+        35.0,
+        "300 K: R. L. Aggarwal and A. K. Ramdas, Physical Properties of Diamond and Sapphire "
+        "(CRC, 2019), ch. 6, after Cahill et al.",
+    ),
+}
+_AT_K = 300.0
+#: What a number may be (W m⁻¹ K⁻¹).
+LEAST, MOST = 1e-3, 1e4
 
 
 def _example(kind: str) -> Kind:
@@ -89,7 +116,7 @@ def _lines(
     return lines
 
 
-def _laws(name: str, example: Kind) -> list[Law]:
+def _laws(name: str, example: Kind) -> list[Law | StatedLaw]:
     """Return the laws of a kind, those of its options among them."""
     options = {"metal-film": {"kappa": 0.5}, "dielectric": {}}.get(name, {"c_kappa": "thickness"})
     other = example.model_copy(update=options)
@@ -121,7 +148,7 @@ def curves(
     """
     curves_of = {}
     for name, kind in (examples() if kinds is None else kinds).items():
-        low = max([_FROM_K, *(law.lowest_K for law in kind.stated.values())])
+        low = max([_FROM_K, *(law.temperature_range[0] for law in kind.stated.values())])
         T = np.linspace(low, min(_TO_K, kind.highest_K), _STEPS)
         kappa, _ = kind.thermal_conductivity(T, thickness_um)
         rho = None
@@ -129,3 +156,45 @@ def curves(
             rho = 1.0 / kind.electrical_conductivity(T, getattr(kind, "n_d", 0.0))[0]
         curves_of[name] = T, 100.0 * kappa, rho
     return curves_of
+
+
+# --- samples ------------------------------------------------------------------------------------
+
+
+def sample_names() -> tuple[str, ...]:
+    """Return the materials that a sample may be made of by name."""
+    return (*_OTHERS, "silicon", *PRESETS)
+
+
+def sample_conductivity(text: str, where: str) -> float:
+    """Return κ (W m⁻¹ K⁻¹) of a material by its name, or of a number in this unit.
+
+    Raises
+    ------
+    InputError
+        If it is neither; the nearest name is given.
+
+    Examples
+    --------
+    >>> [round(sample_conductivity(text, "--sample"), 2) for text in ("silicon", "SiO2", "0.3")]
+    [141.44, 1.38, 0.3]
+    >>> sample_conductivity("2 mW/(cm K)", "--sample")
+    0.2
+    """
+    if text in _OTHERS:
+        return _OTHERS[text][0]
+    if text == "silicon":
+        return 100.0 * float(thermal_conductivity(_AT_K)[0])
+    if text in PRESETS:
+        kind = material_of({"kind": PRESETS[text].kind, "preset": text}, text)
+        return 100.0 * kind.thermal_conductivity(np.array(_AT_K), 1.0)[0].item()
+    value, unit = quantity(text)
+    if value is None:
+        raise unknown_name("material", text, sample_names(), where)
+    factor = product_conversion(unit, "W m⁻¹ K⁻¹") if unit else 1.0
+    if factor is None or not LEAST <= factor * value <= MOST:
+        raise InputError(
+            f"{where}: found '{shown(text)}', expected a material or its thermal conductivity, "
+            f"{LEAST:g} to {MOST:g} W/(m K)"
+        )
+    return factor * value

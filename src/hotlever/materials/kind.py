@@ -12,12 +12,7 @@ from pydantic import ConfigDict, model_validator
 from hotlever.errors import unknown_name
 from hotlever.materials.formulas import TEMPERATURE
 from hotlever.materials.laws import Evaluated, Law
-from hotlever.materials.parameters import (
-    STATED,
-    Parameter,
-    constant_of,
-    declare,
-)
+from hotlever.materials.parameters import STATED, Parameter, constant_of, declare
 from hotlever.materials.radiation import grey_emission
 from hotlever.materials.silicon import MELTING_POINT, Carrier
 from hotlever.materials.stated import StatedLaw, names_stated, number_or_law
@@ -117,7 +112,7 @@ class Kind(Record):
 
     @property
     @abstractmethod
-    def laws(self) -> tuple[Law, ...]:
+    def laws(self) -> tuple[Law | StatedLaw, ...]:
         """Of thermal and, if it conducts, electrical conductivity."""
 
     @property
@@ -128,7 +123,7 @@ class Kind(Record):
     @property
     def highest_K(self) -> float:
         """Temperature (K) at which it melts or the first of its laws ends."""
-        return min([self.melts_K, *(law.highest_K for law in self.stated.values())])
+        return min([self.melts_K, *(law.temperature_range[1] for law in self.stated.values())])
 
     @property
     def melts_K(self) -> float:
@@ -138,8 +133,9 @@ class Kind(Record):
     def end(self, name: str) -> str:
         """Say what happens to a material of this name above its highest temperature."""
         for own, law in self.stated.items():
-            if law.highest_K == self.highest_K < self.melts_K:
-                return f"the {law.noun} of {name}.{own} ends at {law.highest_K:g} K"
+            _, ends = law.temperature_range
+            if ends == self.highest_K < self.melts_K:
+                return f"the {law.noun} of {name}.{own} ends at {ends:g} K"
         return self.melting(name)
 
     def melting(self, name: str) -> str:
@@ -149,14 +145,15 @@ class Kind(Record):
     def impossible(self, coldest_K: float) -> str:
         """Say why its laws make no sense from a temperature (K) on; empty if they do."""
         for name, law in self.stated.items():
-            if coldest_K < law.lowest_K:
+            begins, ends = law.temperature_range
+            if coldest_K < begins:
                 return (
-                    f"the {law.noun} of {name} begins at {law.lowest_K:g} K, expected one from "
+                    f"the {law.noun} of {name} begins at {begins:g} K, expected one from "
                     f"the base temperature, {coldest_K:g} K, on"
                 )
             if coldest_K >= self.highest_K:
                 return (
-                    f"the {law.noun} of {name} ends at {law.highest_K:g} K, expected one that "
+                    f"the {law.noun} of {name} ends at {ends:g} K, expected one that "
                     f"goes on above the base temperature, {coldest_K:g} K"
                 )
             unit, within = STATED[name]

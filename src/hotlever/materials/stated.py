@@ -7,19 +7,29 @@ Newton's method that strays can come back.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
-from typing import Annotated, Any, ClassVar
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from types import NoneType
+from typing import Annotated, Any, ClassVar, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field, GetPydanticSchema, PlainSerializer, WrapValidator
+from pydantic import (
+    Field,
+    GetPydanticSchema,
+    PlainSerializer,
+    Strict,
+    WrapValidator,
+    model_validator,
+)
 
-from hotlever.errors import counted, quoted, shown, unknown_name
+from hotlever.errors import InputError, counted, shown
 from hotlever.materials.formulas import Expression, names_in, parsed
 from hotlever.materials.heat import STANDARD_TEMPERATURE
 from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO, LEVELLING, Evaluated
 from hotlever.piecewise import Piecewise, monotone_cubic
+from hotlever.records import Record
 from hotlever.text import with_unit
 from hotlever.types import Array
 
@@ -35,25 +45,17 @@ _NARROWEST_K = 1e-3
 #: Rows that a table may have, and temperatures (K).
 _MOST_ROWS, _LEAST_K, _MOST_K = 2000, 1.0, 1e4
 
+# A list, which becomes a tuple.
+_Numbers = Annotated[tuple[float, ...], Strict(False), PlainSerializer(list)]
 
-class StatedLaw(ABC):
-    """A law of the temperature that a probe file states; called, it is one of `laws.Law`.
 
-    Attributes
-    ----------
-    lowest_K, highest_K : float
-        Between which it says something.
-    names : tuple of str
-        Of the parameters that it has.
-    source : str
-    """
+class StatedLaw(Record):
+    """A law of the temperature that a probe file states; called, it is one of `laws.Law`."""
 
-    lowest_K: float
-    highest_K: float
     #: What it is called.
     noun: ClassVar[str]
     #: Temperatures at which the slope steps.
-    steps: tuple[float, ...] = ()
+    steps: ClassVar[tuple[float, ...]] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -61,9 +63,9 @@ class StatedLaw(ABC):
         return ()
 
     @property
+    @abstractmethod
     def temperature_range(self) -> tuple[float, float]:
         """The temperatures (K) between which it says something."""
-        return self.lowest_K, self.highest_K
 
     @property
     @abstractmethod
@@ -81,14 +83,14 @@ class StatedLaw(ABC):
         """Temperatures (K) between which it is smooth, for integrals."""
 
     @abstractmethod
-    def formula(self, T: Array, parameters: Mapping[str, float]) -> Evaluated:
+    def inside(self, T: Array, parameters: Mapping[str, float]) -> Evaluated:
         """Return values between its ends, with derivatives by ``T`` and parameters."""
 
     def __call__(self, T: ArrayLike, parameters: Mapping[str, float] | None = None) -> Evaluated:
         """Return values at any temperature (K), with derivatives by ``T`` and parameters."""
         T = np.asarray(T, dtype=float)
-        inside = np.clip(T, self.lowest_K, self.highest_K)
-        value, by = self.formula(inside, parameters or {})
+        inside = np.clip(T, *self.temperature_range)
+        value, by = self.inside(inside, parameters or {})
         outside = T - inside
         if not outside.any():
             return value, by
@@ -139,8 +141,8 @@ class StatedLaw(ABC):
         to_K: float,
     ) -> str:
         """Say where its value is none that can be, between temperatures (K); empty if nowhere."""
-        T = np.linspace(from_K, min(to_K, self.highest_K), _CHECKED)
-        value, by = self.formula(T, parameters)
+        T = np.linspace(from_K, min(to_K, self.temperature_range[1]), _CHECKED)
+        value, by = self.inside(T, parameters)
         low, high = within
         wrong = ~((value >= low) & (value <= high)) | ~np.isfinite(by["T"])
         if not wrong.any():
@@ -157,20 +159,9 @@ class StatedLaw(ABC):
 class Formula(StatedLaw):
     """A law by formula, such as ``1.5 * (T/300)**-1.2``; see `hotlever.materials.formulas`.
 
-    Parameters
-    ----------
-    text : str
-    from_K, to_K : float
-        Between which it holds.
-
-    Raises
-    ------
-    ValueError
-        If the text is no formula, or the temperatures do not rise.
-
     Examples
     --------
-    >>> law = Formula("a * (T/300)**-1.2")
+    >>> law = Formula(formula="a * (T/300)**-1.2")
     >>> value, by = law(300.0, {"a": 1.5})
     >>> value.item(), by["T"].item(), by["a"].item()
     (1.5, -0.006, 1.0)
@@ -178,14 +169,23 @@ class Formula(StatedLaw):
 
     noun: ClassVar = "formula"
 
-    def __init__(self, text: str, from_K: float = FORMULA_FROM, to_K: float = FORMULA_TO) -> None:
-        self.text, self.lowest_K, self.highest_K = text, float(from_K), float(to_K)
-        if not _LEAST_K <= self.lowest_K < self.highest_K <= _MOST_K:
+    formula: str = Field(description="of the temperature T and of parameters")
+    from_K: float = Field(default=FORMULA_FROM, description="from which it holds")
+    to_K: float = Field(default=FORMULA_TO, description="up to which it holds")
+
+    @model_validator(mode="after")
+    def _is_a_formula_between_temperatures(self) -> Self:
+        if not _LEAST_K <= self.from_K < self.to_K <= _MOST_K:
             raise ValueError(
-                f"from_K = {from_K:g} and to_K = {to_K:g}: expected rising temperatures "
+                f"from_K = {self.from_K:g} and to_K = {self.to_K:g}: expected rising temperatures "
                 f"from {_LEAST_K:g} to {_MOST_K:g} K"
             )
-        self._expression: Expression = parsed(text)
+        parsed(self.formula)
+        return self
+
+    @cached_property
+    def _expression(self) -> Expression:
+        return parsed(self.formula)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -193,72 +193,56 @@ class Formula(StatedLaw):
         return self._expression.names
 
     @property
+    def temperature_range(self) -> tuple[float, float]:
+        """The temperatures (K) between which it holds."""
+        return self.from_K, self.to_K
+
+    @property
     def source(self) -> str:
         """The formula."""
-        return f"formula {shown(self.text, 60)}"
+        return f"formula {shown(self.formula, 60)}"
 
     @property
     def stated(self) -> Any:
         """The text, with the temperatures between which it holds where they are not the usual."""
-        if (self.lowest_K, self.highest_K) == (FORMULA_FROM, FORMULA_TO):
-            return self.text
-        return {"formula": self.text, "from_K": self.lowest_K, "to_K": self.highest_K}
+        usual = self.temperature_range == (FORMULA_FROM, FORMULA_TO)
+        return self.formula if usual else self.model_dump()
 
     @property
     def edges(self) -> Array:
         """Temperatures (K) between which it is integrated."""
-        steps = int(np.ceil((self.highest_K - self.lowest_K) / _STEP_K))
-        return np.linspace(self.lowest_K, self.highest_K, steps + 1)
+        steps = int(np.ceil((self.to_K - self.from_K) / _STEP_K))
+        return np.linspace(self.from_K, self.to_K, steps + 1)
 
-    def formula(self, T: Array, parameters: Mapping[str, float]) -> Evaluated:
+    def inside(self, T: Array, parameters: Mapping[str, float]) -> Evaluated:
         """Return values between its ends, with derivatives by ``T`` and parameters."""
         return self._expression(T, parameters)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Formula) and self.stated == other.stated
-
-    def __hash__(self) -> int:
-        return hash((self.text, self.lowest_K, self.highest_K))
-
-    def __repr__(self) -> str:
-        return f"Formula({self.text!r})"
 
 
 class Table(StatedLaw):
     """A law by values at some temperatures (K), with a monotone cubic between them.
 
-    Parameters
-    ----------
-    temperature_K, values : sequence of float
-        Rising temperatures, and values in the parameter's unit.
-    file : str, optional
-        Where they are from.
-
-    Raises
-    ------
-    ValueError
-        If there are less than two of them, or not as many, or the temperatures do not rise.
-
     Examples
     --------
-    >>> law = Table([300.0, 400.0, 600.0], [1.0, 2.0, 3.0])
+    >>> law = Table(temperature_K=[300.0, 400.0, 600.0], values=[1.0, 2.0, 3.0])
     >>> law([300.0, 350.0, 400.0])[0].round(4).tolist()
     [1.0, 1.5593, 2.0]
     """
 
     noun: ClassVar = "table"
 
-    def __init__(
-        self, temperature_K: Collection[float], values: Collection[float], file: str | None = None
-    ) -> None:
-        T, column = (np.asarray(list(each), dtype=float) for each in (temperature_K, values))
-        if T.size != column.size or not 2 <= T.size <= _MOST_ROWS:
+    file: str | None = Field(default=None, description="that they are from")
+    temperature_K: _Numbers = Field(description="rising")
+    values: _Numbers = Field(description="in the unit of the property")
+
+    @model_validator(mode="after")
+    def _has_rising_temperatures_with_values(self) -> Self:
+        T = self.edges
+        if T.size != len(self.values) or not 2 <= T.size <= _MOST_ROWS:
             raise ValueError(
-                f"{counted(T.size, 'temperature')} and {counted(column.size, 'value')}, "
+                f"{counted(T.size, 'temperature')} and {counted(len(self.values), 'value')}, "
                 f"expected as many, 2 to {_MOST_ROWS}"
             )
-        if not (np.isfinite(T).all() and np.isfinite(column).all()):
-            raise ValueError("a value is no number, expected numbers alone")
         if not (np.diff(T) > 0).all():
             row = int((np.diff(T) <= 0).argmax())
             raise ValueError(
@@ -268,11 +252,20 @@ class Table(StatedLaw):
             raise ValueError(
                 f"{T[0]:g} to {T[-1]:g} K, expected temperatures from {_LEAST_K:g} to {_MOST_K:g} K"
             )
-        self.temperature_K, self.values = tuple(T.tolist()), tuple(column.tolist())
-        self.file = file
-        self.lowest_K, self.highest_K = self.temperature_K[0], self.temperature_K[-1]
-        self._curve: Piecewise = monotone_cubic(T, column)
-        self._slope = self._curve.derivative()
+        return self
+
+    @cached_property
+    def _curve(self) -> Piecewise:
+        return monotone_cubic(self.edges, np.array(self.values))
+
+    @cached_property
+    def _slope(self) -> Piecewise:
+        return self._curve.derivative()
+
+    @property
+    def temperature_range(self) -> tuple[float, float]:
+        """The first and the last temperature (K)."""
+        return self.temperature_K[0], self.temperature_K[-1]
 
     @property
     def source(self) -> str:
@@ -282,32 +275,27 @@ class Table(StatedLaw):
     @property
     def stated(self) -> Any:
         """The values, and the file they are from."""
-        named = {} if self.file is None else {"file": self.file}
-        return {**named, "temperature_K": list(self.temperature_K), "values": list(self.values)}
+        return self.model_dump(exclude_none=True)
 
     @property
     def edges(self) -> Array:
         """The temperatures of the table."""
         return np.array(self.temperature_K)
 
-    def formula(self, T: Array, parameters: Mapping[str, float]) -> Evaluated:
+    def inside(self, T: Array, parameters: Mapping[str, float]) -> Evaluated:
         """Return values between its ends, with their derivative by ``T``."""
         return self._curve(T), {"T": self._slope(T)}
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Table) and self.stated == other.stated
-
-    def __hash__(self) -> int:
-        return hash((self.temperature_K, self.values))
-
     def __repr__(self) -> str:
-        return f"Table({self.lowest_K:g} to {self.highest_K:g} K, {len(self.values)} values)"
+        # a file may hold thousands
+        low, high = self.temperature_range
+        return f"Table({low:g} to {high:g} K, {len(self.values)} values)"
 
 
 # --- in records -----------------------------------------------------------------------------------
 
 
-def law_stated(value: Any) -> StatedLaw:
+def law_stated(value: str | Mapping[str, Any] | StatedLaw) -> StatedLaw:
     """Return the law that a text or a section of a probe file states.
 
     Raises
@@ -317,56 +305,32 @@ def law_stated(value: Any) -> StatedLaw:
     """
     if isinstance(value, StatedLaw):
         return value
-    if isinstance(value, str):
-        return Formula(value)
-    kind, keys = (Formula, _OF_FORMULAS) if "formula" in value else (Table, _OF_TABLES)
-    for key, entry in value.items():
-        if key not in keys:
-            raise ValueError(str(unknown_name("key", str(key), keys)))
-        if not keys[key](entry):
-            raise ValueError(f"found {key} = {quoted(entry)}, expected {keys[key].__doc__}")
-    missing = [key for key in ("formula", "temperature_K", "values") if key in keys.keys() - value]
-    if missing:
-        raise ValueError(f"{missing[0]} is missing, expected a formula or temperature_K and values")
-    given = dict(value)
-    if kind is Formula:
-        return Formula(given.pop("formula"), **given)
-    return Table(**given)
+    section = {"formula": value} if isinstance(value, str) else dict(value)
+    kind = Formula if "formula" in section else Table
+    try:
+        return kind.from_values(section, "")
+    except InputError as error:
+        raise ValueError(str(error)) from None
 
 
-def _is_text(entry: Any) -> bool:
-    """a text"""
-    return isinstance(entry, str)
-
-
-def _is_number(entry: Any) -> bool:
-    """a number"""
-    return isinstance(entry, int | float) and not isinstance(entry, bool)
-
-
-def _is_list(entry: Any) -> bool:
-    """a list of numbers"""
-    return isinstance(entry, list | tuple) and all(map(_is_number, entry))
-
-
-_OF_FORMULAS = {"formula": _is_text, "from_K": _is_number, "to_K": _is_number}
-_OF_TABLES = {"file": _is_text, "temperature_K": _is_list, "values": _is_list}
-
-
-def number_or_law(within: tuple[float, float], *, or_none: bool = False) -> GetPydanticSchema:
+def number_or_law(within: tuple[float, float]) -> GetPydanticSchema:
     """Return the annotation of a property of a material: a number within bounds, or a law."""
 
     def read(value: Any, check: Callable[[Any], Any]) -> Any:
-        if or_none and value is None:
-            return None
         return law_stated(value) if isinstance(value, str | Mapping | StatedLaw) else check(value)
 
     def write(value: Any) -> Any:
         return value.stated if isinstance(value, StatedLaw) else value
 
     low, high = within
-    schema = Annotated[float, Field(ge=low, le=high), WrapValidator(read), PlainSerializer(write)]
-    return GetPydanticSchema(lambda _, handler: handler(schema))
+    schema: Any = Annotated[
+        float, Field(ge=low, le=high), WrapValidator(read), PlainSerializer(write)
+    ]
+
+    def of_type(annotated: Any, handler: Callable[[Any], Any]) -> Any:
+        return handler(schema | None if NoneType in get_args(annotated) else schema)
+
+    return GetPydanticSchema(of_type)
 
 
 def names_stated(values: Mapping[str, Any]) -> set[str]:

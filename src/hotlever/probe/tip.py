@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, field_validator
 
 from hotlever.errors import InputError, shown
-from hotlever.materials.samples import sample_conductivity
+from hotlever.materials.catalogue import sample_conductivity
 from hotlever.records import Record
 from hotlever.types import Array
 from hotlever.units import product_conversion, quantity

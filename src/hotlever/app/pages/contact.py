@@ -19,7 +19,7 @@ from hotlever.app.pages.page import MEDIA
 from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 from hotlever.errors import InputError
-from hotlever.materials.samples import sample_names
+from hotlever.materials.catalogue import sample_names
 from hotlever.probe.tip import parsed_layers
 
 #: Biases of a table that is written.
