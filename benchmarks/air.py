@@ -14,11 +14,12 @@ import time
 from dataclasses import replace
 from functools import partial
 from statistics import median
+from unittest.mock import patch
 
 import numpy as np
 
+from hotlever.air import surface
 from hotlever.air.operator import PanelledAir
-from hotlever.air.surface import PanelOptions
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimation.experiment import experiment_of
 from hotlever.lever import Lever
@@ -44,7 +45,7 @@ def build(place: str) -> None:
     layout = Probe.reference().layout()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     began, began_cpu = time.perf_counter(), time.process_time()
-    operator = PanelledAir(layout, PLACES[place], BASE_TEMPERATURE_K, PanelOptions()).operator()
+    operator = PanelledAir(layout, PLACES[place], BASE_TEMPERATURE_K, 1.0).operator()
     seconds, cpu = time.perf_counter() - began, time.process_time() - began_cpu
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     memory = (f"{value / 2**20:.2f}" for value in (peak, before))
@@ -114,21 +115,25 @@ def refinement(vacuum, air):
     probe = air.probe
     bias = [4.0, 8.268, 10.748]
 
-    def observed(options, **changes):
+    def observed(refinement, **changes):
         operator = PanelledAir(
-            probe.layout(), probe.surroundings, BASE_TEMPERATURE_K, options
+            probe.layout(), probe.surroundings, BASE_TEMPERATURE_K, refinement
         ).operator()
         space = vacuum.space.in_air(replace(operator, **changes))
         return len(operator.sites), Lever(probe, space=space).sweep(bias)
 
-    _, finest = observed(PanelOptions(refinement=2.0))
+    def at_half(size):
+        with patch.object(surface, size, getattr(surface, size) / 2):
+            return observed(1.0)
+
+    _, finest = observed(2.0)
     choices = {
-        "sizes × 2": observed(PanelOptions(refinement=0.5)),
-        "default": observed(PanelOptions()),
-        "sizes / 1.5": observed(PanelOptions(refinement=1.5)),
-        "half the size at edges only": observed(PanelOptions(edge=0.075)),
-        "half the size in the heater only": observed(PanelOptions(heater=0.15)),
-        "default, κ_Si in the plate, not κ_Si - κ_air": observed(PanelOptions(), filling=0.0),
+        "sizes × 2": observed(0.5),
+        "default": observed(1.0),
+        "sizes / 1.5": observed(1.5),
+        "half the size at edges only": at_half("EDGE"),
+        "half the size in the heater only": at_half("HEATER"),
+        "default, κ_Si in the plate, not κ_Si - κ_air": observed(1.0, filling=0.0),
     }
     rows = []
     for name, (count, data) in choices.items():

@@ -14,7 +14,6 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
 from hotlever.air.operator import PanelledAir
-from hotlever.air.surface import PanelOptions
 from hotlever.lever import Lever
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe
@@ -80,8 +79,7 @@ def operator(names: Sequence[str] = tuple(STUDY)) -> None:
         rows.append((f"volumes: {name}", air.size, f"{theta @ heat:.3f}", far))
         print(rows[-1], file=sys.stderr, flush=True)
     for refinement in (0.5, 1.0, 1.5, 2.0):
-        options = PanelOptions(refinement=refinement)
-        air = PanelledAir(AIR.layout(), AIR.surroundings, BASE, options).operator()
+        air = PanelledAir(AIR.layout(), AIR.surroundings, BASE, refinement).operator()
         theta = air.sites[:, 0] / length
         name = f"panels: sizes / {refinement:g}"
         rows.append((name, len(air.sites), f"{theta @ air.matrix @ theta:.3f}", ""))

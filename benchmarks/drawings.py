@@ -29,7 +29,7 @@ from skfem import Basis, ElementTriP1
 from skfem.models.poisson import laplace, mass
 
 from hotlever.air.operator import PanelledAir
-from hotlever.air.surface import PanelOptions, lever_surface
+from hotlever.air.surface import lever_surface
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.films import PlacedFilm
@@ -204,14 +204,14 @@ def air() -> None:
     reference = Probe.reference().layout()
     for name, probe in levers().items():
         layout = probe.layout()
-        count, seconds = operator_cost(layout, PanelOptions())
+        count, seconds = operator_cost(layout, 1.0)
         # the reference probe with as many panels
         low, high = 0.3, 2.0
         for _ in range(8):
             middle = (low + high) / 2
-            few = len(lever_surface(reference, PanelOptions(refinement=middle)).panels) < count
+            few = len(lever_surface(reference, middle).panels) < count
             low, high = (middle, high) if few else (low, middle)
-        as_many, parametric = operator_cost(reference, PanelOptions(refinement=low))
+        as_many, parametric = operator_cost(reference, low)
         own, fine = (
             Lever(probe.in_medium("air"), MeshOptions(panels=panels)).sweep(IN_AIR)
             for panels in (1.0, 2.0)
@@ -232,10 +232,10 @@ def air() -> None:
     table([*heads, "rise of T_tip", "I_h", "heat into air"], rows)
 
 
-def operator_cost(layout: Layout, options: PanelOptions) -> tuple[int, float]:
+def operator_cost(layout: Layout, refinement: float) -> tuple[int, float]:
     """Panels of a lever, and the processor seconds that its operator takes."""
-    count = len(lever_surface(layout, options).panels)
-    make = partial(PanelledAir, layout, Surroundings(), BASE_TEMPERATURE_K, options)
+    count = len(lever_surface(layout, refinement).panels)
+    make = partial(PanelledAir, layout, Surroundings(), BASE_TEMPERATURE_K, refinement)
     return count, processor_seconds(one_blas_thread(make), 3)
 
 

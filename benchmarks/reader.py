@@ -21,7 +21,6 @@ from scipy.optimize import fsolve
 
 from hotlever import Lever, Probe
 from hotlever.air.operator import PanelledAir
-from hotlever.air.panels import PanelOptions
 from hotlever.lever.discretisation import plate_of
 from hotlever.lever.lever import COARSE, State
 from hotlever.lever.noise import NoiseOptions, Response, johnson, of_temperature
@@ -44,7 +43,7 @@ HEATED = {
 }
 #: Standard pressure (mbar), and that of the surroundings (K).
 BAR, BASE = 1013.25, 293.0
-PLATE = PanelOptions(refinement=0.7)
+PLATE = 0.7
 
 
 def slopes() -> None:

@@ -20,8 +20,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from hotlever.lever import Lever
-from hotlever.materials.kinds import Dielectric, MetalFilm
 from hotlever.materials.films import wiedemann_franz
+from hotlever.materials.kinds import Dielectric, MetalFilm
 from hotlever.probe import Probe
 from problems import processor_seconds, table
 

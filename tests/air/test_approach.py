@@ -7,10 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from hotlever.air.approach import Approach
-from hotlever.air.laplace import Laplace
+from hotlever.air.laplace import Approach, Laplace
 from hotlever.air.operator import AirOperator, PanelledAir, air_operator
-from hotlever.air.panels import PanelOptions, Panels
+from hotlever.air.panels import Panels
 from hotlever.materials.air import temperature_jump_length
 from hotlever.probe import Probe
 from hotlever.probe.drawing import Drawing, Layer
@@ -78,7 +77,7 @@ def test_panels_that_are_no_rectangles_in_one_frame():
 
 def operator(gap: float, refinement: float = 0.2, **more: object) -> AirOperator:
     around = Surroundings(surface_gap_um=gap, **more)
-    return air_operator(LAYOUT, around, 293.0, PanelOptions(refinement=refinement))
+    return air_operator(LAYOUT, around, 293.0, refinement)
 
 
 @pytest.mark.parametrize(
@@ -120,7 +119,7 @@ def test_the_air_inside_a_plate_carries_nothing_from_face_to_face():
     materials = {"strip": Probe.reference().kinds["low-doped"]}
     layout = Probe.from_sections({**drawing.sections(), "materials": materials}, "strip").layout()
     around = Surroundings(surface_gap_um=0.2, accommodation=1.0)
-    air = PanelledAir(layout, around, 293.0, PanelOptions(refinement=0.3))
+    air = PanelledAir(layout, around, 293.0, 0.3)
     flux = air.densities(np.ones((len(air.surface.sites), 1)))[:, 0]
     lower = air.surface.across[:, 1]
     away = np.linalg.norm(air.panels.centres[lower, :2] - [20.0, 0.0], axis=1)

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from plates import turned
 
-from hotlever.air.chip import REACH, BaseLine, chip_panels, lever_axes
+from hotlever.air.bodies import REACH, BaseLine, chip_panels, lever_axes
 from hotlever.air.operator import air_operator
-from hotlever.air.surface import PanelOptions
 from hotlever.errors import InputError
 from hotlever.probe import Probe
 from hotlever.probe.surroundings import Surroundings
 
 LAYOUT = Probe.reference().layout()
-COARSE = PanelOptions(refinement=0.4)
+COARSE = 0.4
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.6, np.pi / 2, -2.5])
@@ -65,8 +64,8 @@ def with_ground(start, end):
 def test_without_a_base_line_chip_and_tilt_are_refused_and_nothing_else(layout, told):
     for what in ({"chip": True}, {"surface_gap_um": 9.0, "surface_tilt_deg": 5.0}):
         with pytest.raises(InputError, match=rf"^surroundings: .*{told}") as refused:
-            air_operator(layout, Surroundings(**what), options=COARSE)
+            air_operator(layout, Surroundings(**what), refinement=COARSE)
         assert "\n" not in str(refused.value)
     np.testing.assert_array_equal(lever_axes(layout), np.eye(2))
-    level = air_operator(layout, Surroundings(surface_gap_um=9.0), options=COARSE)
+    level = air_operator(layout, Surroundings(surface_gap_um=9.0), refinement=COARSE)
     assert level.matrix.sum() > 0

@@ -9,10 +9,9 @@ import pytest
 from plates import plate, turned
 from scipy.integrate import solve_ivp
 
-from hotlever.air.cone import HOT_K, conduction, cone_panels, revolved
+from hotlever.air.bodies import HOT_K, conduction, cone_panels, revolved
 from hotlever.air.laplace import Laplace
 from hotlever.air.operator import PanelledAir, air_operator
-from hotlever.air.panels import PanelOptions
 from hotlever.air.single_layer import single_layer_matrix
 from hotlever.errors import InputError
 from hotlever.materials.air import thermal_conductivity_of_air
@@ -21,7 +20,7 @@ from hotlever.probe.surroundings import Surroundings
 
 BOX = ((0, 0), (4, 0), (4, 2), (0, 2))
 CONE = Tip(height_um=1.0, half_angle_deg=20, in_air=True)
-COARSE = PanelOptions(refinement=0.5)
+COARSE = 0.5
 #: A cone that is all of the temperature of its base.
 PERFECT = 30.0
 
@@ -70,10 +69,10 @@ def with_cone(cone=CONE, **changes):
     return replace(plate(BOX, 0.4), cone=cone.model_copy(update=changes), tip=(2.0, 1.0))
 
 
-def heats(layout, options=None, **surroundings) -> tuple[float, float]:
+def heats(layout, refinement=1.0, **surroundings) -> tuple[float, float]:
     """Heat lost at θ = 1 by all and by the cone's panels."""
     around = Surroundings(medium="air", **surroundings)
-    air = PanelledAir(layout, around, 293.0, options or PanelOptions())
+    air = PanelledAir(layout, around, 293.0, refinement)
     heat = air.densities(np.ones(len(air.surface.sites))) * air.panels.areas
     own = heat[: len(air.surface.panels)]
     return float(own.sum()), float(own[len(own) - len(air.surface.through_tip) :].sum())
@@ -82,18 +81,18 @@ def heats(layout, options=None, **surroundings) -> tuple[float, float]:
 def test_the_air_does_not_see_a_tip_that_does_not_ask_for_it():
     hidden, none = with_cone(in_air=False), replace(with_cone(), cone=None)
     assert np.array_equal(
-        air_operator(hidden, options=COARSE).matrix, air_operator(none, options=COARSE).matrix
+        air_operator(hidden, refinement=COARSE).matrix, air_operator(none, refinement=COARSE).matrix
     )
 
 
 def test_panels_are_fine_enough_and_the_operator_is_one():
-    operator = air_operator(with_cone(), options=COARSE)
+    operator = air_operator(with_cone(), refinement=COARSE)
     assert np.abs(operator.matrix - operator.matrix.T).max() == 0.0
     assert np.linalg.eigvalsh(operator.matrix).min() > 0.0
     more = [
-        air_operator(with_cone(), options=options).matrix.sum()
-        - air_operator(with_cone(in_air=False), options=options).matrix.sum()
-        for options in (COARSE, PanelOptions(refinement=1.0))
+        air_operator(with_cone(), refinement=refinement).matrix.sum()
+        - air_operator(with_cone(in_air=False), refinement=refinement).matrix.sum()
+        for refinement in (COARSE, 1.0)
     ]
     assert more[0] == pytest.approx(more[1], rel=0.03)
     # the cone shades the lever
@@ -111,7 +110,7 @@ def test_the_sites_of_a_cone_lie_above_it():
     air = PanelledAir(with_cone(), Surroundings(medium="air"), 293.0, COARSE)
     surface, count = air.surface, len(air.surface.through_tip)
     sites = surface.sites[surface.site[-count:]]
-    assert count == len(cone_panels(CONE, COARSE.refinement))
+    assert count == len(cone_panels(CONE, COARSE))
     assert np.linalg.norm(sites - [2.0, 1.0], axis=1).max() < CONE.base_radius_um
 
 
@@ -129,7 +128,7 @@ def test_a_wide_flat_end_near_a_surface_is_a_circular_capacitor():
 
 def test_a_tip_that_touches_the_surface_below_is_refused():
     with pytest.raises(InputError, match="crosses the lever, its tip or its chip"):
-        air_operator(with_cone(), Surroundings(surface_gap_um=0.99), options=COARSE)
+        air_operator(with_cone(), Surroundings(surface_gap_um=0.99), refinement=COARSE)
 
 
 @pytest.mark.parametrize("cone", [CONE.with_(kappa=0.02), Tip(height_um=5.0, half_angle_deg=4.0)])

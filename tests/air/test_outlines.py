@@ -7,7 +7,6 @@ import pytest
 from plates import disc, plate, turned
 
 from hotlever.air.operator import air_operator
-from hotlever.air.surface import PanelOptions
 from hotlever.probe import Layout, Probe
 from hotlever.probe.surroundings import Surroundings
 
@@ -18,8 +17,9 @@ BOX = ((0, 0), (10, 0), (10, 10), (0, 10))
 
 def loss(layout: Layout, refinement: float = 1.0, **surroundings) -> float:
     """Heat lost by a plate of one temperature, θ = 1."""
-    options = PanelOptions(refinement=refinement)
-    return float(air_operator(layout, Surroundings(**surroundings), options=options).matrix.sum())
+    return float(
+        air_operator(layout, Surroundings(**surroundings), refinement=refinement).matrix.sum()
+    )
 
 
 def without_thickness(make, thicknesses=(0.04, 0.02)) -> float:

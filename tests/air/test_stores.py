@@ -10,10 +10,8 @@ from scipy.spatial import ConvexHull
 from hotlever.air.laplace import Laplace
 from hotlever.air.operator import PanelledAir
 from hotlever.air.panels import Panels
-from hotlever.air.screened import Screened, screened_potential
-from hotlever.air.single_layer import single_layer_matrix
+from hotlever.air.single_layer import Screened, screened_potential, single_layer_matrix
 from hotlever.air.stores import stores_of
-from hotlever.air.surface import PanelOptions
 from hotlever.probe.surroundings import Surroundings
 
 
@@ -69,7 +67,7 @@ def test_a_sphere_in_a_medium_loses_as_it_should(spheres, turns):
 def plate():
     """A disc in air, and its stores for two shapes: even, and rising to one side."""
     layout = disc(20.0, 0.5, corners=24)
-    air = PanelledAir(layout, Surroundings(medium="air"), 293.0, PanelOptions(refinement=0.5))
+    air = PanelledAir(layout, Surroundings(medium="air"), 293.0, 0.5)
     x = air.surface.sites[:, 0] / 20.0
     shapes = np.stack([np.ones_like(x), x], axis=1)
     inside = 0.5 * np.pi * 20.0**2 * np.diag([1.0, 0.25])

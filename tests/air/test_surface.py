@@ -8,7 +8,7 @@ import shapely
 from plates import disc, plate, turned
 from shapely import LineString, Polygon
 
-from hotlever.air.surface import PanelOptions, lever_surface
+from hotlever.air.surface import HEATER, lever_surface
 from hotlever.probe import Layout, Probe
 
 POINTED = [(0, 10), (0, 4), (40, 2), (40, -2), (0, -4), (0, -10), (46, -6), (52, 0), (46, 6)]
@@ -89,10 +89,10 @@ def test_each_panel_lies_at_its_site(name):
 @pytest.mark.parametrize("name", ["three legs", "turned"])
 def test_panels_are_small_at_edges_and_in_the_heater(name):
     layout = LAYOUTS[name]
-    surface, options = lever_surface(layout), PanelOptions()
+    surface = lever_surface(layout)
     heater = np.linalg.norm(surface.panels.centres[:, :2] - layout.tip, axis=1) < 0.8
-    assert surface.panels.radii[heater].max() < options.heater * 1.645
-    finer = lever_surface(layout, PanelOptions(refinement=2.0))
+    assert surface.panels.radii[heater].max() < HEATER * 1.645
+    finer = lever_surface(layout, 2.0)
     assert len(finer.panels) == pytest.approx(4 * len(surface.panels), rel=0.35)
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from hotlever.air.operator import air_operator
-from hotlever.air.surface import PanelOptions
 from hotlever.errors import InputError
 from hotlever.materials.air import temperature_jump_length
 from hotlever.probe import Probe
@@ -14,12 +13,12 @@ from hotlever.probe.surroundings import Surroundings
 
 LAYOUT = Probe.reference().layout()
 #: For what does not depend on accuracy.
-COARSE = PanelOptions(refinement=0.4)
+COARSE = 0.4
 
 
-def loss(options=COARSE, **surroundings) -> float:
+def loss(refinement=COARSE, **surroundings) -> float:
     """Heat lost by a lever of one temperature."""
-    return float(air_operator(LAYOUT, Surroundings(**surroundings), 293.0, options).matrix.sum())
+    return float(air_operator(LAYOUT, Surroundings(**surroundings), 293.0, refinement).matrix.sum())
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +32,7 @@ def top_area() -> float:
 
 
 def test_the_operator_is_symmetric_and_positive():
-    matrix = air_operator(LAYOUT, options=COARSE).matrix
+    matrix = air_operator(LAYOUT, refinement=COARSE).matrix
     assert np.abs(matrix - matrix.T).max() == 0.0
     assert np.linalg.eigvalsh(matrix).min() > 0
 
@@ -64,12 +63,12 @@ def test_the_chip_takes_up_heat_and_is_large_enough(monkeypatch):
     monkeypatch.setenv("HOTLEVER_CACHE", "")
 
     def heated_at_the_front(chip):
-        operator = air_operator(LAYOUT, Surroundings(chip=chip), options=COARSE)
+        operator = air_operator(LAYOUT, Surroundings(chip=chip), refinement=COARSE)
         return operator.matrix.sum(axis=0) @ operator.sites[:, 0]
 
     with_chip = heated_at_the_front(True)
     assert with_chip > 1.15 * heated_at_the_front(False)
-    monkeypatch.setattr("hotlever.air.chip.REACH", 32.0)
+    monkeypatch.setattr("hotlever.air.bodies.REACH", 32.0)
     assert heated_at_the_front(True) == pytest.approx(with_chip, rel=1e-3)
 
 
@@ -91,7 +90,7 @@ def test_the_air_inside_the_plate_goes_with_the_jump():
     )
     assert dense.filling == pytest.approx(1.0, abs=1e-2)
     assert thin.filling == pytest.approx(0.0, abs=1e-6)
-    assert air_operator(LAYOUT, options=COARSE).filling == 1.0
+    assert air_operator(LAYOUT, refinement=COARSE).filling == 1.0
 
 
 def test_jumps_at_both_surfaces_of_a_narrow_gap_widen_it():
@@ -103,16 +102,16 @@ def test_jumps_at_both_surfaces_of_a_narrow_gap_widen_it():
 
 def test_operators_are_kept_and_damaged_files_replaced(tmp_path, monkeypatch):
     monkeypatch.setenv("HOTLEVER_CACHE", str(tmp_path))
-    first = air_operator(LAYOUT, options=COARSE)
+    first = air_operator(LAYOUT, refinement=COARSE)
     (file,) = (tmp_path / "air").iterdir()
     calls = []
     monkeypatch.setattr("hotlever.air.operator.single_layer_matrix", lambda *_: calls.append(1))
-    assert np.array_equal(air_operator(LAYOUT, options=COARSE).matrix, first.matrix)
+    assert np.array_equal(air_operator(LAYOUT, refinement=COARSE).matrix, first.matrix)
     assert not calls
     monkeypatch.undo()
     monkeypatch.setenv("HOTLEVER_CACHE", str(tmp_path))
     file.write_bytes(b"damaged")
-    assert np.array_equal(air_operator(LAYOUT, options=COARSE).matrix, first.matrix)
+    assert np.array_equal(air_operator(LAYOUT, refinement=COARSE).matrix, first.matrix)
     assert file.stat().st_size > 1000
 
 

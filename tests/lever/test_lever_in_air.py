@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from hotlever.air.operator import air_operator
-from hotlever.air.surface import PanelOptions
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.measurands import OBSERVABLES
@@ -67,7 +66,7 @@ def test_halved_panels_change_less_than_a_thousandth(lever, fine):
     probe = fine.probe
 
     def with_panels(refinement: float) -> Lever:
-        operator = air_operator(probe.layout(), options=PanelOptions(refinement=refinement))
+        operator = air_operator(probe.layout(), refinement=refinement)
         return Lever(probe, space=lever.space.in_air(operator))
 
     a, b, c = (one.sweep(BIAS) for one in (with_panels(0.7), fine, with_panels(1.4)))

@@ -11,7 +11,6 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from hotlever import Lever, Probe
-from hotlever.air.coupling import AirLoss
 from hotlever.datasets import csv_text
 from hotlever.errors import InputError
 from hotlever.figures import figure_of
@@ -91,7 +90,7 @@ def test_the_delay_is_how_the_response_falls_with_the_rate(over):
     near = at_distance(over, 1.0)
     (state,) = near.solve([6.0])
     equations, rate = near.equations, 1e-3
-    near.space.air.around = AirLoss.nothing(near.space.size + 1).around
+    near.space.air.around = None
     shown = "reader_V" if over.circuit.contacts else "lever_V"
     found = Response.of(equations, state.x, TIP, shown)
     slope, delay = found.by_parameter("surface_gap_um")

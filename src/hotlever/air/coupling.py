@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import copy
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,6 @@ from hotlever.types import Array, Index
 #: beside that of a kept Jacobian, and both are removed by the next step.
 _TOLERANCE = 1e-5
 _MOST_DIRECTIONS, _MOST_RESTARTS = 200, 5
-
-
-def _nothing_around(nothing: HeatInAir, _: float) -> HeatInAir:
-    return nothing
 
 
 class AirLoss:
@@ -54,19 +50,19 @@ class AirLoss:
     ----------
     gas_conductivity : float
         Of the gas, over that of air.
-    around : callable
-        Makes what a gas of some conductivity takes up in time, once it is asked for; nothing, if
-        it is not replaced. It can be pickled, as a lever can.
+    around : callable, optional
+        Makes what a gas of some conductivity takes up in time, once it is asked for; None if it
+        takes up nothing. It can be pickled, as a lever can.
     """
 
     gas_conductivity = 1.0
-    around: Callable[[float], HeatInAir]
+    around: Callable[[float], HeatInAir] | None = None
 
     def __init__(
         self, operator: Any, unknowns: Index, shares: Array, losses: csr_matrix, size: int
     ) -> None:
         self._take(operator)
-        self.around = partial(_nothing_around, HeatInAir.nothing(size))
+        self._nothing_around = HeatInAir.nothing(size)
         held = unknowns < 0
         self._held = np.where(held, shares, 0.0).sum(axis=1)
         rows = np.broadcast_to(np.arange(len(unknowns))[:, None], unknowns.shape)
@@ -96,6 +92,8 @@ class AirLoss:
     @property
     def stores(self) -> HeatInAir:
         """What the air takes up itself; nothing in vacuum, or where that is not known."""
+        if self.around is None:
+            return self._nothing_around
         return self.around(self.gas_conductivity)
 
     def in_gas(self, conductivity: float) -> AirLoss:

@@ -1,10 +1,13 @@
-"""The kernel 1/R of still air: its integrals over flat panels, in closed form.
+"""The kernel 1/R of still air, and its change by a motion: integrals over flat panels.
 
 `potential` integrates over one polygon (Wilton et al., IEEE Trans. Antennas Propag. 32, 276
 (1984), doi:10.1109/TAP.1984.1143304); `rectangle_pairs` over two axis-parallel rectangles (the
 integrals of Ruehli and Brennan, IEEE Trans. Microw. Theory Tech. 21, 76 (1973),
-doi:10.1109/TMTT.1973.1127927); `far_pairs` expands 1/R about the centroids. Logarithms are
-written as inverse hyperbolic sines: the two differ by terms that cancel between the limits.
+doi:10.1109/TMTT.1973.1127927). Pairs that are far are expanded about their centroids. Logarithms
+are written as inverse hyperbolic sines: the two differ by terms that cancel between the limits.
+
+And how these integrals change where the second panel moves: so the single layer of a lever changes
+with the gap to a surface, whose images all move along its normal.
 """
 
 from __future__ import annotations
@@ -30,6 +33,8 @@ ORDERS = ((8, 0.5), (6, 1.0), (4, 1.5), (3, 2.0), (2, np.inf))
 _SAME_ANGLE = 2e-6
 #: Points at which potentials are found at once.
 _ROWS = 128
+#: Signs of the limits: where both panels extend, and where one does.
+_TWICE, _ONCE = np.array([1.0, -1.0, -1.0, 1.0]), np.array([1.0, -1.0])
 
 
 class Laplace:
@@ -39,12 +44,17 @@ class Laplace:
     dtype, far = np.dtype(float), FAR
 
     def far_pairs(self, first: Panels, second: Panels, offsets: Array) -> Array:
-        """Return ∫∫ 1/R over distant pairs; see `far_pairs`."""
-        return far_pairs(first, second, offsets)
+        """Return ∫∫ 1/R over distant pairs, to second order in size over distance."""
+        square = np.einsum("nmd,nmd->nm", offsets, offsets)
+        inverse = 1.0 / np.sqrt(np.maximum(square, _TINY))
+        spread, traces = _spreads(first, second, offsets)
+        correction = 0.5 * (3.0 * spread * inverse**2 - traces) * inverse**2
+        expanded: Array = np.outer(first.areas, second.areas) * inverse * (1.0 + correction)
+        return expanded
 
     def near_pairs(self, first: Panels, second: Panels, i: Index, j: Index) -> Array:
         """Return ∫∫ 1/R over pairs: closed for rectangles in one frame, else by points."""
-        closed = in_one_frame(first, second, i, j)
+        closed = _in_one_frame(first, second, i, j)
         result = np.empty(len(i))
         result[closed] = rectangle_pairs(first.chosen(i[closed]), second.chosen(j[closed]))
         others = first.chosen(i[~closed]), second.chosen(j[~closed])
@@ -52,7 +62,52 @@ class Laplace:
         return result
 
 
-def in_one_frame(first: Panels, second: Panels, i: Index, j: Index) -> NDArray[np.bool_]:
+class Approach:
+    """The kernel m·∇(1/R), the derivative of 1/R by a motion m of the second point.
+
+    See `hotlever.air.single_layer.Kernel`.
+
+    Parameters
+    ----------
+    motion : ndarray, shape (3,)
+    """
+
+    shape: tuple[int, ...] = ()
+    dtype, far = np.dtype(float), FAR
+
+    def __init__(self, motion: Array) -> None:
+        self._motion, self._upwards = motion, not motion[:2].any()
+
+    def far_pairs(self, first: Panels, second: Panels, offsets: Array) -> Array:
+        """Return the integrals over distant pairs: the derivative of the same expansion."""
+        inverse = 1.0 / np.maximum(np.einsum("nmd,nmd->nm", offsets, offsets), _TINY)
+        along = offsets @ self._motion
+        spread, traces = _spreads(first, second, offsets)
+        turned = np.einsum("nmd,nd->nm", offsets, first.moments @ self._motion)
+        turned += np.einsum("nmd,md->nm", offsets, second.moments @ self._motion)
+        slope = along * (1.0 + inverse * (7.5 * spread * inverse - 1.5 * traces))
+        slope -= 3.0 * turned * inverse
+        return np.asarray(np.outer(first.areas, second.areas) * slope * inverse**1.5)
+
+    def near_pairs(self, first: Panels, second: Panels, i: Index, j: Index) -> Array:
+        """Return the integrals: closed for rectangles in one frame that move upwards."""
+
+        def over_panel(points: Array, corners: Array) -> Array:
+            sides = _seen_from(points, corners)
+            in_plane = ((sides.outward @ self._motion) * sides.inverse).sum(axis=-1)
+            return in_plane + (sides.normal @ self._motion) * np.sign(sides.height) * sides.angle
+
+        closed = _in_one_frame(first, second, i, j) & self._upwards
+        result = np.empty(len(i))
+        result[closed] = self._motion[2] * _raised_rectangle_pairs(
+            first.chosen(i[closed]), second.chosen(j[closed])
+        )
+        others = first.chosen(i[~closed]), second.chosen(j[~closed])
+        result[~closed] = pairs_by_points(*others, over_panel, ORDERS, odd=True)
+        return result
+
+
+def _in_one_frame(first: Panels, second: Panels, i: Index, j: Index) -> NDArray[np.bool_]:
     """Return which pairs of panels are rectangles turned by the same angle, see `frame`."""
     (axis, angle), (other_axis, other_angle) = first.frame, second.frame
     between = np.abs(angle[i] - other_angle[j])
@@ -76,11 +131,11 @@ def potential(points: Array, corners: Array) -> Array:
     ndarray, shape (...)
         µm.
     """
-    sides = seen_from(points, corners)
+    sides = _seen_from(points, corners)
     return (sides.across * sides.inverse).sum(axis=-1) - np.abs(sides.height) * sides.angle
 
 
-class Sides(NamedTuple):
+class _Sides(NamedTuple):
     """A polygon as seen from points, shapes (..., k) and (..., k, 3) for its k sides."""
 
     outward: Array  #: unit vectors in its plane, normal to the sides
@@ -91,7 +146,7 @@ class Sides(NamedTuple):
     angle: Array  #: solid angle, (...)
 
 
-def seen_from(points: Array, corners: Array) -> Sides:
+def _seen_from(points: Array, corners: Array) -> _Sides:
     """Return what the integrals over polygons are made of; see `potential`."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=-2) - corners, axis=-1)
     along = (np.roll(corners, -1, axis=-2) - corners) / np.maximum(lengths, _TINY)[..., None]
@@ -110,7 +165,7 @@ def seen_from(points: Array, corners: Array) -> Sides:
     # at a double corner of a triangle both are nothing
     ratio = np.maximum(both + lengths, _TINY) / np.maximum(both - lengths, _TINY * both + _TINY)
     angle = _solid_angle(to_corner, distance)
-    return Sides(outward, across, np.log(ratio), normal, height, angle)
+    return _Sides(outward, across, np.log(ratio), normal, height, angle)
 
 
 def _solid_angle(to_corner: Array, distance: Array) -> Array:
@@ -147,7 +202,7 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
         µm³.
     """
     result = np.empty(len(first))
-    for pairs, (normal, other_normal), d in by_orientation(first, second):
+    for pairs, (normal, other_normal), d in _by_orientation(first, second):
         if normal == other_normal:
             u, v = (axis for axis in range(3) if axis != normal)
             result[pairs] = _parallel(d[:, :, u], d[:, :, v], d[0, :, normal])
@@ -160,7 +215,7 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
     return result
 
 
-def by_orientation(
+def _by_orientation(
     first: Panels, second: Panels
 ) -> Iterator[tuple[NDArray[np.bool_], tuple[int, int], Array]]:
     """Give pairs of rectangles in one frame by the axes normal to both.
@@ -192,12 +247,11 @@ def _parallel(u: Array, v: Array, w: Array) -> Array:
     a, b, c = u[:, None], v[None, :], np.abs(w)
     aa, bb, cc = a * a, b * b, c * c
     distance = np.sqrt(aa + bb + cc)
-    terms = 0.5 * (bb - cc) * a * np.arcsinh(a / np.maximum(np.sqrt(bb + cc), _TINY))
-    terms += 0.5 * (aa - cc) * b * np.arcsinh(b / np.maximum(np.sqrt(aa + cc), _TINY))
+    terms = 0.5 * (bb - cc) * a * _asinh(a, bb + cc)
+    terms += 0.5 * (aa - cc) * b * _asinh(b, aa + cc)
     terms -= (aa + bb - 2.0 * cc) * distance / 6.0
     terms -= a * b * c * np.arctan2(a * b, c * distance)
-    signs = np.array([1.0, -1.0, -1.0, 1.0])
-    total: Array = np.einsum("u,v,uvn->n", signs, signs, terms)
+    total: Array = np.einsum("u,v,uvn->n", _TWICE, _TWICE, terms)
     return total
 
 
@@ -210,9 +264,9 @@ def _perpendicular(u: Array, v: Array, w: Array) -> Array:
     a, b, c = u[:, None, None], v[None, :, None], w[None, None, :]
     aa, bb, cc = a * a, b * b, c * c
     distance = np.sqrt(aa + bb + cc)
-    terms = (aa / 2 - cc / 6) * c * np.arcsinh(b / np.maximum(np.sqrt(aa + cc), _TINY))
-    terms += (aa / 2 - bb / 6) * b * np.arcsinh(c / np.maximum(np.sqrt(aa + bb), _TINY))
-    terms += a * b * c * np.arcsinh(a / np.maximum(np.sqrt(bb + cc), _TINY))
+    terms = (aa / 2 - cc / 6) * c * _asinh(b, aa + cc)
+    terms += (aa / 2 - bb / 6) * b * _asinh(c, aa + bb)
+    terms += a * b * c * _asinh(a, bb + cc)
     terms -= b * c * distance / 3.0
     for power, product, height in (
         (aa * a / 6, b * c, a),
@@ -221,35 +275,72 @@ def _perpendicular(u: Array, v: Array, w: Array) -> Array:
     ):
         below = height * distance
         terms -= power * np.arctan(product / np.where(np.abs(below) < _TINY, _TINY, below))
-    twice, once = np.array([1.0, -1.0, -1.0, 1.0]), np.array([1.0, -1.0])
-    total: Array = np.einsum("u,v,w,uvwn->n", twice, once, once, terms)
+    total: Array = np.einsum("u,v,w,uvwn->n", _TWICE, _ONCE, _ONCE, terms)
     return total
 
 
-def far_pairs(first: Panels, second: Panels, offsets: Array) -> Array:
-    """Return ∫∫ 1/R over distant pairs, to second order in size over distance.
+def _raised_rectangle_pairs(first: Panels, second: Panels) -> Array:
+    """Return the derivatives by the height of the second of rectangles in one frame, (n,)."""
+    result = np.empty(len(first))
+    for pairs, (normal, other_normal), d in _by_orientation(first, second):
+        if normal == other_normal == 2:
+            terms = _apart(*_grid(d, 0, 1), d[0, :, 2])
+            total = np.einsum("u,v,uvn->n", _TWICE, _TWICE, terms)
+        elif normal == other_normal:
+            terms = _aside(*_grid(d, 1 - normal, 2), d[0, :, normal])
+            total = np.einsum("u,v,uvn->n", _TWICE, _TWICE, terms)
+        else:
+            # along the normal of one rectangle only the other extends
+            shared = 3 - normal - other_normal
+            a = d[:, :, shared][:, None, None]
+            b, c = d[[0, 1], :, other_normal][None, :, None], d[[0, 2], :, normal][None, None, :]
+            if shared == 2:
+                terms = _box(a, b, c)
+            else:
+                terms = _aside(a, c, b) if other_normal == 2 else _aside(a, b, c)
+            total = np.einsum("u,v,w,uvwn->n", _TWICE, _ONCE, _ONCE, terms)
+        # the differences fall as the second rises
+        result[pairs] = -total
+    return result
 
-    Parameters
-    ----------
-    first : Panels, n
-    second : Panels, m
-    offsets : ndarray, shape (n, m, 3)
-        Between their centroids (µm).
 
-    Returns
-    -------
-    ndarray, shape (n, m)
-        µm³.
-    """
-    square = np.einsum("nmd,nmd->nm", offsets, offsets)
-    inverse = 1.0 / np.sqrt(np.maximum(square, _TINY))
-    spread, traces = spreads(first, second, offsets)
-    correction = 0.5 * (3.0 * spread * inverse**2 - traces) * inverse**2
-    expanded: Array = np.outer(first.areas, second.areas) * inverse * (1.0 + correction)
-    return expanded
+def _grid(d: Array, u: int, v: int) -> tuple[Array, Array]:
+    return d[:, :, u][:, None], d[:, :, v][None, :]
 
 
-def spreads(first: Panels, second: Panels, offsets: Array) -> tuple[Array, Array]:
+def _apart(a: Array, b: Array, c: Array) -> Array:
+    """Return −∫∫∫∫ c/R³ by a and b twice each, at the distance c."""
+    aa, bb, cc = a * a, b * b, c * c
+    distance = np.sqrt(aa + bb + cc)
+    size = np.abs(c)
+    terms = size * (distance - a * _asinh(a, bb + cc) - b * _asinh(b, aa + cc))
+    return np.asarray(np.sign(c) * (terms - a * b * np.arctan2(a * b, size * distance)))
+
+
+def _aside(a: Array, b: Array, c: Array) -> Array:
+    """Return ∫∫∫ 1/R by a twice and b once, at the distance c."""
+    aa, bb, cc = a * a, b * b, c * c
+    distance = np.sqrt(aa + bb + cc)
+    terms = a * b * _asinh(a, bb + cc) + 0.5 * (aa - cc) * _asinh(b, aa + cc) - 0.5 * b * distance
+    return np.asarray(terms - a * np.abs(c) * np.arctan2(a * b, np.abs(c) * distance))
+
+
+def _box(a: Array, b: Array, c: Array) -> Array:
+    """Return ∫∫∫ 1/R by a, b and c once each."""
+    total = np.zeros(np.broadcast_shapes(a.shape, b.shape, c.shape))
+    distance = np.sqrt(a * a + b * b + c * c)
+    for u, v, w in ((a, b, c), (b, c, a), (c, a, b)):
+        total += u * v * _asinh(w, u * u + v * v)
+        below = np.abs(u) * distance
+        total -= 0.5 * u * np.abs(u) * np.arctan2(v * w, below)
+    return total
+
+
+def _asinh(length: Array, square: Array) -> Array:
+    return np.asarray(np.arcsinh(length / np.maximum(np.sqrt(square), _TINY)))
+
+
+def _spreads(first: Panels, second: Panels, offsets: Array) -> tuple[Array, Array]:
     """Return the sums of the moments of pairs, along their offsets and their traces, (n, m)."""
     # pairs of moments with offsets as matrix products: this is done for all pairs of panels
     flat = (offsets[..., :, None] * offsets[..., None, :]).reshape(*offsets.shape[:2], 9)

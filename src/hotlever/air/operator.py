@@ -18,12 +18,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
 
-from hotlever.air.approach import Approach
-from hotlever.air.chip import BaseLine, chip_panels
-from hotlever.air.laplace import Laplace, layer_potential
-from hotlever.air.panels import Mirror, PanelOptions, Panels, mirror_group
-from hotlever.air.screened import Screened
-from hotlever.air.single_layer import Numbers, single_layer_matrix
+from hotlever.air.bodies import BaseLine, chip_panels
+from hotlever.air.laplace import Approach, Laplace, layer_potential
+from hotlever.air.panels import Mirror, Panels, mirror_group
+from hotlever.air.single_layer import Numbers, Screened, single_layer_matrix
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import Layout
@@ -93,7 +91,7 @@ def air_operator(
     layout: Layout,
     surroundings: Surroundings | None = None,
     base_temperature_K: float = BASE_TEMPERATURE_K,
-    options: PanelOptions | None = None,
+    refinement: float = 1.0,
     progress: Progress | None = None,
 ) -> AirOperator:
     """Return the operator of a lever in its surroundings, from the cache or made and cached.
@@ -105,7 +103,8 @@ def air_operator(
         Free space by default.
     base_temperature_K : float
         Of the surroundings; matters only where the temperature jumps at surfaces.
-    options : PanelOptions, optional
+    refinement : float
+        Divides the sizes of the panels.
     progress : callable, optional
         Called while an operator is made, with steps done and their number.
 
@@ -113,23 +112,25 @@ def air_operator(
     ------
     InputError
         If the surface below crosses the lever; or, with a chip or a tilted surface, the leg ends
-        are not on one line (see `hotlever.air.chip.BaseLine`).
+        are not on one line (see `hotlever.air.bodies.BaseLine`).
     ComputationError
         If the dimensions of the lever differ too much.
     """
-    surroundings, options = surroundings or Surroundings(), options or PanelOptions()
+    surroundings = surroundings or Surroundings()
     facts = {
         "layout": asdict(replace(layout, cone=None)),
         "cone": layout.cone_in_air and layout.cone_in_air.model_dump(),
         "surroundings": surroundings.model_dump(exclude={"medium", "gas_conductivity"}),
         "jump_um": surroundings.jump_length_um(base_temperature_K),
-        "options": asdict(options),
+        "refinement": refinement,
     }
     path = cache_file("air", facts)
     kept = stored(path, AirOperator.from_arrays)
     if kept is not None:
         return kept
-    operator = PanelledAir(layout, surroundings, base_temperature_K, options, progress).operator()
+    operator = PanelledAir(
+        layout, surroundings, base_temperature_K, refinement, progress
+    ).operator()
     store_arrays(path, {name: np.asarray(value) for name, value in vars(operator).items()})
     return operator
 
@@ -154,19 +155,19 @@ class PanelledAir:
         layout: Layout,
         surroundings: Surroundings,
         base_temperature_K: float,
-        options: PanelOptions,
+        refinement: float = 1.0,
         progress: Progress | None = None,
     ) -> None:
         # only air that is not in the cache needs panels, and with them Shapely
         from hotlever.air.surface import lever_surface
 
         symmetric = surroundings.symmetric and layout.cone_in_air is None
-        self.surface = lever_surface(layout, options, mirrored=symmetric)
-        chip = [chip_panels(layout, options.refinement)] if surroundings.chip else []
+        self.surface = lever_surface(layout, refinement, mirrored=symmetric)
+        chip = [chip_panels(layout, refinement)] if surroundings.chip else []
         self.panels = Panels(
             np.concatenate([panels.corners for panels in (self.surface.panels, *chip)])
         )
-        most = int(_MOST_PANELS * options.refinement**2)
+        most = int(_MOST_PANELS * refinement**2)
         if len(self.panels) > most:
             raise ComputationError(
                 f"air: this lever takes {len(self.panels)} panels, more than {most}; are its "
@@ -269,7 +270,7 @@ class PanelledAir:
         Parameters
         ----------
         q : ndarray, shape (k,)
-            √(rate / diffusivity) (1/µm), see `hotlever.air.screened`.
+            √(rate / diffusivity) (1/µm), see `hotlever.air.single_layer`.
         shapes : ndarray, shape (sites, m)
             Of θ (mW/µm), by their values at the sites.
 

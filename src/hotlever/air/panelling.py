@@ -13,11 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from scipy.integrate import cumulative_trapezoid
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
+from hotlever.air.panels import divided
 from hotlever.types import Array
 
 # the largest edge that a panel may have at each of some places (n, 2), shape (n,)
@@ -71,15 +71,6 @@ def panelled(shape: Polygon, exposed: BaseGeometry, depths: Array, size: Size) -
     area = np.abs(diagonals[:, 0, 0] * diagonals[:, 1, 1] - diagonals[:, 0, 1] * diagonals[:, 1, 0])
     # narrower ones come of rounding
     return corners[area > _NARROWEST * np.linalg.norm(diagonals, axis=2).sum(axis=1)]
-
-
-def divided(at: Array, size: Array) -> Array:
-    """Return break points between the ends of `at` whose distances follow `size`."""
-    counted = cumulative_trapezoid(1.0 / size, at, initial=0.0)
-    pieces = max(1, int(np.ceil(counted[-1] - 1e-6)))
-    breaks = np.interp(np.linspace(0.0, counted[-1], pieces + 1), counted, at)
-    breaks[[0, -1]] = at[[0, -1]]
-    return breaks
 
 
 def parts(shape: BaseGeometry, kind: str = "Polygon") -> list[BaseGeometry]:

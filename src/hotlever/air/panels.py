@@ -21,28 +21,6 @@ _RECTANGLE = 1e-6
 
 
 @dataclass(frozen=True)
-class PanelOptions:
-    """Sizes of the panels.
-
-    Attributes
-    ----------
-    refinement : float
-        Divides all sizes and their growth: 2 halves them.
-    edge : float
-        At an edge of the lever, as a share of its thickness.
-    heater : float
-        In the heater, as a share of its narrow side.
-    tip : float
-        On the lever where a tip stands, as a share of the radius of its base.
-    """
-
-    refinement: float = 1.0
-    edge: float = 0.15
-    heater: float = 0.3
-    tip: float = 0.4
-
-
-@dataclass(frozen=True)
 class Mirror:
     """Reflection of space in planes, with the sign that an image source takes.
 
@@ -184,3 +162,13 @@ class Panels:
         along, across = (b - a) + t * (c - d - b + a), far - near
         areas = np.linalg.norm(np.cross(along, across), axis=2)
         return near + t * across, areas * np.outer(weights, weights).ravel() / 4
+
+
+def divided(at: Array, size: Array) -> Array:
+    """Return break points between the ends of `at` whose distances follow `size`."""
+    per_length = 1.0 / size
+    counted = np.append(0.0, np.cumsum(np.diff(at) * (per_length[1:] + per_length[:-1]) / 2.0))
+    pieces = max(1, int(np.ceil(counted[-1] - 1e-6)))
+    breaks = np.interp(np.linspace(0.0, counted[-1], pieces + 1), counted, at)
+    breaks[[0, -1]] = at[[0, -1]]
+    return breaks

@@ -2,7 +2,7 @@
 
 Air at rest lets heat through (`hotlever.air.operator`): what leaves a body is Y(0) θ. Where θ
 changes as exp(st) it is Y(s) θ, of the single layer with the kernel exp(−qR)/(4πR), q² = s/α
-(`hotlever.air.screened`): for a sphere of radius a, 4πa(1 + qa). Air without an end answers
+(`hotlever.air.single_layer`): for a sphere of radius a, 4πa(1 + qa). Air without an end answers
 along a cut of the complex plane::
 
     Y(s) − Y(0) = ∫ s/(s + p) Im Y(−p + i0)/π dp/p
@@ -172,17 +172,14 @@ class HeatInAir:
 
     def follows(self, x: Array) -> Array:
         """Return the temperatures to which the stores tend, (size, n), for states of the lever."""
-        shares = self._shares(x)
+        shares = self.coordinates @ x
         repeated = shares[None].repeat(len(self._rates), axis=0)
         return repeated.reshape(len(self._rates) * len(shares), *x.shape[1:])
 
     def held(self, x: Array, in_air: Array) -> Array:
         """Return the heat in the air (nJ) by mode, (m, n), for the temperatures of its stores."""
         heat = np.einsum("kij,kjn->in", self._volumes, self._by_store(in_air))
-        return self.capacity * (heat + self.stores.volume @ self._shares(x))
-
-    def _shares(self, x: Array) -> Array:
-        return np.asarray(self.coordinates @ x)
+        return self.capacity * (heat + self.stores.volume @ (self.coordinates @ x))
 
     def tested(self, by_mode: Array) -> Array:
         """Return heat by mode (m, n) as the weak equations test it, (size + 1, n)."""

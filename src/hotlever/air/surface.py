@@ -3,7 +3,7 @@
 The lever is a plate of its true thickness and of any outline, with top, bottom and side faces. The
 flux into air is singular at the edges and its source is the heater, so panels are small at both.
 The leg ends are at base temperature and have no panels; borders between regions are no edges.
-A tip that stands in the air (`hotlever.air.cone`) has panels of its own. Those of the lever go on
+A tip that stands in the air (`hotlever.air.bodies`) has panels of its own. Those of the lever go on
 below it: between two bodies of one temperature nothing flows.
 """
 
@@ -15,15 +15,18 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiLineString, Polygon
 
-from hotlever.air.cone import conduction, cone_panels
-from hotlever.air.panelling import GRID, divided, panelled, parts, rings, turns
-from hotlever.air.panels import PanelOptions, Panels
+from hotlever.air.bodies import conduction, cone_panels
+from hotlever.air.panelling import GRID, panelled, parts, rings, turns
+from hotlever.air.panels import Panels, divided
 from hotlever.probe.layout import Layout
 from hotlever.types import Array, Index
 
 #: Largest panels, as a share of the lever's length, and growth of the size with the distance from
 #: edges, and from the heater.
 _LARGEST, _GROWTH, _FROM_HEATER = 0.025, 1.2, 0.4
+#: Sizes of panels: at an edge of the lever, as a share of its thickness; in the heater, as a share
+#: of its narrow side; and on the lever where a tip stands, as a share of the radius of its base.
+EDGE, HEATER, TIP = 0.15, 0.3, 0.4
 #: Share of the size at an edge by which a panel may be off a curve that is made of short lines.
 _OFF_CURVE = 0.1
 #: Panels are small at corners of the outline that turn by more (rad).
@@ -61,19 +64,19 @@ class LeverSurface:
 
 
 def lever_surface(
-    layout: Layout, options: PanelOptions | None = None, *, mirrored: bool = True
+    layout: Layout, refinement: float = 1.0, *, mirrored: bool = True
 ) -> LeverSurface:
     """Panel the surface of a lever.
 
     Parameters
     ----------
     layout : Layout
-    options : PanelOptions, optional
+    refinement : float
+        Divides all sizes of panels and their growth: 2 halves them.
     mirrored : bool
         Only above the mid-plane: enough where the surroundings are symmetric about it.
     """
-    options = options or PanelOptions()
-    outline = _Outline(layout, options)
+    outline = _Outline(layout, refinement)
     half = layout.thickness_um / 2
     upright = outline.upright(half, mirrored)
     cells = outline.cells()
@@ -82,7 +85,7 @@ def lever_surface(
     across = np.arange(0 if mirrored else 2 * len(cells)).reshape(2, -1).T
     through_tip = np.empty((0, 0))
     if (cone := layout.cone_in_air) is not None:
-        of_cone = cone_panels(cone, options.refinement)
+        of_cone = cone_panels(cone, refinement)
         through_tip = conduction(cone, of_cone)
         corners.append(of_cone.corners + np.append(outline.tip, -half))
     panels = Panels(np.concatenate(corners))
@@ -100,10 +103,10 @@ class _Outline:
     same panels anywhere on a wafer and in any orientation.
     """
 
-    def __init__(self, layout: Layout, options: PanelOptions) -> None:
-        fine = 1.0 / options.refinement
+    def __init__(self, layout: Layout, refinement: float) -> None:
+        fine = 1.0 / refinement
         self._growth, self._from_fine = fine * _GROWTH, fine * _FROM_HEATER
-        self._edge = fine * options.edge * layout.thickness_um
+        self._edge = fine * EDGE * layout.thickness_um
         first = next(terminal for terminal in layout.terminals if terminal.name == "supply")
         self._origin = np.array(first.start)
         x, y = (self._origin - first.end) / np.linalg.norm(self._origin - first.end)
@@ -121,13 +124,13 @@ class _Outline:
         length = np.linalg.norm(np.diff(around, axis=0), axis=1).max()
         self._largest = fine * _LARGEST * float(length)
         self._fine = [
-            (shape, fine * options.heater * region.narrow_um)
+            (shape, fine * HEATER * region.narrow_um)
             for region, shape in shapes.items()
             if region.part == "heater"
         ]
         if (cone := layout.cone_in_air) is not None:
             base = shapely.Point(self.tip).buffer(cone.base_radius_um)
-            self._fine.append((base, fine * options.tip * cone.base_radius_um))
+            self._fine.append((base, fine * TIP * cone.base_radius_um))
         self._edges, self._corners = self._exposed(layout)
 
     def _seen(self, points: object) -> Array:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.air.chip import BaseLine
+from hotlever.air.bodies import BaseLine
 from hotlever.app.jobs import Task, probe_of, request_of
 from hotlever.app.live import coloured
 from hotlever.app.workers import Report

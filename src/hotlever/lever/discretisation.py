@@ -24,7 +24,6 @@ from scipy.sparse import diags
 from scipy.sparse.linalg import eigsh
 
 from hotlever.air.operator import PanelledAir, air_operator
-from hotlever.air.panels import PanelOptions
 from hotlever.air.stores import AirStores, HeatInAir, stores_of
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import InputError
@@ -47,7 +46,7 @@ TOLERANCE = 5e-4
 _SHARE, _MOST_ROUNDS = 0.8, 10
 #: Modes of the lever, and how fine the panels are: twice as many change a history by less than
 #: what its steps are off by.
-_MODES, _PANELS = 48, PanelOptions(refinement=0.5)
+_MODES, _PANELS = 48, 0.5
 
 
 class MeshedProbe:
@@ -58,7 +57,7 @@ class MeshedProbe:
     probe : Probe
     space : FullSpace
     equations : LeverEquations
-    panels : PanelOptions
+    panels : float
         How fine the panels of the surface are, where there is air.
     """
 
@@ -77,7 +76,7 @@ class MeshedProbe:
         if space is None and mesh is None:
             space = chosen_space(self.probe)
         mesh = mesh or MeshOptions()
-        self.panels = PanelOptions(refinement=mesh.panels)
+        self.panels = mesh.panels
         self.space = space or flat_space(self.probe.layout(), mesh, self.probe.wiring)
         if self.space.air.medium != self.medium:
             self.space = self._surrounded(self.space, progress)
@@ -215,7 +214,7 @@ def plate_of(probe: Probe) -> Layout:
 
 
 def surrounded(
-    space: FullSpace, probe: Probe, panels: PanelOptions, progress: Progress | None = None
+    space: FullSpace, probe: Probe, panels: float, progress: Progress | None = None
 ) -> FullSpace:
     """Return a space in the surroundings of its probe; all but the air is shared."""
     around, base = probe.surroundings, probe.circuit.base_temperature_K
@@ -280,7 +279,7 @@ def taken_up_around(
         "cone": layout.cone_in_air and layout.cone_in_air.model_dump(),
         "surroundings": surroundings.model_dump(exclude={"medium", "gas_conductivity"}),
         "base_K": base_temperature_K,
-        "panels": asdict(_PANELS),
+        "panels": _PANELS,
     }
     path = cache_file("stores", facts)
     names = tuple(AirStores.__dataclass_fields__)

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from scipy.sparse import csr_matrix
 
-from hotlever.air.chip import lever_axes
+from hotlever.air.bodies import lever_axes
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file

@@ -310,7 +310,9 @@ def law_stated(value: str | Mapping[str, Any] | StatedLaw) -> StatedLaw:
     try:
         return kind.from_values(section, "")
     except InputError as error:
-        raise ValueError(str(error)) from None
+        missing = str(error).endswith(" is missing")
+        hint = ", expected a formula or temperature_K and values" if missing else ""
+        raise ValueError(f"{error}{hint}") from None
 
 
 def number_or_law(within: tuple[float, float]) -> GetPydanticSchema:

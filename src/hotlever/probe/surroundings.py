@@ -23,7 +23,7 @@ class Surroundings(Record):
 
     The surface is isothermal and tilted about the base line, on which the leg ends lie; its gap is
     the tip's height and what is between tip and surface. The chip is a block behind that line
-    (`hotlever.air.chip`).
+    (`hotlever.air.bodies`).
     The jump is that of `hotlever.materials.air.temperature_jump_length`; at other surfaces than
     the lever's its length is taken at the base temperature.
     """

@@ -10,7 +10,6 @@ from scipy.sparse import csr_matrix
 
 from hotlever.air.operator import PanelledAir
 from hotlever.air.stores import HeatInAir
-from hotlever.air.surface import PanelOptions
 from hotlever.lever import Lever
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import COARSE
@@ -57,7 +56,7 @@ class AllPanels:
         gradient = equations.observed_gradient(x)[:, 0]
         self.tip, self.shown = space.tip_rise(unit), gradient[:, :2]
         surroundings, layout = lever.probe.surroundings, lever.probe.layout()
-        self.air = PanelledAir(layout, surroundings, 293.0, PanelOptions(refinement=0.5))
+        self.air = PanelledAir(layout, surroundings, 293.0, 0.5)
         self.at_sites = csr_matrix(space.rise_at(self.air.surface.sites, unit))
         values = space.temperature.matrix[: space.weights.size]
         self.inside = layout.thickness_um * (values.T @ (space.weights * values.toarray()))

@@ -1,20 +1,27 @@
-"""The chip that holds a lever, and the direction in which the lever leaves it.
+"""What stands beside a lever's plate in the air: the chip that holds it, and its tip.
 
 The chip body is a block behind the base line, on which the leg ends of supply and ground lie. Its
 lower face continues the lever's lower face and it rises above it, as where a lever is etched from
 the device layer and the tip points away from the chip. Its faces reach `REACH` lever lengths to
 all sides.
+
+The tip is a cone with a flat end. Its panels belong to the places of the lever above them. What a
+panel gives to the air comes from there along the cone, in one dimension: its θ is lower than the
+lever's by the resistance of the way that its heat has in common with that of every other panel.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from hotlever.air.panels import Panels
+from hotlever.air.panels import Panels, divided
 from hotlever.errors import InputError
+from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.probe.layout import Layout
+from hotlever.probe.tip import Tip
 from hotlever.types import Array
 
 #: Extent of the chip in lever lengths; four times as much changes the loss by less than 2e-4.
@@ -23,6 +30,14 @@ REACH = 8.0
 _ROOT, _ROOT_GROWTH = 0.1, 0.5
 #: How far (µm) leg ends may be off one line: more than drawings are rounded by.
 _OFF_LINE = 0.02
+#: Panels in a ring; at the ends of the side and at the rim of the flat end, as a share of the
+#: radius there; and their growth with the distance from these.
+_AROUND, _AT_END, _GROWTH = 12, 0.5, 0.5
+#: Temperature (K) at which tip and air are taken to conduct: a hot tip's, where it matters most.
+HOT_K = 900.0
+
+
+# --- the chip -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -111,8 +126,6 @@ def chip_panels(layout: Layout, refinement: float = 1.0) -> Panels:
     InputError
         If leg ends are not on one line, or the lever is on both sides of it.
     """
-    from hotlever.air.panelling import divided  # loads Shapely; see `PanelledAir`
-
     line = BaseLine.of(layout, "the chip")
     seen = line.seen(layout.corners)
     low, high = float(seen[:, 1].min()), float(seen[:, 1].max())
@@ -140,3 +153,83 @@ def _grid(axis: int, at: float, u: Array, v: Array) -> Array:
     corners_v = np.stack([v[:-1], v[:-1], v[1:], v[1:]], axis=1)
     cells = np.stack(np.broadcast_arrays(corners_u, corners_v), axis=-1).reshape(-1, 4, 2)
     return np.insert(cells, axis, at, axis=2)
+
+
+# --- the tip --------------------------------------------------------------------------------------
+
+
+def cone_panels(cone: Tip, refinement: float = 1.0) -> Panels:
+    """Return panels on the side of a cone and on its flat end.
+
+    Its axis is that of z, and it points down from z = 0. The base, where it meets the lever, is
+    no surface.
+
+    Parameters
+    ----------
+    cone : Tip
+    refinement : float
+        Divides all sizes.
+    """
+    base, apex, fine = cone.base_radius_um, cone.apex_radius_um, 1.0 / refinement
+    length = math.hypot(cone.height_um, base - apex)
+    side = _breaks(length, fine * _AT_END * base, fine * _AT_END * apex, fine * _GROWTH)
+    end = _breaks(apex, fine * _AT_END * apex, apex, fine * _GROWTH)[1:]
+    radius = np.append(base + side * (apex - base), apex * (1.0 - end))
+    depth = np.append(side, np.ones(end.size)) * cone.height_um
+    return revolved(np.stack([radius, -depth], axis=1), round(_AROUND * refinement))
+
+
+def _breaks(length: float, first: float, last: float, growth: float) -> Array:
+    """Return where panels on a line meet, from 0 to 1, of their sizes (µm) at its ends."""
+    # sizes differ by orders of magnitude: they are read at distances that do so too
+    away = np.append(0.0, np.geomspace(0.01 * min(first, last, length), length / 2, 400))
+    along = np.concatenate([away, length - away[-2::-1]])
+    size = np.minimum(first + growth * along, last + growth * (length - along))
+    return divided(along / length, size / length)
+
+
+def revolved(profile: Array, around: int) -> Panels:
+    """Return panels on a surface of revolution about the axis of z.
+
+    Parameters
+    ----------
+    profile : ndarray, shape (k, 2)
+        Radius and height (µm) at which rings of panels meet, from one end to the other.
+    around : int
+        Panels in a ring: a polygon of the area of the circle.
+    """
+    angle = 2.0 * np.pi * np.arange(around + 1) / around
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) / np.sqrt(np.sinc(2.0 / around))
+    lines = np.empty((len(profile), around + 1, 3))
+    lines[..., :2] = profile[:, 0, None, None] * circle
+    lines[..., 2] = profile[:, 1, None]
+    # of a triangle the last two corners are the same: those on the axis
+    from_axis = (profile[:-1, 0] == 0)[:, None, None]
+    first = np.where(from_axis, lines[1:], lines[:-1])
+    last = np.where(from_axis, lines[:-1], lines[1:])
+    corners = np.stack([first[:, :-1], first[:, 1:], last[:, 1:], last[:, :-1]], axis=2)
+    return Panels(corners.reshape(-1, 4, 3))
+
+
+def conduction(cone: Tip, panels: Panels) -> Array:
+    """Return by how much θ on `panels` is below that of the lever, per heat from each.
+
+    Between the base and a depth z, where the radius is r, a cone of base radius r₀ has the
+    resistance z / (π κ r₀ r). Air and cone conduct as at `HOT_K`.
+
+    Parameters
+    ----------
+    cone : Tip
+    panels : Panels, n
+        Of `cone_panels`.
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+        1/µm, symmetric and positive semi-definite.
+    """
+    depth, base = -panels.centres[:, 2], cone.base_radius_um
+    to_panel = depth / (np.pi * base * (base - depth * cone.slope))
+    of_air, _ = thermal_conductivity_of_air(HOT_K)
+    # what two panels have in common is the way to the nearer one
+    return np.asarray(of_air / cone.kappa * np.minimum.outer(to_panel, to_panel))
