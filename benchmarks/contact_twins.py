@@ -27,8 +27,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hotlever import Measurement, Probe, fit
-from hotlever.contact.cone import cold_resistance
 from hotlever.contact.law import INTERFACE, ContactLaw
+from hotlever.contact.resistances import cold_resistance
 from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.estimation.noise import METERS
 from hotlever.estimation.over_a_sample import with_distances

@@ -7,9 +7,14 @@ import pytest
 from scipy.integrate import quad, solve_bvp
 from scipy.special import j1
 
-from hotlever.contact.cone import AirBeside, cold_resistance, up_the_cone
 from hotlever.contact.law import ContactLaw
-from hotlever.contact.spreading import axis_rise, contact_resistance
+from hotlever.contact.resistances import (
+    AirBeside,
+    axis_rise,
+    cold_resistance,
+    contact_resistance,
+    up_the_cone,
+)
 from hotlever.errors import InputError
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.silicon import thermal_conductivity
@@ -20,6 +25,12 @@ from hotlever.probe.tip import OUT_OF_CONTACT, interface_of
 SHARP = Tip(height_um=0.7, half_angle_deg=20.0, apex_radius_um=0.005)
 BLUNT = Tip(height_um=0.5, half_angle_deg=50.0, apex_radius_um=0.1)
 RADIUS = 0.005
+
+
+def at_the_lever(*arguments: object) -> list[np.ndarray]:
+    """Temperature, heat and resistance of a cone where it meets the lever."""
+    _, *along = up_the_cone(*arguments)
+    return [each[-1] for each in along]
 
 
 def probe(**values: object) -> Probe:
@@ -41,7 +52,7 @@ def test_a_cold_cone_is_the_integral_of_its_shells(tip):
     assert cold_resistance(tip, 400.0) == pytest.approx(whole, rel=1e-8)
     # a heat that warms it by a microkelvin
     heat = np.array([1e-6 / whole])
-    T, same, _ = up_the_cone(tip, np.array([400.0]), heat, 293.0)
+    T, same, _ = at_the_lever(tip, np.array([400.0]), heat, 293.0)
     assert pytest.approx(1e-6, rel=1e-5) == T - 400.0
     assert same == heat
 
@@ -51,7 +62,7 @@ def test_a_hot_cone_is_the_integral_of_bulk_and_surface():
     wide = Tip(height_um=0.7, half_angle_deg=20.0, apex_radius_um=10.0)
     cosine = np.cos(np.radians(20.0))
     heat = 0.1 * np.pi * 10.0 * wide.base_radius_um / 0.7 * 20.0 * 2.0 * cosine / (1.0 + cosine)
-    T, *_ = up_the_cone(wide, np.array([500.0]), np.array([heat]), 293.0)
+    T, *_ = at_the_lever(wide, np.array([500.0]), np.array([heat]), 293.0)
     # almost bulk: Kirchhoff's integral of κ, less the surface's share at the mean diameter
     by_surface = 0.3 / (float(thermal_conductivity(300.0)[0]) * 20.25)
     kappa = lambda K: 1.0 / (1.0 / float(thermal_conductivity(K)[0]) + by_surface)  # noqa: E731
@@ -84,11 +95,11 @@ def test_a_cone_in_air_is_a_fin():
     z = np.linspace(0.0, tip.height_um, 30)
     fixed = lambda a, b: np.array([a[0] - 400.0, a[1] - 1e-3])  # noqa: E731
     exact = solve_bvp(slopes, fixed, z, np.stack([400.0 + 0 * z, 1e-3 + 0 * z]), tol=1e-6)
-    T, heat, _ = up_the_cone(tip, np.array([400.0]), np.array([1e-3]), base, air)
+    T, heat, _ = at_the_lever(tip, np.array([400.0]), np.array([1e-3]), base, air)
     assert pytest.approx(exact.y[0, -1], abs=1e-4) == T
     assert heat == pytest.approx(exact.y[1, -1], rel=1e-4)
     # of a cold cone it is what it would be in vacuum, where no heat comes through its end too
-    *_, cone = up_the_cone(tip, np.array([base + 0.01]), np.array([0.0]), base, air)
+    *_, cone = at_the_lever(tip, np.array([base + 0.01]), np.array([0.0]), base, air)
     assert cone == pytest.approx(cold_resistance(tip, base), rel=1e-4)
 
 
@@ -194,7 +205,7 @@ def test_the_law_is_a_series_of_resistances():
     assert beside == pytest.approx(0.0, abs=1e-12)
     assert apex - surface == pytest.approx(heat * 5e4, rel=1e-9)
     assert apex - 293.0 == pytest.approx(heat * (5e4 + law.spreading_K_per_mW), rel=1e-9)
-    T, *_ = up_the_cone(SHARP, apex, heat, 293.0)
+    T, *_ = at_the_lever(SHARP, apex, heat, 293.0)
     assert pytest.approx(293.0 + rise, rel=1e-7) == T
     cold = 5e4 + law.spreading_K_per_mW + cold_resistance(SHARP, 293.0)
     assert heat[0] == pytest.approx(1.0 / cold, rel=1e-4)

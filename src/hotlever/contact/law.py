@@ -13,8 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hotlever.contact.cone import AirBeside, along_the_cone, cold_resistance, up_the_cone
-from hotlever.contact.spreading import axis_rise, contact_resistance
+from hotlever.contact.resistances import (
+    AirBeside,
+    axis_rise,
+    cold_resistance,
+    contact_resistance,
+    up_the_cone,
+)
 from hotlever.materials.laws import Evaluated
 from hotlever.probe import Probe
 from hotlever.types import Array
@@ -64,6 +69,7 @@ class ContactLaw:
         assert tip is not None
         assert contact is not None
         self._probe, self._tip = probe, tip
+        self._others: dict[tuple[str, float], ContactLaw] = {}
         self.base_temperature_K = probe.circuit.base_temperature_K
         layers = contact.layers
         self.interface_K_per_mW = contact.interface_K_per_mW
@@ -94,11 +100,11 @@ class ContactLaw:
             at_apex = driving / (1.0 + above / below)
             heat = driving / (below + above)
             base, air = self.base_temperature_K, self._air
-            T, into_tip, cone = up_the_cone(self._tip, base + at_apex, heat, base, air)
-            rise = T - base
+            _, T, into_tip, cone = up_the_cone(self._tip, base + at_apex, heat, base, air)
+            rise = T[-1] - base
             # a hot cone resists more: no more of the table than is of use
             driving = _rises(float(np.interp(_HIGHEST_K, rise, driving)))
-        return CubicSpline(rise, np.stack([into_tip, heat, at_apex, cone], axis=1))
+        return CubicSpline(rise, np.stack([into_tip[-1], heat, at_apex, cone[-1]], axis=1))
 
     def heat(self, rise: Array, names: Sequence[str] = ()) -> Evaluated:
         """Return the heat (mW) that enters the tip at rises (K) of its base.
@@ -108,13 +114,8 @@ class ContactLaw:
         """
         inside = np.clip(rise, self._table.x[0], self._table.x[-1])
         slope = self._table(inside, 1)[..., 0]
-        by = {
-            name: self._by(name, lambda law: law.heat(rise)[0])
-            if name in self.names
-            else np.zeros_like(rise)
-            for name in names
-        }
         value = self._table(inside)[..., 0] + slope * (rise - inside)
+        by = {name: self._by(name, lambda law: law.heat(rise)[0], value) for name in names}
         return value, {**by, "T": slope}
 
     def at(self, tip_K: Array) -> AtTheContact:
@@ -144,10 +145,7 @@ class ContactLaw:
             return np.asarray(np.log(risen / (tip - risen)))
 
         value = odds(self)
-        by = {
-            name: self._by(name, odds) if name in self.names else np.zeros_like(value)
-            for name in names
-        }
+        by = {name: self._by(name, odds, value) for name in names}
         change = odds(self, 1.0 + _STEP) - odds(self, 1.0 - _STEP)
         return value, {**by, "T": np.where(rise > _WARM_K, change / (2.0 * _STEP * warm), 0.0)}
 
@@ -157,10 +155,9 @@ class ContactLaw:
         By the temperature of the tip's base, and for depths (µm) in the sample, above zero.
         """
         apex, _, heat, *_ = self.at(np.array([tip_K]))
-        ends = float(apex[0]), float(heat[0])
-        height, T = along_the_cone(self._tip, *ends, self.base_temperature_K, self._air)
-        rise = (ends[0] - self.base_temperature_K) * axis_rise(*self._below, depth_um)
-        return height, T, self.base_temperature_K + rise
+        height, T, *_ = up_the_cone(self._tip, apex, heat, self.base_temperature_K, self._air)
+        rise = (apex - self.base_temperature_K) * axis_rise(*self._below, depth_um)
+        return height, T[:, 0], self.base_temperature_K + rise
 
     @property
     def sum_by_interface(self) -> float:
@@ -174,8 +171,10 @@ class ContactLaw:
         """The numbers of a probe on which the law depends."""
         return (INTERFACE, *_NUMBERS, *(("gas_conductivity",) if self._air else ()))
 
-    def _by(self, name: str, what: Callable[[ContactLaw], Array]) -> Array:
-        """Return how something of the law changes with a number of the probe."""
+    def _by(self, name: str, what: Callable[[ContactLaw], Array], here: Array) -> Array:
+        """Return how what something of the law is here changes with a number of the probe."""
+        if name not in self.names:
+            return np.zeros_like(here)
         (value,) = self._probe.values([name])
         step = _STEP * (self.below_apex_K_per_mW if name == INTERFACE else value)
         # an interface may have none, and no less: by both sides further up, then
@@ -190,10 +189,6 @@ class ContactLaw:
             self._others[key] = ContactLaw(self._probe.replace({name: value}))
         return self._others[key]
 
-    @cached_property
-    def _others(self) -> dict[tuple[str, float], ContactLaw]:
-        return {}
-
 
 def _rises(highest: float) -> Array:
     """Return rises (K) at which the law is tabulated, zero among them."""
@@ -201,11 +196,7 @@ def _rises(highest: float) -> Array:
     return np.concatenate([cooler, np.linspace(0.0, highest, _TABULATED)])
 
 
+@lru_cache(maxsize=16)
 def contact_of(probe: Probe) -> ContactLaw | None:
     """Return the law of a probe's contact; None if it touches nothing."""
-    return None if probe.contact is None else _law(probe)
-
-
-@lru_cache(maxsize=16)
-def _law(probe: Probe) -> ContactLaw:
-    return ContactLaw(probe)
+    return None if probe.contact is None else ContactLaw(probe)

@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hotlever.contact.cone import cold_resistance
-from hotlever.contact.spreading import contact_resistance
+from hotlever.contact.resistances import cold_resistance, contact_resistance
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.noise import johnson_without_feedback
