@@ -17,7 +17,7 @@ from hotlever import Lever, Probe
 from hotlever.app import approaching, touching
 from hotlever.app.jobs import Task
 from hotlever.lever.reader import over_surface
-from hotlever.tasks.approaching import jumping_at_tip
+from hotlever.tasks.surfaces import jumping_at_tip
 from problems import table
 
 

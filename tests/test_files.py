@@ -73,6 +73,14 @@ def test_a_pipe_is_read_to_its_end_however_slow_its_writer(tmp_path):
     assert content == b"x" * 300_000
 
 
+def test_a_file_is_read_where_only_sockets_can_be_waited_for(tmp_path, monkeypatch):
+    """As on Windows."""
+    (tmp_path / "a.csv").write_bytes(b"1,2\n")
+    monkeypatch.delattr(os, "O_NONBLOCK")
+    monkeypatch.setattr("select.select", None)
+    assert read_bytes(tmp_path / "a.csv") == b"1,2\n"
+
+
 def test_a_pipe_that_nobody_writes_to_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "PATIENCE_S", 0.1)
     os.mkfifo(tmp_path / "pipe")

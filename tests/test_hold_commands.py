@@ -80,7 +80,7 @@ def test_a_loop_that_is_lost_is_told(run):
         (("sweep", "--hold-power", "1mW:2mW"), "START:STOP:COUNT, such as 1mW:4mW:7"),
         (
             ("sweep", "--hold-power", "1mW", "--bias", "1:2:2"),
-            "found --hold-power, --bias: expected",
+            "--bias and --hold-power: expected only one of them",
         ),
         (("sweep", "--hold-power", "1mW", "--model", "full-3d"), "goes with --model flat"),
         (("pulse", *CONTROL[:2], "--step", "4V"), "--hold-resistance: goes with --controller P,I"),

@@ -32,7 +32,7 @@ PACKAGES = {f"hotlever.{path.parent.name}" for path in SOURCE.glob("*/__init__.p
 FLOORS = {
     "ground": ("colours", "errors", "memory", "plotting", "threads", "types"),
     "numbers and files": ("files", "piecewise", "records", "spieser2017", "steps", "units"),
-    "texts": ("cache", "datasets", "measurands", "text", "unforeseen"),
+    "texts": ("cache", "datasets", "measurands", "text"),
     "tables and processes": ("cluster", "processes", "tables"),
     "materials": ("materials",),
     "probe": ("probe",),

@@ -115,7 +115,7 @@ def test_what_was_reached_before_silicon_melts_is_written(run, tmp_path):
     ("words", "found"),
     [
         ((), "found none: expected one of --step, --pulse"),
-        (("--step", "1", "--ramp", "1,2us"), "found --step, --ramp: expected one of"),
+        (("--step", "1", "--ramp", "1,2us"), "--step and --ramp: expected only one of them"),
         (("--step", "x"), "--step: found 'x', expected a number with a unit like V"),
         (("--step", "1e9"), "--step: found a bias of 1e+09 V"),
         (("--pulse", "10V"), "--pulse: found '10V', expected V,TIME"),

@@ -85,7 +85,10 @@ def cluster_workers(address: str) -> Iterator[ClusterWorkers]:
         If nothing answers at the address, or a worker has another version or none.
     """
     where = f"--scheduler {address}"
-    levels = _silence()
+    # Dask's logs are kept from standard error
+    levels = {name: logging.getLogger(name).level for name in _LOGGERS}
+    for name in levels:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         with _connected(address, where) as client:
             yield ClusterWorkers(client)
@@ -135,14 +138,6 @@ def _connected(address: str, where: str) -> Iterator[Client]:
                     f"{where}: at worker {worker} hotlever is {version}, expected {__version__}"
                 )
         yield client
-
-
-def _silence() -> dict[str, int]:
-    """Keep Dask's logs from standard error; return the levels they had."""
-    levels = {name: logging.getLogger(name).level for name in _LOGGERS}
-    for name in levels:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-    return levels
 
 
 def _version() -> str:

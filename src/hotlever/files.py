@@ -49,7 +49,8 @@ def read_bytes(path: Name, largest: int = LARGEST_TEXT) -> bytes:
             kind = _kind(file.fileno())
             if kind not in ("file", "pipe"):
                 raise InputError(f"{path}: is a {kind}, expected a file")
-            while select.select([file], [], [], PATIENCE_S)[0]:
+            # a file is always ready, and on Windows nothing but a socket can be asked
+            while kind == "file" or select.select([file], [], [], PATIENCE_S)[0]:
                 part = file.read(2**20)
                 if part == b"":
                     return bytes(content)
@@ -70,7 +71,7 @@ def read_bytes(path: Name, largest: int = LARGEST_TEXT) -> bytes:
 
 def _opened(path: str, flags: int) -> int:
     """Open a file; a pipe too, where opening would wait for a writer who may never come."""
-    return os.open(path, flags | os.O_NONBLOCK)
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def read_text(path: Name, largest: int = LARGEST_TEXT) -> str:

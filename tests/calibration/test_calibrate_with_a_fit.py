@@ -61,7 +61,7 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--fit", "a", "--probe", "b"), "--fit and --probe: expected at most one of"),
+        (("--fit", "a", "--probe", "b"), "--fit and --probe: expected only one of them"),
         (("--medium", "vacum"), "--medium vacum: expected vacuum or air"),
         (("--table", "t.txt"), "unknown file type '.txt'"),
         (("--prior", "n_d"), "--prior n_d: expected NAME=VALUE±SPREAD"),

@@ -299,7 +299,10 @@ def test_the_worst_failure_decides_the_exit_status():
         ((), "2 data files: expected -o FOLDER or --report DIR"),
         (("-o", "out", "--fix", "nd"), "did you mean 'n_d'"),
         (("-o", "out", "--processes", "0"), "--processes 0: expected a number from 1"),
-        (("-o", "out", "--processes", "2", "--scheduler", "tcp://a:1"), "not both"),
+        (
+            ("-o", "out", "--processes", "2", "--scheduler", "tcp://a:1"),
+            "expected only one of them",
+        ),
         (("-o", "a.csv"), "a.csv: cannot be made a folder"),
         (("-o", "out", "--scheduler", "tcp://127.0.0.1:1"), "no scheduler answers there"),
     ],

@@ -28,7 +28,7 @@ from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.solid import SolidMeshOptions
 from hotlever.probe.tip import OUT_OF_CONTACT
-from hotlever.tasks.contacting import what_the_current_tells
+from hotlever.tasks.surfaces import what_the_current_tells
 
 TIP = {"tip.height_um": 0.7, "tip.half_angle_deg": 20.0, "tip.apex_radius_um": 0.1}
 

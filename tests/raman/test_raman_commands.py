@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import synthetic_spectra as synthetic
-from hotlever.cli.options import spread_option
+from hotlever.cli.commands import spread_option
 from hotlever.figures import raman as figures
 from hotlever.raman.calibration import published_raman_calibration
 from hotlever.raman.reading import read_spectra
@@ -172,7 +172,7 @@ BAD = {
     "not a spectrum": (["raman", "log.csv"], "log.csv: the axis runs from 1 to 30"),
     "two calibrations": (
         ["raman", "tip", "--calibration", "c.json", "--calibrate-from", "plate"],
-        "--calibration or --calibrate-from, not both",
+        "--calibration and --calibrate-from: expected only one of them",
     ),
     "broken calibration": (["raman", "tip", "--calibration", "log.csv"], "not valid JSON"),
     "law": (["raman", "tip", "--law", "quadratic"], "unknown law 'quadratic'"),

@@ -119,7 +119,7 @@ def test_a_search_that_is_cut_off_has_the_best_that_it_saw(monkeypatch):
         (["--minimise", "power_mW", "--within", "n_d=1e17"], "expected LOW:HIGH"),
         (["--minimise", "power_mW", "--within", "n_d=1e17:"], "expected both"),
         (["--minimise", "power_mW", "--within", "n_d=2e17:1e17"], "expected a rising range"),
-        (["--minimise", "power_mW", "--maximise", "tip_K"], "found both, expected one"),
+        (["--minimise", "power_mW", "--maximise", "tip_K"], "expected only one of them"),
         (["--minimise", "power_mW", "--within", "gap_um=-1:5"], "gap_um = -1: expected at least"),
         (["--minimise", "power_mW", "--within", "n_d=0:1e18"], "n_d = 0: expected at least 5e+15"),
         (["--within", "n_d=1e17:1e18"], "goes with --minimise"),

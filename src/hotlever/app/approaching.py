@@ -25,8 +25,8 @@ from hotlever.lever.reader import Reader, Signal, at_distance
 from hotlever.probe import Layout, Probe
 from hotlever.probe.shapes import Shape
 from hotlever.steps import each
-from hotlever.tasks.approaching import jumping_at_tip, needs_jump, noise_of, probe_over_surface
-from hotlever.tasks.ranges import parse_bias, parse_distances
+from hotlever.tasks.surfaces import jumping_at_tip, needs_jump, noise_of, probe_over_surface
+from hotlever.tasks.texts import parse_bias, parse_distances
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 

@@ -34,7 +34,7 @@ from hotlever.lever.streamline import current_path
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.probe.shapes import EDGE_BIAS
-from hotlever.tasks.probes import make_lever
+from hotlever.tasks.shared import make_lever
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 

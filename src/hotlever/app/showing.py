@@ -47,7 +47,7 @@ from hotlever.report.calibration_pages import calibration_page
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.page import Block, Page
 from hotlever.tasks.reporter import Silence
-from hotlever.tasks.thermometry import set_up
+from hotlever.tasks.spectra import set_up
 from hotlever.types import Array
 
 #: Results kept, whose figures may be asked for as files.

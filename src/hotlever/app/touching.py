@@ -23,8 +23,8 @@ from hotlever.lever.contact import state_in_contact, sweep_in_contact
 from hotlever.lever.lever import COARSE, State
 from hotlever.probe import Probe
 from hotlever.probe.tip import EXAMPLE, OUT_OF_CONTACT
-from hotlever.tasks.contacting import notes_of, probe_in_contact
-from hotlever.tasks.probes import make_lever
+from hotlever.tasks.shared import make_lever
+from hotlever.tasks.surfaces import contact_notes, probe_in_contact
 from hotlever.threads import one_blas_thread
 
 #: Biases of the curves, and levers kept.
@@ -77,7 +77,7 @@ def answer(report: Report, task: Task, bias: float, most: float, quick: bool) ->
     else:
         free, lever = _touching(report, probe, max(most, bias))
         data = sweep_in_contact(lever, [bias], free=free)
-        report.note(*notes_of(data))
+        report.note(*contact_notes(data))
         now = {str(name): float(values.item()) for name, values in data.data_vars.items()}
         curves = _curves(report, probe, max(most, bias))
     drawn = contact_picture(probe, now["tip_K"])

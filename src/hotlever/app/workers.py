@@ -26,10 +26,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NoReturn
 
-from hotlever.errors import HotleverError
+from hotlever.errors import HotleverError, unforeseen_error
 from hotlever.memory import give_back
 from hotlever.types import Progress
-from hotlever.unforeseen import unforeseen_error
 
 #: Number of what a process says of no call.
 _ANY = 0
@@ -39,8 +38,7 @@ _TIDY_S = 0.6
 _REST_S = 1.0
 #: Modules that a process imports before it is asked for anything, so that it then answers at once.
 _READY = (
-    *("hotlever.tasks.fitting", "hotlever.tasks.calibrating"),
-    *("hotlever.tasks.simulating", "hotlever.tasks.sweeping"),
+    *("hotlever.tasks.estimating", "hotlever.tasks.simulating", "hotlever.tasks.sweeping"),
     *("hotlever.figures", "hotlever.lever", "hotlever.report.fit_pages", "hotlever.raman"),
 )
 _LOST = (

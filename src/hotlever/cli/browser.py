@@ -9,11 +9,10 @@ from pathlib import Path
 
 import typer
 
-from hotlever.errors import InputError
+from hotlever.errors import InputError, unforeseen_error
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import argument, option
 from hotlever.tasks.texts import check_number
-from hotlever.unforeseen import unforeseen_error
 
 #: Where a password may stand, that would be seen by others on the command line.
 _PASSWORD = "HOTLEVER_APP_PASSWORD"

@@ -1,58 +1,31 @@
 """The ``hotlever`` command: a command line of the commands that there are.
 
-A command is parsed, done and reported. What it computes with is imported when it is done, so that
-the command line answers at once.
+The fields of a request are arguments and options of its command, which is parsed, done and
+reported. What it computes with is imported when it is done, so that the command line answers at
+once.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections import deque
+from dataclasses import MISSING, fields
+from inspect import Parameter, Signature
+from typing import Annotated, Any, get_type_hints
 
 import typer
 import typer.core
 
 from hotlever import __version__
+from hotlever.cli import output as terminal
 from hotlever.cli.browser import AppRequest
-from hotlever.cli.options import add_command
-from hotlever.cli.output import give
 from hotlever.errors import InputError, unknown_name
 from hotlever.tasks.commands import COMMANDS, Command
 
 _EVERY = {**COMMANDS, "app": Command(AppRequest, "hotlever.cli.browser", "open_app")}
 #: What the commands are for whose names have a word in common.
 _GROUPS = {"probe": "Write, describe, draw and import probes."}
-
-
-class Commands(typer.core.TyperGroup):
-    """A command group that answers a typo with the nearest command, and reads options once."""
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command, or raise with the nearest name that exists."""
-        command = super().get_command(ctx, cmd_name)
-        if command is None:
-            raise unknown_name("command", cmd_name, self.list_commands(ctx))
-        return command
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command and its arguments; an option given twice would lose a value."""
-        name, command, rest = super().resolve_command(ctx, args)
-        if command is not None and not isinstance(command, Commands):
-            inner = command.context_class(command, info_name=name, parent=ctx)
-            _, _, options = command.make_parser(inner).parse_args(list(rest))
-            for option in options:
-                if options.count(option) > 1 and not option.multiple:
-                    raise InputError(f"{option.opts[-1]}: given twice, expected once")
-        return name, command, rest
-
-
-def root(
-    version: bool = typer.Option(
-        False, "--version", help="Print the version and exit.", is_eager=True
-    ),
-) -> None:
-    if version:
-        give(f"{__version__}\n")
-        raise typer.Exit
+#: The option that takes all paths up to the next option.
+_SPREAD = "--calibrate-from"
 
 
 def command_line(word: str = "") -> Any:
@@ -76,3 +49,107 @@ def command_line(word: str = "") -> Any:
             app.add_typer(groups[group], name=group)
         add_command(groups[group], last, command)
     return typer.main.get_command(app)
+
+
+class Commands(typer.core.TyperGroup):
+    """A command group that answers a typo with the nearest command."""
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command, or raise with the nearest name that exists."""
+        command = super().get_command(ctx, cmd_name)
+        if command is None:
+            raise unknown_name("command", cmd_name, self.list_commands(ctx))
+        return command
+
+
+def root(
+    version: bool = typer.Option(
+        False, "--version", help="Print the version and exit.", is_eager=True
+    ),
+) -> None:
+    if version:
+        terminal.give(f"{__version__}\n")
+        raise typer.Exit
+
+
+def add_command(commands: typer.Typer, name: str, command: Command) -> None:
+    """Add a command of some name to others."""
+    types = get_type_hints(command.request)
+    parameters = []
+    for field in fields(command.request):
+        texts, names = field.metadata["texts"], field.metadata.get("names")
+        stated = typer.Argument(**texts) if names is None else typer.Option(*names, **texts)
+        default = Parameter.empty if field.default is MISSING else field.default
+        kind: Any = Annotated[types[field.name], stated]
+        parameters.append(
+            Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+        )
+
+    def run(**values: Any) -> None:
+        raise typer.Exit(command.do(terminal, command.request(**values)))
+
+    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    run.__doc__ = command.request.__doc__
+    commands.command(name, cls=_Command)(run)
+
+
+class _Command(typer.core.TyperCommand):
+    """A command none of whose options may be given twice, which would lose a value.
+
+    Its ``--calibrate-from``, if it has one, takes all paths up to the next option. Where that would
+    leave no spectra to measure, it takes the first path only, so that ``hotlever raman
+    --calibrate-from hot-plate/ tip/`` means what it says.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat the option before each of its paths, then parse as usual."""
+        options = [param for param in self.params if param.param_type_name == "option"]
+        valued = [option for option in options if not getattr(option, "is_flag", False)]
+        names = {name for option in valued for name in option.opts}
+        if _SPREAD in names:
+            args = spread_option(args, _SPREAD, names)
+        _, _, given = self.make_parser(ctx).parse_args(list(args))
+        for option in given:
+            if given.count(option) > 1 and not option.multiple:
+                raise InputError(f"{option.opts[-1]}: given twice, expected once")
+        return super().parse_args(ctx, args)
+
+
+def spread_option(args: list[str], option: str, takes_value: set[str]) -> list[str]:
+    """Turn ``--option a b`` into ``--option a --option b``.
+
+    Examples
+    --------
+    >>> spread_option(["x", "--from", "a", "b", "-o", "c"], "--from", {"--from", "-o"})
+    ['x', '--from', 'a', '--from', 'b', '-o', 'c']
+    >>> spread_option(["--from", "a", "b"], "--from", {"--from"})
+    ['--from', 'a', 'b']
+    """
+    # each option with its values, and each other word by itself
+    parts: list[list[str]] = []
+    words = deque(args)
+    while words:
+        word = words.popleft()
+        name, equals, value = word.partition("=")
+        part = [word]
+        if name == option:
+            part = [option, value] if equals else [option]
+            while words and not words[0].startswith("-"):
+                part.append(words.popleft())
+        elif word.startswith("-") and word in takes_value and words:
+            part.append(words.popleft())
+        parts.append(part)
+    groups = [part for part in parts if part[0] == option and len(part) > 1]
+    if groups and all(part[0].startswith("-") for part in parts):
+        # nothing is left to measure: what follows the first path of the last group
+        last = groups[-1]
+        parts.insert(parts.index(last) + 1, last[2:])
+        del last[2:]
+    out: list[str] = []
+    for part in parts:
+        if part in groups:
+            out += [word for value in part[1:] for word in (option, value)]
+        else:
+            out += part
+    return out

@@ -16,8 +16,7 @@ from types import FrameType
 from typing import NoReturn
 
 from hotlever.cli.output import fail, give
-from hotlever.errors import HotleverError
-from hotlever.unforeseen import unforeseen_error
+from hotlever.errors import HotleverError, unforeseen_error
 
 #: Signals that end a command, and those that have come: a compiled module that is stopped while
 #: it is imported says something else.

@@ -1,7 +1,7 @@
 """The coupled electro-thermal problem of a lever in vacuum or air, and sweeps over the bias."""
 
 from hotlever.lever.branch import Branch, OperatingPoint
-from hotlever.lever.dataset import probe_of, read_sweep, sweep_csv, write_sweep
+from hotlever.lever.dataset import probe_of, read_sweep, write_sweep
 from hotlever.lever.lever import Lever, State, sweep
 
 __all__ = [
@@ -12,6 +12,5 @@ __all__ = [
     "probe_of",
     "read_sweep",
     "sweep",
-    "sweep_csv",
     "write_sweep",
 ]

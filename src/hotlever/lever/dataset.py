@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from hotlever.datasets import (
     CHECKSUM,
     checksum,
-    csv_text,
     in_a_file,
     labelled,
     offer_plots,
@@ -190,11 +189,6 @@ def write_sweep(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
         If the suffix is neither, or the file cannot be written.
     """
     write_dataset(data, path, in_a_file(data, SWEEP_COLUMNS))
-
-
-def sweep_csv(data: xr.Dataset) -> str:
-    """Return a sweep as CSV text, one row per bias; empty where a value does not exist."""
-    return csv_text(data, in_a_file(data, SWEEP_COLUMNS))
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:

@@ -46,6 +46,8 @@ _ROOM_K = 293.0
 _FOUR_K = 4e3 * Boltzmann
 #: µm⁻³ per cm⁻³.
 _PER_UM3 = 1e-12
+#: What options may be at most.
+_MOST = {"low_Hz": 1e12, "high_Hz": 1e12, "amplifier_V": 1.0, "hooge": 1.0, "vibration_nm": 1e3}
 
 
 @dataclass(frozen=True)
@@ -77,9 +79,11 @@ class NoiseOptions:
 
     def __post_init__(self) -> None:
         for each in fields(self):
-            value = getattr(self, each.name)
-            if not (math.isfinite(value) and value >= 0):
-                raise InputError(f"{each.name}: found {value:g}, expected a number of 0 or more")
+            value, most = getattr(self, each.name), _MOST[each.name]
+            if not 0.0 <= value <= most:
+                raise InputError(
+                    f"{each.name}: found {value:g}, expected a number from 0 to {most:g}"
+                )
         if not 0 < self.low_Hz < self.high_Hz:
             raise InputError(
                 f"found a band from {self.low_Hz:g} to {self.high_Hz:g} Hz, expected one from a "

@@ -7,7 +7,6 @@ from importlib import import_module
 from typing import Any
 
 from hotlever.tasks.caching import CacheRequest
-from hotlever.tasks.design_requests import DesignRequest, ImportRequest, NewRequest, ShowRequest
 from hotlever.tasks.evidence import ReproduceRequest, ValidateRequest
 from hotlever.tasks.measured_requests import (
     CalibrateRequest,
@@ -16,11 +15,17 @@ from hotlever.tasks.measured_requests import (
     RamanCheckRequest,
     RamanRequest,
 )
-from hotlever.tasks.next_requests import NextRequest
+from hotlever.tasks.planning_requests import (
+    DesignRequest,
+    ImportRequest,
+    MaterialsRequest,
+    NewRequest,
+    NextRequest,
+    ShowRequest,
+)
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.requests import (
     ContactRequest,
-    MaterialsRequest,
     PulseRequest,
     ReaderRequest,
     SpectrumRequest,
@@ -65,20 +70,20 @@ class Command:
 COMMANDS = {
     "probe new": Command(NewRequest, "hotlever.tasks.describing", "new_probe"),
     "probe show": Command(ShowRequest, "hotlever.tasks.describing", "show_probe"),
-    "probe import": Command(ImportRequest, "hotlever.tasks.importing", "propose_probe"),
+    "probe import": Command(ImportRequest, "hotlever.tasks.describing", "propose_probe"),
     "materials": Command(MaterialsRequest, "hotlever.tasks.describing", "list_materials"),
     "sweep": Command(SweepRequest, "hotlever.tasks.sweeping", "sweep"),
     "pulse": Command(PulseRequest, "hotlever.tasks.simulating", "simulate_in_time"),
-    "contact": Command(ContactRequest, "hotlever.tasks.contacting", "touch"),
-    "reader": Command(ReaderRequest, "hotlever.tasks.approaching", "approach"),
-    "spectrum": Command(SpectrumRequest, "hotlever.tasks.small_signals", "respond"),
+    "contact": Command(ContactRequest, "hotlever.tasks.surfaces", "touch"),
+    "reader": Command(ReaderRequest, "hotlever.tasks.surfaces", "approach"),
+    "spectrum": Command(SpectrumRequest, "hotlever.tasks.sweeping", "respond"),
     "design": Command(DesignRequest, "hotlever.tasks.designing", "vary_design"),
     "raman": Command(RamanRequest, "hotlever.tasks.spectra", "measure_spectra"),
     "join": Command(JoinRequest, "hotlever.tasks.spectra", "join_spectra"),
     "raman-check": Command(RamanCheckRequest, "hotlever.tasks.spectra", "check_linear_law"),
-    "fit": Command(FitRequest, "hotlever.tasks.fitting", "fit_files"),
-    "calibrate": Command(CalibrateRequest, "hotlever.tasks.calibrating", "calibrate_files"),
-    "next": Command(NextRequest, "hotlever.tasks.planning", "propose"),
+    "fit": Command(FitRequest, "hotlever.tasks.estimating", "fit_files"),
+    "calibrate": Command(CalibrateRequest, "hotlever.tasks.estimating", "calibrate_files"),
+    "next": Command(NextRequest, "hotlever.tasks.estimating", "propose"),
     "reproduce": Command(ReproduceRequest, "hotlever.tasks.evidence", "reproduce"),
     "validate": Command(ValidateRequest, "hotlever.tasks.evidence", "validate"),
     "cache": Command(CacheRequest, "hotlever.tasks.caching", "show_cache"),

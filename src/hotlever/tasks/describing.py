@@ -1,22 +1,28 @@
-"""Probes and materials, written, drawn and described."""
+"""Probes and materials, written, drawn, described and imported."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from hotlever.errors import unknown_name
-from hotlever.lever.discretisation import chosen_space
+from hotlever.files import write_text
 from hotlever.materials import Kind
 from hotlever.materials.catalogue import curves, listing
 from hotlever.probe import Probe, ProbeMesh
 from hotlever.probe.drawing.outlines import DrawingError
+from hotlever.probe.importing import import_drawing
 from hotlever.probe.layout import Layout, Taper
 from hotlever.probe.shapes import Parametric
-from hotlever.tasks.design_requests import NEW_PROBES, NewRequest, ShowRequest
-from hotlever.tasks.files import draw
-from hotlever.tasks.probes import read_probe
+from hotlever.tasks.planning_requests import (
+    NEW_PROBES,
+    ImportRequest,
+    MaterialsRequest,
+    NewRequest,
+    ShowRequest,
+)
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import MaterialsRequest
+from hotlever.tasks.shared import draw, read_probe
 
 
 def new_probe(reporter: Reporter, request: NewRequest) -> None:
@@ -33,24 +39,24 @@ def new_probe(reporter: Reporter, request: NewRequest) -> None:
 
 def show_probe(reporter: Reporter, request: ShowRequest) -> None:
     """Draw and describe a probe; outlines that make none are drawn with what is wrong of them."""
-    outputs = request.outputs()
+    request.outputs()
     try:
         probe = read_probe(reporter, request.probe)
     except DrawingError as error:
         fault = error
-        with outputs.together():
-            draw(
-                request.plot,
-                lambda figures: figures.outlines_drawing(
-                    fault.outlines, fault=str(fault), fault_at=fault.place
-                ),
-            )
+        draw(
+            request.plot,
+            lambda figures: figures.outlines_drawing(
+                fault.outlines, fault=str(fault), fault_at=fault.place
+            ),
+        )
         raise
+    from hotlever.lever.discretisation import chosen_space  # brings all of the lever along
+
     name = "reference probe" if request.probe is None else request.probe.name
     layout, triangles = probe.layout(), chosen_space(probe).mesh
     drawn = triangles if request.mesh else None
-    with outputs.together():
-        draw(request.plot, lambda figures: figures.probe_drawing(layout, name, mesh=drawn))
+    draw(request.plot, lambda figures: figures.probe_drawing(layout, name, mesh=drawn))
     reporter.give(_probe_text(probe, triangles, name))
 
 
@@ -133,13 +139,39 @@ def _regions(layout: Layout) -> list[str]:
     return lines
 
 
+def propose_probe(reporter: Reporter, request: ImportRequest) -> None:
+    """Say what a drawing holds, and propose a probe file for it."""
+    drawing, output, unit = request.drawing, request.output, request.known_unit
+    outputs = request.outputs()
+    folder = Path() if output is None else output.parent
+    proposed = import_drawing(drawing, request.cell, folder, unit)
+    fault = proposed.fault
+    fault_at = fault.place if isinstance(fault, DrawingError) else None
+    with outputs.together():
+        if output is not None:
+            write_text(output, proposed.text)
+        draw(
+            request.plot,
+            lambda figures: figures.outlines_drawing(
+                proposed.outlines,
+                drawing.name,
+                tip=proposed.inference.tip,
+                fault="" if fault_at is None else str(fault),
+                fault_at=fault_at,
+            ),
+        )
+    reporter.give(proposed.text if output is None else "\n".join([*proposed.listing, ""]))
+    reporter.note(*proposed.notes)
+    if fault is not None:
+        reporter.note(f"the probe file needs an edit before it can be solved: {fault}")
+
+
 def list_materials(reporter: Reporter, request: MaterialsRequest) -> None:
     """List kinds of material, or those of a probe, and draw their laws."""
-    outputs = request.outputs()
+    request.outputs()
     chosen: tuple[Any, ...] = ()
     if request.probe is not None:
         probe = read_probe(reporter, request.probe)
         chosen = probe.made_of, probe.layout().thickness_um
-    with outputs.together():
-        draw(request.plot, lambda figures: figures.material_curves(curves(*chosen)))
+    draw(request.plot, lambda figures: figures.material_curves(curves(*chosen)))
     reporter.give("\n".join([*listing(*chosen[:1]), ""]))

@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from hotlever.datasets import write_dataset
-from hotlever.errors import InputError
 from hotlever.files import write_text
 from hotlever.probe.shapes import DRAWING
 from hotlever.studies import design as study
-from hotlever.tasks.design_requests import DesignRequest
-from hotlever.tasks.files import draw
-from hotlever.tasks.probes import read_probe
-from hotlever.tasks.ranges import parse_varied
+from hotlever.tasks.planning_requests import DesignRequest
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.texts import check_number, parse_bounds, parse_setting
+from hotlever.tasks.shared import draw, read_probe
+from hotlever.tasks.texts import check_number, parse_bounds, parse_setting, parse_varied
 
 #: Numbers that are varied at once of which there are figures: a curve or a map.
 _DRAWN = 2
@@ -26,16 +23,17 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
     if request.asks_for_best:
         optimise_design(reporter, request)
         return
-    output, plot, outputs = request.output, request.plot, request.outputs()
+    output, outputs = request.output, request.outputs()
     asked: Any = {"power_mW": request.power, "air": request.air}
     check_number("--power", request.power, 1e-3, 1000)
     check_number("--annealing-K", request.annealing_K, 700, 1700)
     check_number("--annealing-min", request.annealing_min, 1e-3, 1e5)
     varied = parse_varied(request.vary or [])
-    if not varied and (plot is not None or output is not None):
-        raise InputError("a file or a figure needs a sweep: --vary NAME=START:STOP:COUNT")
-    if plot is not None and len(varied) > _DRAWN:
-        raise InputError(f"--plot: found {len(varied)} of --vary, expected at most {_DRAWN}")
+    if not varied:
+        request.refuse("plot", "output", why="needs a sweep, --vary NAME=START:STOP:COUNT")
+    elif len(varied) > _DRAWN:
+        why = f"found {len(varied)} of --vary, expected at most {_DRAWN}"
+        request.refuse("plot", why=why)
     start = study.Design(
         request.with_physics(read_probe(reporter, request.probe)),
         request.annealing_K,
@@ -59,7 +57,7 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
             write_dataset(data, output, ())
         elif output is not None:
             write_text(output, study.design_csv(data))
-        draw(plot, lambda figures: figures.design_study(data))
+        draw(request.plot, lambda figures: figures.design_study(data))
     if output is None:
         reporter.give(study.design_csv(data))
 
@@ -70,20 +68,12 @@ def optimise_design(reporter: Reporter, request: DesignRequest) -> None:
     from hotlever.studies.working_point import WorkingPoint
 
     outputs = request.outputs()
-    if request.minimise is not None and request.maximise is not None:
-        raise InputError("--minimise, --maximise: found both, expected one")
     probe = request.with_physics(read_probe(reporter, request.probe))
     point = WorkingPoint(*parse_setting(request.at, tip=True))
     quantity, bounds = request.minimise or request.maximise or "", parse_bounds(request.within)
     with reporter.progress("design") as update:
-        optimum = optimise(
-            probe,
-            quantity,
-            point,
-            bounds,
-            greatest=request.maximise is not None,
-            progress=update,
-        )
+        greatest = request.maximise is not None
+        optimum = optimise(probe, quantity, point, bounds, greatest=greatest, progress=update)
     if optimum.reason:
         reporter.note(f"this may not be the optimum: {optimum.reason}")
     with outputs.together():

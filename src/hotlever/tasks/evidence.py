@@ -60,7 +60,7 @@ def reproduce(reporter: Reporter, request: ReproduceRequest) -> None:
 def validate(reporter: Reporter, request: ValidateRequest) -> None:
     """Write the page and the table of published numbers, or predict those of one case."""
     if request.case is not None:
-        request.refuse(["output"], "goes without a case of your own, whose prediction is printed")
+        request.refuse("output", why="goes without a case of your own, whose prediction is printed")
         _predict(reporter, request.case)
         return
     from hotlever.datasets import frame_text

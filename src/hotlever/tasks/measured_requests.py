@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, Field, dataclass
+from dataclasses import MISSING, Field, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class MeasuredRequest(PhysicsRequest, Request):
+class MeasuredRequest(PhysicsRequest):
     """What is done with a measurement: how its file is read, and what is known beforehand."""
 
     column: list[str] | None = option(
@@ -95,10 +95,9 @@ class LeversRequest(MeasuredRequest):
     def check(self) -> None:
         """Refuse what does not go together."""
         check_number("--processes", self.processes, 1, 256)
-        if self.processes is not None and self.scheduler is not None:
-            raise InputError("--processes and --scheduler: expected one of them, not both")
-        if not self.several and self.scheduler is not None:
-            raise InputError("--scheduler: expected several data files")
+        self.at_most_one("processes", "scheduler")
+        if not self.several:
+            self.refuse("scheduler", why="expected several data files")
 
     @property
     def several(self) -> bool:
@@ -110,9 +109,9 @@ class LeversRequest(MeasuredRequest):
         return FOLDER if own.name == "output" and self.several else super().types_of(own)
 
     def need_single(self, *names: str) -> None:
-        """Refuse several data files, with options that go with one."""
-        if self.several and names:
-            raise InputError(f"{' and '.join(names)}: expected a single data file")
+        """Refuse options that go with one data file where there are several."""
+        if self.several:
+            self.refuse(*names, why="expected a single data file")
 
 
 @dataclass(kw_only=True)
@@ -154,10 +153,8 @@ class FitRequest(DriveRequest, LeversRequest):
         super().check()
         check_number("--samples", self.samples, 1, 1_000_000)
         if not self.posterior:
-            self.refuse(["samples"], "goes with --posterior")
-        if self.posterior or self.profiles:
-            self.need_single("--posterior", "--profiles")
-        self.need_single(*self.drive)
+            self.refuse("samples", why="goes with --posterior")
+        self.need_single("posterior", "profiles", *(own.name for own in fields(DriveRequest)))
 
     def options(self, probe: Probe) -> FitOptions:
         """Return what the fit of a probe is asked."""
@@ -229,20 +226,15 @@ class CalibrateRequest(PlotRequest, LeversRequest):
 
         super().check()
         if not self.posterior:
-            self.refuse(["samples"], "goes with --posterior")
+            self.refuse("samples", why="goes with --posterior")
         if self.table is None and not self.several:
-            self.refuse(["table_by", "table_step"], "goes with --table")
+            self.refuse("table_by", "table_step", why="goes with --table")
         check_budget_of(self.budget_of)
-        sources = {"--fit": self.fit, "--probe": self.probe, "--power-law": self.power_law}
-        stated = [name for name, path in sources.items() if path is not None]
-        if len(stated) > 1:
-            names = " and ".join(stated)
-            raise InputError(f"{names}: expected at most one of {', '.join(sources)}")
-        if self.physics is not None and (self.fit or self.power_law):
-            raise InputError("--physics: goes with --probe, expected neither --fit nor --power-law")
+        self.at_most_one("fit", "probe", "power_law")
+        if self.fit or self.power_law:
+            self.refuse("physics", why="goes with --probe, expected neither --fit nor --power-law")
         check_medium(self.medium, UNKNOWN_MEDIUM)
-        of_one = {"--fit": self.fit, "--table": self.table, "--plot": self.plot}
-        self.need_single(*(name for name, path in of_one.items() if path is not None))
+        self.need_single("fit", "table", "plot")
         if self.at is not None and not self.several and parse_setting(self.at)[0] != "bias_V":
             raise InputError(
                 f"--at: found {quoted(self.at)}, expected a bias such as 8V of one data file, or "

@@ -8,14 +8,13 @@ share options inherit them.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from hotlever.errors import InputError, shown
 from hotlever.files import FIGURE_TYPES, FILM_TYPES, Outputs
-from hotlever.tasks.probes import read_probe
+from hotlever.tasks.shared import read_probe
 from hotlever.units import setting
 
 if TYPE_CHECKING:
@@ -26,6 +25,9 @@ if TYPE_CHECKING:
 
 #: Times that may be asked for.
 MOST_TIMES = 10_000
+
+#: Wave forms that a text tells, as options.
+_TOLD_BY_TEXT = ("step", "pulse", "ramp", "sine")
 
 File = Path | None
 #: How the name of what is written ends if that is a folder.
@@ -54,13 +56,26 @@ def written(types: tuple[str, ...], *names: str, default: Any = None, **texts: A
 class Request:
     """What is asked of a task that writes files."""
 
-    def refuse(self, names: Collection[str], why: str) -> None:
-        """Refuse options that would do nothing: fields that are other than if left out."""
-        for own in fields(self):
-            if own.name in names and getattr(self, own.name) != own.default:
-                usual = f"--{'no-' * (own.default is True)}{own.name.replace('_', '-')}"
-                stated = [name for name in own.metadata["names"] if name.startswith("--")]
-                raise InputError(f"{(*stated, usual)[0]}: {why}")
+    def given(self, *names: str) -> list[str]:
+        """Return the options, of fields of some names, that say other than if left out."""
+        options, by_name = [], {own.name: own for own in fields(self)}
+        for name in names:
+            own = by_name[name]
+            if getattr(self, name) != own.default:
+                usual = f"--{'no-' * (own.default is True)}{name.replace('_', '-')}"
+                stated = [word for word in own.metadata["names"] if word.startswith("--")]
+                options.append((*stated, usual)[0])
+        return options
+
+    def refuse(self, *names: str, why: str) -> None:
+        """Refuse options of which any would do nothing, or contradict."""
+        for option in self.given(*names):
+            raise InputError(f"{option}: {why}")
+
+    def at_most_one(self, *names: str) -> None:
+        """Refuse several of some options."""
+        if len(options := self.given(*names)) > 1:
+            raise InputError(f"{' and '.join(options)}: expected only one of them")
 
     def inputs(self) -> list[Path]:
         """Return the files that are read: all that fields name and that are not written."""
@@ -103,18 +118,7 @@ class ProbeRequest(Request):
 
 
 @dataclass(kw_only=True)
-class MaterialsRequest(PlotRequest):
-    """List kinds of material, or those of a probe: parameters, units, bounds, laws, sources."""
-
-    probe: File = argument(
-        None,
-        metavar="[PROBE.toml]",
-        help="Probe file whose materials are listed; all kinds and presets if left out.",
-    )
-
-
-@dataclass(kw_only=True)
-class PhysicsRequest:
+class PhysicsRequest(Request):
     """Physics beyond the paper."""
 
     physics: str | None = option(
@@ -190,23 +194,23 @@ class SweepRequest(TableRequest, LeverRequest):
     @property
     def set_points(self) -> tuple[str, str, Array] | None:
         """What is held, by which option, and the set points (Ω, mW); None of a range of bias."""
-        from hotlever.tasks.ranges import parse_set_points
+        from hotlever.tasks.texts import parse_set_points
 
-        asked = {"--hold-resistance": self.hold_resistance, "--hold-power": self.hold_power}
-        given = {name: text for name, text in asked.items() if text is not None}
-        if not given:
+        self.at_most_one("bias", "hold_resistance", "hold_power")
+        if self.hold_resistance is not None:
+            what, text, unit = "resistance", self.hold_resistance, "ohm"
+        elif self.hold_power is not None:
+            what, text, unit = "power", self.hold_power, "mW"
+        else:
             return None
-        others = [*given, *(["--bias"] if self.bias is not None else [])]
-        if len(others) > 1:
-            raise InputError(f"found {', '.join(others)}: expected one of them")
+        option = f"--hold-{what}"
         if self.model != "flat":
-            raise InputError(f"{others[0]}: goes with --model flat, found {shown(self.model)}")
-        (name, text), unit = *given.items(), "mW" if self.hold_power else "ohm"
-        return name.removeprefix("--hold-"), name, parse_set_points(text, unit, name)
+            raise InputError(f"{option}: goes with --model flat, found {shown(self.model)}")
+        return what, option, parse_set_points(text, unit, option)
 
 
 @dataclass(kw_only=True)
-class DriveRequest:
+class DriveRequest(Request):
     """At most one wave form: as a text of some kind, or a table."""
 
     step: str | None = option(None, metavar="V", help="Switch the bias on, and leave it.")
@@ -217,20 +221,12 @@ class DriveRequest:
     sine: str | None = option(None, metavar="V+V@FREQ", help="Such as 3V+0.5V@20kHz.")
     waveform: File = option(None, help="A table of times and biases, such as a supply takes.")
 
-    #: Those of which each is a wave form; that of a table comes last.
-    _kinds: ClassVar = ("--step", "--pulse", "--ramp", "--sine", "--waveform")
-
-    @property
-    def drive(self) -> dict[str, Any]:
-        """Those that are given, by name."""
-        values = {field.name: getattr(self, field.name) for field in fields(DriveRequest)}
-        return {f"--{name}": value for name, value in values.items() if value is not None}
-
     def required_waveform(self) -> Waveform:
         """Return the wave form as `read_waveform` does, or raise that there is none."""
         waveform = self.read_waveform()
         if waveform is None:
-            raise InputError(f"found none: expected one of {', '.join(self._kinds)}")
+            kinds = ", ".join(f"--{kind}" for kind in (*_TOLD_BY_TEXT, "waveform"))
+            raise InputError(f"found none: expected one of {kinds}")
         return waveform
 
     def read_waveform(self) -> Waveform | None:
@@ -238,17 +234,14 @@ class DriveRequest:
         from hotlever.lever.transient import read_waveform
         from hotlever.lever.transient.waveform import waveform_from_text
 
-        names = [name for name in self._kinds if name in self.drive]
-        if len(names) > 1:
-            raise InputError(f"found {', '.join(names)}: expected one of {', '.join(self._kinds)}")
-        for name in ("--period", "--count"):
-            if name in self.drive and self.pulse is None:
-                raise InputError(f"{name}: goes with --pulse")
+        self.at_most_one(*_TOLD_BY_TEXT, "waveform")
+        if self.pulse is None:
+            self.refuse("period", "count", why="goes with --pulse")
         if self.waveform is not None:
             return read_waveform(self.waveform)
-        for name in names:
-            text, kind = self.drive[name], name.removeprefix("--")
-            return waveform_from_text(kind, text, self.period, self.count, mark="--")
+        for kind in _TOLD_BY_TEXT:
+            if (text := getattr(self, kind)) is not None:
+                return waveform_from_text(kind, text, self.period, self.count, mark="--")
         return None
 
 
@@ -313,9 +306,10 @@ class PulseRequest(TableRequest, LeverRequest, TimesRequest):
 
     def need_no_waveform(self) -> None:
         """Refuse what does not go with a page, which has wave forms of its own."""
-        others = {own.name for own in fields(self)} - {own.name for own in fields(LeverRequest)}
+        goes = {"report", *(own.name for own in fields(LeverRequest))}
+        others = [own.name for own in fields(self) if own.name not in goes]
         why = "does not go with --report, which has wave forms of its own"
-        self.refuse(others - {"report"}, why)
+        self.refuse(*others, why=why)
 
 
 @dataclass(kw_only=True)

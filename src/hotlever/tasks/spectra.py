@@ -2,16 +2,48 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
 
-from hotlever.errors import InputError
+from hotlever.errors import InputError, unknown_name
 from hotlever.files import json_text, write_text
-from hotlever.raman.series import to_csv
-from hotlever.raman.tables import join, read_bias_log
-from hotlever.tasks.files import draw
-from hotlever.tasks.measured_requests import JoinRequest, RamanCheckRequest, RamanRequest
-from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.thermometry import calibration_named, set_up
+from hotlever.raman import series
+from hotlever.raman.calibration import (
+    RamanCalibration,
+    published_raman_calibration,
+    read_raman_calibration,
+)
+from hotlever.raman.lineshape import PeakOptions
+from hotlever.raman.reading import read_spectra
+from hotlever.raman.series import Line
+from hotlever.raman.spectrum import Spectrum, file_and_label
+from hotlever.raman.tables import (
+    Correction,
+    check_corrections,
+    join,
+    read_bias_log,
+    read_corrections,
+    read_temperatures,
+)
+from hotlever.raman.thermometer import Law, Thermometer, laser_heating
+from hotlever.tasks.measured_requests import (
+    JoinRequest,
+    RamanCheckRequest,
+    RamanRequest,
+    ThermometerRequest,
+)
+from hotlever.tasks.reporter import Listener, Reporter
+from hotlever.tasks.shared import draw
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: What stands for the published laws in place of a calibration file.
+PUBLISHED = "published"
+_MOST_NOTES = 20
 
 
 def measure_spectra(reporter: Reporter, request: RamanRequest) -> None:
@@ -27,7 +59,7 @@ def measure_spectra(reporter: Reporter, request: RamanRequest) -> None:
     if request.save_calibration is not None and setup.calibration is None:
         raise InputError("--save-calibration: there is no calibration; give --calibrate-from")
     lines, table = setup.measure(request.spectra)
-    text = to_csv(table)
+    text = series.to_csv(table)
     with outputs.together():
         if len(lines) == 1 and setup.calibration is None:
             draw(request.plot, lambda figures: figures.one_spectrum(lines[0]))
@@ -88,3 +120,193 @@ def _answer(reporter: Reporter, text: str, output: Path | None) -> None:
         reporter.give(text)
     else:
         reporter.tell(f"wrote {output}")
+
+
+# --- the thermometer ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Thermometry:
+    """How spectra are measured: the line's shape, and a thermometer if there is a calibration.
+
+    ``hot_plate`` is what the calibration was made of, if it was made now; ``spectra`` are all that
+    the thermometer was set up from.
+    """
+
+    listener: Listener
+    options: PeakOptions
+    calibration: RamanCalibration | None = None
+    thermometer: Thermometer | None = None
+    hot_plate: Sequence[Line] = ()
+    spectra: Sequence[Spectrum] = ()
+    corrections: Mapping[str, Correction] = field(default_factory=dict)
+    corrected_by: str = ""  #: name of the table
+
+    def measure(self, paths: Sequence[Path]) -> tuple[list[Line], xr.Dataset]:
+        """Read and fit spectra; return their lines and the table of `read_lines`.
+
+        Raises
+        ------
+        InputError
+            If one cannot be read, none is left to use, or none has a silicon line.
+        """
+        spectra = _read(self.listener, paths)
+        table = self.corrected_by
+        elsewhere = check_corrections(self.corrections, [*self.spectra, *spectra], table)
+        stray = [f"{table}: passed over {name}, of no folder read here" for name in elsewhere]
+        _note_some(self.listener, stray)
+        lines = _measure(self.listener, spectra, self.options, self.corrections, "spectra")
+        used = [line for line in lines if line.used]
+        if not used:
+            raise InputError(f"{table}: leaves out every spectrum, expected some to use")
+        if all(line.peak is None for line in used):
+            which = "this spectrum" if len(used) == 1 else f"any of {len(used)} spectra"
+            raise InputError(f"{paths[0]}: no silicon line in {which}, expected one near 520 cm⁻¹")
+        return lines, series.read_lines(lines, self.thermometer)
+
+
+def _note_some(listener: Listener, texts: Sequence[str]) -> None:
+    """Tell the first of many notes, and how many more there are."""
+    listener.note(*texts[:_MOST_NOTES])
+    if len(texts) > _MOST_NOTES:
+        listener.note(f"{len(texts) - _MOST_NOTES} more such notes")
+
+
+def _read(listener: Listener, paths: Sequence[Path]) -> list[Spectrum]:
+    """Read spectra; what a folder holds beside them is noted."""
+    skipped: list[str] = []
+    with listener.progress("reading") as update:
+        spectra = read_spectra(paths, skipped, update)
+    _note_some(listener, [f"passed over {line}" for line in skipped])
+    names = {(spectrum.folder, spectrum.name) for spectrum in spectra}
+    files = Counter((folder, file_and_label(name)[0]) for folder, name in names)
+    several = {name: count for (_, name), count in sorted(files.items()) if count > 1}
+    _note_some(
+        listener, [f"{name}: {count} spectra in one file" for name, count in several.items()]
+    )
+    return spectra
+
+
+def _measure(
+    listener: Listener,
+    spectra: Sequence[Spectrum],
+    options: PeakOptions,
+    corrections: Mapping[str, Correction],
+    label: str,
+) -> list[Line]:
+    """Fit the lines of spectra; those of many that have none are noted."""
+    with listener.progress(label) as update:
+        lines = series.measure(spectra, options, update, corrections)
+    if len(lines) > 1:
+        without = [line.spectrum.name for line in lines if line.used and line.peak is None]
+        _note_some(listener, [f"{name}: no silicon line" for name in without])
+    return lines
+
+
+def calibration_named(name: str | None) -> RamanCalibration | None:
+    """Return the published calibration, the one in a file, or none."""
+    if name is None:
+        return None
+    return published_raman_calibration() if name == PUBLISHED else read_raman_calibration(name)
+
+
+def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
+    """Set up a thermometer, or only the fit of the line if no calibration is named.
+
+    Raises
+    ------
+    InputError
+        If a file is at fault, or these do not go together.
+    """
+    if request.law not in get_args(Law):
+        raise unknown_name("law", request.law, get_args(Law))
+    request.at_most_one("calibration", "calibrate_from")
+    if not request.calibrate_from:
+        request.refuse("temperatures", why="goes with --calibrate-from")
+    laser_power, thermal_resistance = request.laser_power, request.thermal_resistance
+    if (laser_power is None) != (thermal_resistance is None):
+        raise InputError("--laser-power and --thermal-resistance belong together: give both")
+    heating = 0.0
+    if laser_power is not None and thermal_resistance is not None:
+        heating = laser_heating(laser_power, thermal_resistance)
+        listener.note(f"laser heating is estimated as {heating:.2g} K and enters the error")
+    chosen = calibration_named(request.calibration)
+    options = _options(listener, chosen, request)
+    by_hand = read_corrections(request.corrections) if request.corrections else {}
+    corrected_by = str(request.corrections)
+    hot_plate: list[Line] = []
+    spectra: list[Spectrum] = []
+    if request.calibrate_from:
+        stated = request.temperatures
+        table = read_temperatures(stated) if stated else None
+        spectra = _read(listener, request.calibrate_from)
+        source = ", ".join(path.name or str(path) for path in request.calibrate_from)
+        with listener.progress("hot plate") as update:
+            chosen, hot_plate = series.calibrate_from(
+                spectra, options, table, update, source, by_hand
+            )
+        _describe(listener, chosen)
+    if chosen is None:
+        unused = "reference", "stress", "laser_power", "law"
+        request.refuse(*unused, why="needs --calibration or --calibrate-from")
+        return Thermometry(listener, options, corrections=by_hand, corrected_by=corrected_by)
+    if chosen.reference_cm is None and not request.reference:
+        raise InputError(
+            "--calibration published: give --reference, a spectrum of your instrument at room "
+            "temperature, from which the shifts are taken"
+        )
+    # a calibration without reference gets one below; 0 stands in until then
+    start = 0.0 if chosen.reference_cm is None else None
+    law: Any = request.law
+    thermometer = Thermometer(chosen, law, start, 0.0, heating, request.stress)
+    if request.reference:
+        lines = _measure(
+            listener, _read(listener, request.reference), options, by_hand, "reference"
+        )
+        peaks = [(line.peak, line.spectrum.temperature) for line in lines if line.peak]
+        thermometer = thermometer.with_reference(peaks)
+        spectra += [line.spectrum for line in lines]
+    return Thermometry(
+        listener, options, chosen, thermometer, hot_plate, spectra, by_hand, corrected_by
+    )
+
+
+def _options(
+    listener: Listener, calibration: RamanCalibration | None, request: ThermometerRequest
+) -> PeakOptions:
+    """The line shape asked for, else the calibration's: both sides must be fitted alike."""
+    shape, resolution = request.shape, request.resolution
+    if calibration is not None and calibration.points:
+        same = shape in (None, calibration.line_shape)
+        if not same or resolution not in (None, calibration.resolution_cm):
+            listener.note(
+                f"the calibration was made with the line shape {calibration.line_shape}; "
+                "fitting another one shifts the line"
+            )
+        if shape is None:
+            shape = calibration.line_shape
+            resolution = calibration.resolution_cm if resolution is None else resolution
+    asked: Any = shape or "lorentzian"
+    return PeakOptions(asked, resolution)
+
+
+def _describe(listener: Listener, calibration: RamanCalibration) -> None:
+    """Tell what the series gave, and plainly where the line is not good enough."""
+    line, law = calibration.linear, calibration.anharmonic
+    residuals, (low, high) = calibration.residuals(), calibration.range_K
+    outside = abs(residuals["linear_K"]) > residuals["band_K"]
+    listener.note(
+        f"calibrated from {len(calibration.points)} spectra, {low:g} to {high:g} K: linear "
+        f"{line.slope_K_cm:.2f} K cm (rms {line.residual_rms_K:.1f} K), anharmonic rms "
+        f"{law.residual_rms_K:.1f} K"
+    )
+    if outside.any():
+        where = ", ".join(f"{t:g}" for t in residuals["temperature_K"][outside])
+        listener.note(
+            f"the line leaves the paper's error band at {where} K: the shift is not linear"
+        )
+    if law.ratio_fixed:
+        listener.note(
+            "too few temperatures to tell three- from four-phonon terms: their ratio is the "
+            "published one"
+        )

@@ -1,24 +1,23 @@
-"""Levers over a range of bias, or at set points: a table, a figure and fields."""
+"""Levers over a range of bias, at set points, or under small signals: a table, a figure, fields."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from hotlever.datasets import in_a_file
 from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.files import output_folder
-from hotlever.lever import State, sweep_csv, write_sweep
-from hotlever.lever.set_points import HeldStates, hold
-from hotlever.tasks.files import draw
-from hotlever.tasks.probes import make_lever
-from hotlever.tasks.ranges import parse_bias
+from hotlever.lever import State
+from hotlever.lever.dataset import SWEEP_COLUMNS
+from hotlever.lever.set_points import hold
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import SweepRequest
-from hotlever.types import Array, Progress
+from hotlever.tasks.requests import SpectrumRequest, SweepRequest
+from hotlever.tasks.shared import draw, make_lever, notes_of, write_table
+from hotlever.tasks.texts import parse_bias, parse_frequencies
+from hotlever.units import bias_setting
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from hotlever.lever import Lever
 
 
 def sweep(reporter: Reporter, request: SweepRequest) -> None:
@@ -39,7 +38,12 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
     failure: ComputationError | None = None
     with reporter.progress("sweep") as update:
         if held is not None:
-            data, states, curve = _held(lever, *held, update)
+            what, option, set_points = held
+            try:
+                held_states = hold(lever, what, set_points, progress=update)
+            except InputError as error:
+                raise InputError(f"{option}: {error}") from None
+            data, states, curve = held_states.data, held_states.states, held_states.curve
         else:
             data, failure = as_far_as_possible(lambda: lever.sweep(biases, progress=update))
         if failure is not None and not data.bias.size:
@@ -50,10 +54,9 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
         if request.map is not None:
             hottest = int(data.tip_K.values.argmax())
             (mapped,) = states[hottest:][:1] or lever.solve([data.bias_V.values[hottest]])
-    reporter.note(*filter(None, data.attrs["notes"].split("\n")))
+    reporter.note(*notes_of(data))
     with outputs.together():
-        if request.output is not None:
-            write_sweep(data, request.output)
+        text = write_table(request.output, data, in_a_file(data, SWEEP_COLUMNS))
         draw(
             request.plot,
             lambda figures: (
@@ -71,18 +74,35 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
                 output_folder(request.fields),
                 lambda slices, path: draw(path, lambda figures: figures.temperature_slices(slices)),
             )
-    if request.output is None:
-        reporter.give(sweep_csv(data))
+    if text:
+        reporter.give(text)
     if failure is not None:
         raise failure
 
 
-def _held(
-    lever: Lever, what: str, option: str, set_points: Array, update: Progress
-) -> tuple[xr.Dataset, list[State], xr.Dataset]:
-    """Return the states at set points, and all of the branch."""
-    try:
-        held_states: HeldStates = hold(lever, what, set_points, progress=update)
-    except InputError as error:
-        raise InputError(f"{option}: {error}") from None
-    return held_states.data, held_states.states, held_states.curve
+def respond(reporter: Reporter, request: SpectrumRequest) -> None:
+    """Find impedance and thermal response to small signals at a bias, or harmonics."""
+    # takes longer to import than all that a sweep needs
+    from hotlever.lever.transient.frequency_domain import (
+        HARMONIC_COLUMNS,
+        SPECTRUM_COLUMNS,
+        harmonics,
+        spectrum,
+    )
+
+    swing = None if request.amplitude is None else bias_setting(request.amplitude, "--amplitude")
+    volts, frequencies = bias_setting(request.bias, "--bias"), parse_frequencies(request.frequency)
+    outputs = request.outputs()
+    lever = make_lever(reporter, request.read_probe(reporter))
+    with reporter.progress("spectrum") as update:
+        if swing is None:
+            (state,) = lever.solve([volts], update)
+            data = spectrum(state, frequencies)
+        else:
+            data = harmonics(lever, volts, swing, frequencies, update)
+    columns = in_a_file(data, SPECTRUM_COLUMNS if swing is None else HARMONIC_COLUMNS)
+    with outputs.together():
+        text = write_table(request.output, data, columns)
+        draw(request.plot, lambda figures: figures.figure_of(data))
+    if text:
+        reporter.give(text)

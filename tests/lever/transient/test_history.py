@@ -10,7 +10,7 @@ from hotlever import Lever, Probe
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.lever import probe_of
 from hotlever.lever.lever import COARSE
-from hotlever.lever.transient import history_csv, pulse, ramp, simulate, sine, step, write_history
+from hotlever.lever.transient import pulse, ramp, simulate, sine, step, write_history
 from hotlever.lever.transient.history import TIME_COLUMNS
 from of_materials import metal_film_probe, metal_film_sections
 
@@ -192,7 +192,8 @@ def test_times_that_make_no_sense_are_refused(coarse, wrong):
 
 
 def test_a_history_is_written_and_read_again(golden, tmp_path):
-    lines = history_csv(golden).splitlines()
+    write_history(golden, tmp_path / "a.csv")
+    lines = (tmp_path / "a.csv").read_text().splitlines()
     assert lines[0] == "time_us,bias_V,current_mA,lever_V,reader_V,tip_K,power_mW"
     assert len(lines) == 10
     write_history(golden, tmp_path / "a.nc")

@@ -28,7 +28,7 @@ from hotlever.app.project import LARGEST_PROBE, safe_name
 from hotlever.errors import InputError
 from hotlever.files import read_text
 from hotlever.probe import Probe
-from hotlever.tasks.design_requests import NEW_PROBES
+from hotlever.tasks.planning_requests import NEW_PROBES
 
 _ROLES = {"": "not used", "body": "outline of the lever", FILM: "film or part"}
 _ROLES |= {name: f"terminal: {name}" for name in TERMINALS}

@@ -2,7 +2,7 @@
 
 from hotlever.lever.transient.controller import Controller
 from hotlever.lever.transient.frequency_domain import spectrum
-from hotlever.lever.transient.history import history_csv, integrate, write_history
+from hotlever.lever.transient.history import integrate, write_history
 from hotlever.lever.transient.modes import rise_times, time_constants, with_times
 from hotlever.lever.transient.trains import simulate
 from hotlever.lever.transient.waveform import (
@@ -18,7 +18,6 @@ from hotlever.lever.transient.waveform import (
 __all__ = [
     "Controller",
     "Waveform",
-    "history_csv",
     "integrate",
     "pulse",
     "ramp",

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from hotlever.datasets import csv_text, labelled, write_dataset
+from hotlever.datasets import labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
 from hotlever.lever.dataset import in_a_file, probe_attributes, range_notes
 from hotlever.lever.lever import State
@@ -320,8 +320,3 @@ def write_history(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
         If the suffix is neither, or the file cannot be written.
     """
     write_dataset(data, path, in_a_file(data, TIME_COLUMNS))
-
-
-def history_csv(data: xr.Dataset) -> str:
-    """Return a history as CSV text, one row per time; empty where a value does not exist."""
-    return csv_text(data, in_a_file(data, TIME_COLUMNS))

@@ -1,24 +1,140 @@
-"""What is asked of the task that says what to measure next."""
+"""What is asked of tasks on probes, materials, designs, and what to measure next."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import MISSING, Field, dataclass
+from pathlib import Path
 from typing import Any
 
 from hotlever.errors import InputError, quoted, shown, unknown_name
+from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.measured_requests import MeasuredRequest
-from hotlever.tasks.ranges import parse_bias
-from hotlever.tasks.requests import File, PlotRequest, argument, check_medium, option, written
-from hotlever.tasks.texts import check_number, parse_number, parse_pairs
+from hotlever.tasks.requests import (
+    File,
+    PhysicsRequest,
+    PlotRequest,
+    ProbeRequest,
+    Request,
+    TableRequest,
+    argument,
+    check_medium,
+    option,
+    written,
+)
+from hotlever.tasks.texts import check_number, parse_bias, parse_number, parse_pairs
 from hotlever.units import setting
 
+#: Shapes of new probe files, and the methods of `Probe` that make one.
+NEW_PROBES = {"three-leg": "reference", "u-shape": "u_shape"}
 #: Measurements that are proposed at once; by default, unless kinds are limited.
 MOST_PROPOSALS, _USUAL_PROPOSALS = 100, 5
 #: Minutes by unit of time.
 _MINUTES = {"s": 1.0 / 60.0, "min": 1.0, "h": 60.0}
+
+
+@dataclass(kw_only=True)
+class NewRequest(Request):
+    """Write the reference probe as a commented file."""
+
+    output: File = written((".toml",), "-o", "--output", help="File; standard output if left out.")
+    shape: str = option("three-leg", help=f"One of: {', '.join(NEW_PROBES)}.")
+
+
+@dataclass(kw_only=True)
+class ShowRequest(PlotRequest, ProbeRequest):
+    """Draw and describe a probe."""
+
+    mesh: bool = option(False, "--mesh", help="Draw the triangles of the mesh too.")
+
+
+@dataclass(kw_only=True)
+class ImportRequest(PlotRequest):
+    """Say what a drawing holds, and propose a probe file for it."""
+
+    drawing: Path = argument(MISSING, metavar="DRAWING", help="GDSII, OASIS or DXF file.")
+    output: File = written(
+        (".toml",), "-o", "--output", help="Probe file to write; standard output if left out."
+    )
+    cell: str | None = option(None, help="Of GDSII or OASIS; the top cell if left out.")
+    unit: str | None = option(
+        None, help="Of the drawing's numbers, as mm; what the file says if left out."
+    )
+
+    @property
+    def known_unit(self) -> str | None:
+        """The unit, by a name that drawings are read with."""
+        from hotlever.probe.drawing.sheet import UNITS
+
+        name = None if self.unit is None else self.unit.replace("µ", "u").replace("μ", "u")
+        if name is not None and name not in UNITS:
+            raise unknown_name("unit", name, UNITS, "--unit")
+        return name
+
+
+@dataclass(kw_only=True)
+class MaterialsRequest(PlotRequest):
+    """List kinds of material, or those of a probe: parameters, units, bounds, laws, sources."""
+
+    probe: File = argument(
+        None,
+        metavar="[PROBE.toml]",
+        help="Probe file whose materials are listed; all kinds and presets if left out.",
+    )
+
+
+@dataclass(kw_only=True)
+class DesignRequest(TableRequest, PhysicsRequest, ProbeRequest):
+    """Show how knee, tip temperature and loss to air depend on a probe's design."""
+
+    vary: list[str] | None = option(
+        None,
+        metavar="NAME=START:STOP:COUNT",
+        help="Sweep a number of the probe file, annealing_K or annealing_min; repeated: each with "
+        "each, as a map. A table of sensitivities if left out.",
+    )
+    power: float = option(2.0, help="Power (mW) in vacuum at which the tip temperature is given.")
+    annealing_K: float = option(
+        ANNEALING_K, "--annealing-K", help="Annealing (K) that the probe's delta is of."
+    )
+    annealing_min: float = option(ANNEALING_S / 60.0, help="Annealing (min) that the delta is of.")
+    air: bool = option(True, help="Solve in air too, for k.")
+    minimise: str | None = option(
+        None,
+        metavar="QUANTITY",
+        help="Find the design whose quantity is least, such as time_constant_us; it writes a probe "
+        "file (-o FILE.toml).",
+    )
+    maximise: str | None = option(None, metavar="QUANTITY", help="Or greatest.")
+    within: list[str] | None = option(
+        None,
+        metavar="NAME=LOW:HIGH",
+        help="Bounds of a number that may change, or of a quantity (one may be left out).",
+    )
+    at: str = option(
+        "700K", metavar="POINT", help="Working point: a tip temperature, or as 8V or 2mW."
+    )
+
+    @property
+    def asks_for_best(self) -> bool:
+        """Whether the best design is looked for."""
+        return self.minimise is not None or self.maximise is not None
+
+    def need_no_others(self) -> None:
+        """Refuse options that do nothing beside what is asked for: the best design, or others."""
+        if self.asks_for_best:
+            self.at_most_one("minimise", "maximise")
+            others = "vary", "power", "annealing_K", "annealing_min", "air"
+            self.refuse(*others, why="does not go with --minimise or --maximise")
+        else:
+            self.refuse("within", "at", why="goes with --minimise or --maximise")
+
+    def types_of(self, own: Field[Any]) -> tuple[str, ...]:
+        """Return how the name of a file may end: the best design is a probe file."""
+        is_probe = own.name == "output" and self.asks_for_best
+        return (".toml",) if is_probe else super().types_of(own)
 
 
 @dataclass(kw_only=True)
@@ -92,30 +208,21 @@ class NextRequest(PlotRequest, MeasuredRequest):
         # of a lever that was not measured nothing could tell in which it is
         check_medium(self.medium, *([] if self.data is None else [UNKNOWN_MEDIUM]))
         check_number("--count", self.count, 1, MOST_PROPOSALS)
-        stated = {"--probe": self.probe, "--prior": self.prior, "--medium": self.medium}
-        stated |= {"--physics": self.physics, "--column": self.column}
-        for name, value in stated.items():
-            if self.calibrated and value is not None:
-                raise InputError(
-                    f"{name}: the calibration has its own; expected a measurement file"
-                )
-        if self.data is None and self.column is not None:
-            raise InputError("--column: expected a measurement file")
+        if self.calibrated:
+            of_levers = "probe", "prior", "medium", "physics", "column"
+            why = "the calibration has its own; expected a measurement file"
+            self.refuse(*of_levers, why=why)
+        elif self.data is None:
+            self.refuse("column", why="expected a measurement file")
 
     def choices(self) -> dict[str, Any]:
         """Return what is asked of `hotlever.calibration.next_measurement.plan_next`."""
         allowed = parse_kinds(self.allow)
         limits = list((allowed or {"": None}).values())
         usual = sum(number or 0 for number in limits) if all(limits) else _USUAL_PROPOSALS
-        temperatures = {
-            name: None if text is None else _temperature(text, option)
-            for name, text, option in (
-                ("at_K", self.at, "--at"),
-                ("stay_below_K", self.stay_below, "--stay-below"),
-            )
-        }
         return {
-            **temperatures,
+            "at_K": _temperature(self.at, "--at"),
+            "stay_below_K": _temperature(self.stay_below, "--stay-below"),
             "allowed": allowed,
             "count": self.count or min(usual, MOST_PROPOSALS),
             "bias": None if self.bias is None else parse_bias(self.bias),
@@ -124,7 +231,9 @@ class NextRequest(PlotRequest, MeasuredRequest):
         }
 
 
-def _temperature(text: str, option: str) -> float:
+def _temperature(text: str | None, option: str) -> float | None:
+    if text is None:
+        return None
     kelvins = setting(text, "K", option)
     check_number(option, kelvins, 1.0, 5000.0)
     return kelvins
