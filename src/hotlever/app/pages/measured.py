@@ -36,6 +36,7 @@ from hotlever.errors import HotleverError, InputError
 from hotlever.measurands import MEASURANDS
 from hotlever.measurement import FileColumn
 from hotlever.measurement.columns import UNUSED, quantity_of
+from hotlever.units import name_and_unit
 
 #: What is shown where there is no measurement.
 _EXAMPLE = "lever-a.csv"
@@ -293,7 +294,8 @@ class ColumnPicker:
 
     def __init__(self, tell: Callable[[list[str]], Any]) -> None:
         self._tell = tell
-        self._told: list[str] = []
+        #: What was told, a quantity and perhaps its unit, by the column.
+        self._told: dict[str, str] = {}
         self._columns: dict[str, FileColumn] = {}
         self._fields: dict[str, tuple[ui.select, ui.select]] = {}
         opened = ui.expansion("Columns of the file").props("header-class=text-bold")
@@ -303,7 +305,8 @@ class ColumnPicker:
 
     def show(self, columns: list[FileColumn], told: list[str], is_understood: bool) -> None:
         """Show the columns of a file; they are open where the file is not understood."""
-        self._told = told
+        parts = (text.partition("=") for text in told)
+        self._told = {name.strip(): quantity for quantity, _, name in parts}
         self._opened.set_visibility(bool(columns))
         if not is_understood:
             self._opened.set_value(True)
@@ -319,8 +322,9 @@ class ColumnPicker:
             has_unit = bool(column.symbol and not column.unit)
             unit.set_visibility(has_unit)
             if has_unit:
-                units = list(_UNITS[MEASURANDS[column.symbol].unit])
-                unit.set_options(units, value=self._unit_of(column, units))
+                told_unit = self._unit_of(column.name)
+                units = [*_UNITS[MEASURANDS[column.symbol].unit], *filter(None, [told_unit])]
+                unit.set_options(list(dict.fromkeys(units)), value=told_unit)
 
     def _row(self, column: FileColumn) -> tuple[ui.select, ui.select]:
         """Show a column; return the fields of what it is, and of its unit."""
@@ -342,39 +346,28 @@ class ColumnPicker:
             unit.on_value_change(lambda event: self._pick_unit(name, event.value))
         return picked, unit
 
-    def _unit_of(self, column: FileColumn, units: list[str]) -> str | None:
-        """Return the unit that was told of a column, which is offered then."""
-        for text in self._told:
-            quantity, _, name = text.partition("=")
-            if name.strip() == column.name and "(" in quantity:
-                told = quantity.partition("(")[2].rstrip(") ")
-                units += [told] if told not in units else []
-                return told
-        return None
+    def _unit_of(self, name: str) -> str | None:
+        """Return the unit that was told of a column."""
+        return name_and_unit(self._told.get(name, ""))[1]
 
     def _pick(self, name: str, symbol: str, unit: str | None = None) -> Any:
         """Tell what a column is, and nothing else of it, nor of that quantity."""
         column = self._columns[name]
         if symbol == column.symbol and unit is None:
             return None  # nobody picked it
-        others = [text for text in self._told if not self._is_of(text, name, symbol)]
-        inside = f" ({unit})" if unit else ""  # a unit is not guessed: the reader asks for one
-        own = [f"{symbol}{inside}={name}"]
-        if not symbol:
+        # a unit is not guessed: the reader asks for one
+        own = f"{symbol} ({unit})" if unit else symbol
+        if not symbol and (quantity_of(column.heading) is not None or name not in self._told):
             # what was only told to be used is taken back; what the file itself says is not
-            was_told = len(others) < len(self._told)
-            by_itself = quantity_of(column.heading) is not None or not was_told
-            own = [f"{UNUSED}={name}"] if by_itself else []
+            own = UNUSED
         # at once: the next may be picked before the file is read with this
-        self._told = [*others, *own]
-        return self._tell(self._told)
+        self._told = {
+            heading: quantity
+            for heading, quantity in self._told.items()
+            if heading != name and quantity_of(quantity, assigned=True) != symbol
+        } | ({name: own} if own else {})
+        return self._tell([f"{quantity}={heading}" for heading, quantity in self._told.items()])
 
     def _pick_unit(self, name: str, unit: str | None) -> Any:
-        column = self._columns[name]
-        is_new = unit is not None and unit != self._unit_of(column, [])
-        return self._pick(name, column.symbol, unit) if is_new else None
-
-    @staticmethod
-    def _is_of(text: str, name: str, symbol: str) -> bool:
-        quantity, _, heading = text.partition("=")
-        return heading.strip() == name or quantity_of(quantity, assigned=True) == symbol
+        is_new = unit is not None and unit != self._unit_of(name)
+        return self._pick(name, self._columns[name].symbol, unit) if is_new else None
