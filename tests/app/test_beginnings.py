@@ -181,5 +181,6 @@ def test_without_a_measurement_an_example_is_shown(tmp_path: Path, address: str)
         await user.should_see(f"hotlever {address[1:]} lever-a.csv", retries=50)
         await user.open("/levers")
         await until(lambda: session.chosen["levers"]["data"] == ["lever-a.csv"])
+        await user.should_not_see("-o fits")  # one is fitted on another page
 
     visit(tmp_path, story)

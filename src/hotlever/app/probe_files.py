@@ -19,7 +19,15 @@ from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.errors import InputError
 from hotlever.lever.discretisation import chosen_space
-from hotlever.probe import Probe
+from hotlever.materials.kinds import KINDS
+from hotlever.materials.parameters import STATED, label, parameter_named
+from hotlever.materials.presets import PRESETS, usual_values
+from hotlever.materials.sections import with_tables
+from hotlever.materials.stated import names_stated
+from hotlever.probe import Circuit, Probe
+from hotlever.probe.drawing.outlines import DrawingError
+from hotlever.probe.drawing.shape import TOLERANCE_UM, DrawnShape
+from hotlever.probe.drawing.sheet import read_sheet
 from hotlever.probe.file_sections import sections_of
 from hotlever.probe.shapes import DRAWING, PARAMETRIC
 
@@ -104,8 +112,6 @@ def _wrong(error: InputError, text: str, fault: str) -> Figure:
     InputError
         If neither has a place in a picture.
     """
-    from hotlever.probe.drawing.outlines import DrawingError
-
     if isinstance(error, DrawingError):
         return figures.outlines_drawing(error.outlines, fault=fault, fault_at=error.place)
     try:
@@ -160,9 +166,6 @@ def _rows(sections: Mapping[str, Any]) -> list[LayerRow]:
 
 @lru_cache(maxsize=8)
 def _layers(path: Path, stamp: float, cell: Any, unit_um: Any) -> tuple[str, ...]:
-    from hotlever.probe.drawing.shape import TOLERANCE_UM
-    from hotlever.probe.drawing.sheet import read_sheet
-
     number = unit_um if isinstance(unit_um, int | float) else None
     name = cell if isinstance(cell, str) else None
     return tuple(read_sheet(path, name, unit_um=number, tolerance_um=TOLERANCE_UM).layers)
@@ -170,9 +173,6 @@ def _layers(path: Path, stamp: float, cell: Any, unit_um: Any) -> tuple[str, ...
 
 def _new_materials() -> dict[str, str]:
     """Return what a new material may be, by what `with_layer` takes."""
-    from hotlever.materials.kinds import KINDS
-    from hotlever.materials.presets import PRESETS
-
     new = {f"+{kind}": f"new: {kind.replace('-', ' ')}" for kind in KINDS}
     for name, preset in PRESETS.items():
         new[f"+{preset.kind}/{name}"] = f"new: {name} ({preset.kind.replace('-', ' ')})"
@@ -181,9 +181,6 @@ def _new_materials() -> dict[str, str]:
 
 def _others(shape: str) -> Iterator[tuple[str, dict[str, str]]]:
     """Give the sections that are no material, with what their numbers are, for a kind of shape."""
-    from hotlever.probe.circuit import Circuit
-    from hotlever.probe.drawing.shape import DrawnShape
-
     if shape == DRAWING:
         meanings = DrawnShape.description()
         yield "probe", {key: meanings[key] for key in _OF_A_DRAWING}
@@ -195,9 +192,6 @@ def _others(shape: str) -> Iterator[tuple[str, dict[str, str]]]:
 
 def _other(name: str, section: Mapping[str, Any], meanings: Mapping[str, str]) -> dict[str, Any]:
     """Return the numbers of a section that is no material."""
-    from hotlever.materials.parameters import label, parameter_named
-    from hotlever.probe.circuit import Circuit
-
     shown = []
     for key, words in meanings.items():
         unit, default = parameter_named(key).unit, _number(getattr(Circuit(), key, ""))
@@ -208,12 +202,6 @@ def _other(name: str, section: Mapping[str, Any], meanings: Mapping[str, str]) -
 
 def _card(path: Section, section: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parameters of a material: of its kind, and those that formulas name."""
-    from hotlever.materials.kinds import KINDS
-    from hotlever.materials.parameters import STATED
-    from hotlever.materials.presets import PRESETS, usual_values
-    from hotlever.materials.sections import with_tables
-    from hotlever.materials.stated import names_stated
-
     kind = KINDS.get(str(section.get("kind")))
     words = [str(section.get(key)).replace("-", " ") for key in ("kind", "preset")]
     like = f", else as {words[1]}" if "preset" in section else ""
