@@ -63,7 +63,9 @@ class _Times:
         for indices, nodes, rows, start in self._parts:
             part = values[:, nodes]
             if start is not None:
-                spline = make_interp_spline(np.log(self.at[nodes] - start), part, 3, axis=1)
+                after = np.log(self.at[nodes] - start)
+                # what a lever does not show is NaN, and stays alone so
+                spline = make_interp_spline(after, part, 3, axis=1, check_finite=False)
                 part = spline(np.log(rows - start))
             at_rows[:, indices] = part
         return at_rows
