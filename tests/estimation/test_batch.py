@@ -268,7 +268,7 @@ def test_what_fails_for_one_lever_is_a_failure_of_its_own(levers, texts, tmp_pat
         path.write_text(text)
 
     monkeypatch.setattr(Lever, "__init__", fail)
-    monkeypatch.setattr("hotlever.estimation.batch.write_text", full)
+    monkeypatch.setattr("hotlever.estimation.outcome.write_text", full)
     batch = fit_many(levers, tmp_path / "out", None, OPTIONS, processes=1)
     assert list(batch.results) == ["lever-2"]
     assert batch.exit_status == 1

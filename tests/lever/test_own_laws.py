@@ -27,7 +27,7 @@ from hotlever.materials.kinds import Dielectric, HighDopedSilicon, MetalFilm, NS
 from hotlever.materials.parameters import field_of, parameter_named
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of, usual_parameters
-from hotlever.probe.priors import default_priors
+from hotlever.probe.priors import default_priors, priors_of
 from hotlever.studies.simulation_based_calibration import MinimosMaterial
 from of_materials import metal_film_probe
 
@@ -152,7 +152,7 @@ def test_a_parameter_of_its_own_is_one_like_any_other(how_to):
     for wrong in (
         lambda: probe.with_(**{"film.debye": 300.0}),
         lambda: FitOptions(free=["film.debye"]).of(probe),
-        lambda: FitOptions(priors={"film.debye": "300 ± 10"}).stated_priors(probe),
+        lambda: priors_of({"film.debye": "300 ± 10"}, probe, "priors"),
     ):
         with pytest.raises(InputError, match=r"did you mean '(film\.)?debye_K'"):
             wrong()

@@ -17,7 +17,7 @@ from hotlever.estimation.estimator import fit
 from hotlever.estimation.options import FitOptions
 from hotlever.estimation.outcome import Result, ResultFile
 from hotlever.estimation.result import Fit, FitFile
-from hotlever.files import Outputs, output_folder, without_nan, write_text
+from hotlever.files import Outputs, output_folder, without_nan
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced
 from hotlever.measurement import Measurement, read_measurement_of, with_measured_circuit
@@ -177,7 +177,7 @@ def estimate_many(
     asked["version"] = __version__
     if columns:
         asked["columns"] = dict(columns)
-    batch, waiting = Batch[Result](), dict[str, Measurement]()
+    batch, waiting, requests = Batch[Result](), dict[str, Measurement](), dict[str, Any]()
 
     def tell() -> None:
         if progress is not None:
@@ -194,9 +194,11 @@ def estimate_many(
         except InputError as error:
             batch.fail(path, error)
             continue
+        # all that a result depends on, for its file: the same again need not be made
+        requests[name] = dict(without_nan({"sha256": measurement.sha256, **asked}))
         # whoever changes the code of a class of materials keeps its name
-        request = _request(measurement, asked)
-        earlier = None if work.probe.classes else _written_before(files[name], work, request)
+        again = not work.probe.classes
+        earlier = _written_before(files[name], work, requests[name]) if again else None
         if earlier is None:
             waiting[name] = measurement
         else:
@@ -215,7 +217,7 @@ def estimate_many(
                     if isinstance(result, HotleverError):
                         raise result
                     output_folder(target)
-                    write_text(files[name], result.file(_request(measurement, asked)).to_json())
+                    result.write(files[name], requests[name])
                     batch.results[name] = result
                 except HotleverError as error:
                     batch.fail(measurement.path, error)
@@ -271,11 +273,6 @@ def _identity(path: Path) -> object:
     except OSError:
         return os.path.realpath(path)
     return status.st_dev, status.st_ino
-
-
-def _request(measurement: Measurement, asked: dict[str, Any]) -> dict[str, Any]:
-    """Return all that a result depends on, for its file: the same again need not be made."""
-    return dict(without_nan({"sha256": measurement.sha256, **asked}))
 
 
 def _written_before(file: Path, work: Work[Result], request: dict[str, Any]) -> Result | None:

@@ -25,6 +25,7 @@ from hotlever.estimation.result import Fit, band_dataset
 from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import of_materials, parameters_of
+from hotlever.probe.priors import priors_of
 from hotlever.probe.surroundings import Medium
 from hotlever.text import NOT_DETERMINED, value_with_error, with_unit
 from hotlever.types import Array, Progress
@@ -108,6 +109,7 @@ def _fit_of(estimate: Estimate) -> Fit:
     options, residuals, prediction = estimate.options, estimate.residuals, estimate.prediction
     values, posterior = prediction.values, estimate.posterior
     in_time = estimate.measurement.time_us is not None
+    priors = priors_of(options.priors, estimate.probe, "priors", in_time=in_time)
     notes = outlier_notes(residuals, values, options.robust)
     notes += residuals.drifting_zeros(values, posterior.slopes)
     chi_square = residuals.errors.reduced_chi_square(
@@ -138,7 +140,7 @@ def _fit_of(estimate: Estimate) -> Fit:
         reason=reason,
         converged=converged,
         seconds=estimate.seconds,
-        priors=estimate.priors(options.stated_priors(estimate.probe, in_time=in_time)),
+        priors=estimate.priors(priors),
         notes=[*estimate.notes, *notes],
     )
     return replace(result, notes=[*result.notes, *undetermined(result)])

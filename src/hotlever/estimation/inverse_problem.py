@@ -49,6 +49,7 @@ from hotlever.probe.priors import (
     Prior,
     PriorUse,
     default_priors,
+    priors_of,
 )
 from hotlever.types import Array, Progress
 
@@ -167,7 +168,7 @@ def estimate(
     probe, notes = with_measured_circuit(given, measurement, options.medium)
     notes += note_on_averages(whole, measurement) + check_sample(measurement, probe)
     options = options.of(probe, in_time=in_time)
-    priors = options.stated_priors(probe, in_time=in_time)
+    priors = priors_of(options.priors, probe, "priors", in_time=in_time)
     without_effect = [name for name in options.priors if name not in (*priors, ALL_DIMENSIONS)]
     if without_effect:
         notes.append(
@@ -198,7 +199,9 @@ def estimate(
         )
     density = PriorDensity.of_priors(priors)
     likeliest = zip(density.names, density.values.tolist(), strict=True)
-    start = options.held(probe.replace(dict(likeliest)))
+    held = {name: value for name, value in options.fixed.items() if value is not None}
+    start = probe.replace(dict(likeliest))
+    start = start.with_(**held) if held else start
     search = Search(
         residuals, start, options.varied, options.robust, density.beside(before), progress, seen
     )

@@ -16,7 +16,7 @@ from hotlever.probe.parameters import (
     parameter_of,
     usual_parameters,
 )
-from hotlever.probe.priors import SCALES, Prior, priors_of
+from hotlever.probe.priors import SCALES, Prior
 from hotlever.probe.surroundings import Medium
 
 Weights = Literal["maximum", "errors"]
@@ -128,32 +128,11 @@ class FitOptions:
             raise InputError("all parameters are fixed; nothing is left to fit")
         return own
 
-    def stated_priors(self, probe: Probe, *, in_time: bool = False) -> dict[str, Prior]:
-        """Return the priors of what counts for a probe, those in words included.
-
-        Raises
-        ------
-        InputError
-            If a name does not exist (with the nearest that does) or a text is no prior.
-        """
-        return priors_of(self.priors, probe, "priors", in_time=in_time)
-
     @property
     def media(self) -> tuple[Medium | None, ...]:
         """What is to be tried: None is what measurement and probe say."""
         asked = self.medium
         return get_args(Medium) if asked == UNKNOWN_MEDIUM else (cast("Medium | None", asked),)
-
-    def held(self, probe: Probe) -> Probe:
-        """Return a probe with the fixed values in place.
-
-        Raises
-        ------
-        InputError
-            If a value is impossible.
-        """
-        values = {name: value for name, value in self.fixed.items() if value is not None}
-        return probe.with_(**values) if values else probe
 
     def values(self) -> dict[str, Any]:
         """Return the options as plain values."""

@@ -256,10 +256,6 @@ class ResultFile(Section, Generic[Result]):
         own = values.keys() - ResultFile.model_fields.keys()
         return dict(sorted(values.items(), key=lambda entry: entry[0] not in own))
 
-    def to_json(self) -> str:
-        """Return the text of the file."""
-        return json_text(self.content())
-
 
 class Outcome(ABC):
     """What was estimated of a lever; without errors unless the data are described.
@@ -328,14 +324,12 @@ class Outcome(ABC):
     def file(self, request: dict[str, JsonValue] | None = None) -> ResultFile[Any]:
         """Return what the result file holds; `request` is what a batch was asked."""
 
-    def content(self) -> dict[str, Any]:
-        """Return the content of the result file in plain values."""
-        return self.file().content()
-
-    def to_json(self) -> str:
+    def to_json(self, request: dict[str, JsonValue] | None = None) -> str:
         """Return the text of the result file."""
-        return self.file().to_json()
+        return json_text(self.file(request).content())
 
-    def write(self, path: str | os.PathLike[str]) -> None:
+    def write(
+        self, path: str | os.PathLike[str], request: dict[str, JsonValue] | None = None
+    ) -> None:
         """Write the result file, whole or not at all."""
-        write_text(path, self.to_json())
+        write_text(path, self.to_json(request))

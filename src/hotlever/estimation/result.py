@@ -188,7 +188,7 @@ class Fit(Outcome):
     @cached_property
     def stated_priors(self) -> dict[str, Prior]:
         """What was known before of parameters and scales, by name."""
-        return self.options.stated_priors(self.probe, in_time=self.in_time)
+        return priors_of(self.options.priors, self.probe, "priors", in_time=self.in_time)
 
     @property
     def correlation(self) -> Array:
