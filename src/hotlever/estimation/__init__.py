@@ -5,12 +5,12 @@ forward map     `experiment`: at rest, in time, over a sample; the `surrogate` o
 noise model     `residuals`: `noise`, drift, and the scales that data have in common
 prior           `hotlever.probe.priors`, together a `prior_density`
 optimiser       of an `objective`: `optimiser`
-posterior       `posterior`: of any quantity, linearised; its `profile`; `sampling` by `chains`
+posterior       `posterior`: of any quantity, also curved; its `profile`; `sampling` by `chains`
 design          `optimal_design`: which further rows lessen an error most
 diagnosis       `lack_of_fit`; `diagnosis` by `hypotheses`
 problem         `inverse_problem` puts all that together, as `options` ask, and searches
 answers         `estimator` makes a fit of it: a `result`, an `outcome` as calibrations are, with
-                `summary` and `uncertainty`; a `batch` of fits, and their `levers` compared
+                `uncertainty` and `summary`, also of levers compared; a `batch` of fits
 ==============  ====================================================================================
 """
 

@@ -196,10 +196,14 @@ class PredictionAtRest(Prediction):
     surrogate : CurveSurrogate
     linearised : Linearised
         What it was read from, not corrected.
+    away : tuple of PredictionAtRest
+        Of levers away from a sample, see `hotlever.estimation.over_a_sample`; then what it was read
+        from is the lever in contact.
     """
 
     surrogate: CurveSurrogate
     linearised: Linearised
+    away: tuple[PredictionAtRest, ...] = ()
 
 
 @dataclass(frozen=True)

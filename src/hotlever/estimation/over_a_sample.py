@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -129,16 +129,6 @@ class SurrogateOverSample(CurveSurrogate):
 
 
 @dataclass(frozen=True)
-class PredictionOverSample(PredictionAtRest):
-    """What an instrument and a thermometer would show over a sample.
-
-    What it was read from, `linearised`, is the lever in contact; `away` are those that are not.
-    """
-
-    away: tuple[PredictionAtRest, ...]
-
-
-@dataclass(frozen=True)
 class ExperimentOverSample(ExperimentAtRest):
     """Predicts a measurement over a sample; see `hotlever.estimation.experiment`.
 
@@ -189,10 +179,10 @@ class ExperimentOverSample(ExperimentAtRest):
         away = tuple(each.drawn_anew(there) for each, there in pairs)
         return replace(super().drawn_anew(probe), away=away)
 
-    def predict(self, probe: Probe, near: PredictionAtRest | None = None) -> PredictionOverSample:
+    def predict(self, probe: Probe, near: PredictionAtRest | None = None) -> PredictionAtRest:
         """See `ExperimentAtRest.predict`."""
         own = super().predict(probe, near)
-        nearby: Sequence[Any] = getattr(near, "away", (None,) * len(self.away))
+        nearby = (None,) * len(self.away) if near is None else near.away
         trios = zip(self.away, self.positions.probes(probe), nearby, strict=True)
         away = tuple(each.predict(there, other) for each, there, other in trios)
         surrogate = SurrogateOverSample(
@@ -202,7 +192,7 @@ class ExperimentOverSample(ExperimentAtRest):
         values, slopes = surrogate.mixed(every[0], every[1:])
         lever = probe.circuit.lever_voltage(self.bias, values[0])
         columns = {**own.columns, "lever_V": lever, **named(values)}
-        return PredictionOverSample(
+        return PredictionAtRest(
             probe, values, slopes, surrogate, columns, slopes[TIP], own.linearised, away
         )
 
@@ -210,7 +200,6 @@ class ExperimentOverSample(ExperimentAtRest):
         """See `ExperimentAtRest.confirmed`."""
         if self.full is None:
             return self
-        assert isinstance(at, PredictionOverSample)
         pairs = zip(self.away, at.away, strict=True)
         away = tuple(each.confirmed(there) for each, there in pairs)
         return replace(super().confirmed(at), away=away)
