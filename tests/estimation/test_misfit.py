@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hotlever.estimation import Measurement
-from hotlever.estimation.lack_of_fit import lack_of_fit_text, run_of_outliers
+from hotlever.estimation.diagnosis import lack_of_fit_text, run_of_outliers
 from hotlever.estimation.residuals import Residuals
 
 COUNT = 40

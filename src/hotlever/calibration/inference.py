@@ -26,9 +26,9 @@ from hotlever.calibration.tip_temperature import (
 from hotlever.calibration.uncertainty_budget import BudgetOf, budget_of_estimate
 from hotlever.errors import ComputationError, counted
 from hotlever.estimation import Fit, FitOptions, Measurement
+from hotlever.estimation.diagnosis import lack_of_fit_text, outlier_notes, run_of_outliers
 from hotlever.estimation.experiment import PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
-from hotlever.estimation.lack_of_fit import lack_of_fit_text, outlier_notes, run_of_outliers
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE

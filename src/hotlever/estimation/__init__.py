@@ -7,7 +7,7 @@ prior           `hotlever.probe.priors`, together a `prior_density`
 optimiser       of an `objective`: `optimiser`
 posterior       `posterior`: of any quantity, also curved; its `profile`; `sampling` by `chains`
 design          `optimal_design`: which further rows lessen an error most
-diagnosis       `lack_of_fit`; `diagnosis` by `hypotheses`
+diagnosis       `diagnosis`: whether data are described; why not, by `hypotheses`
 problem         `inverse_problem` puts all that together, as `options` ask, and searches
 answers         `estimator` makes a fit of it: a `result`, an `outcome` as calibrations are, with
                 `uncertainty` and `summary`, also of levers compared; a `batch` of fits

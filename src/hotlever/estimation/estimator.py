@@ -14,10 +14,9 @@ import numpy as np
 import xarray as xr
 
 from hotlever.errors import ComputationError, unknown_name
-from hotlever.estimation.diagnosis import Diagnosis
+from hotlever.estimation.diagnosis import Diagnosis, lack_of_fit_text, outlier_notes
 from hotlever.estimation.experiment import Experiment, Prediction
 from hotlever.estimation.inverse_problem import Estimate, estimate
-from hotlever.estimation.lack_of_fit import lack_of_fit_text, outlier_notes
 from hotlever.estimation.options import UNKNOWN_MEDIUM, FitOptions
 from hotlever.estimation.outcome import Outcome
 from hotlever.estimation.posterior import standard_errors

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hotlever.errors import HotleverError, InputError
+from hotlever.estimation.diagnosis import lack_of_fit_text
 from hotlever.estimation.experiment import Prediction, Predictor
-from hotlever.estimation.lack_of_fit import lack_of_fit_text
 from hotlever.estimation.objective import Objective, Subproblem
 from hotlever.estimation.residuals import Residuals
 from hotlever.probe import Probe

@@ -14,7 +14,7 @@ from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.levers import tips_along
 from hotlever.calibration.pulses import PulseCalibration
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION
-from hotlever.estimation.lack_of_fit import USUAL_SCATTER
+from hotlever.estimation.diagnosis import USUAL_SCATTER
 from hotlever.figures.style import (
     LINES,
     MEASURED,

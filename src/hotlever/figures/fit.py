@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
 from hotlever.colours import BLACK, BLUE, ORANGE, SKY, VERMILION
-from hotlever.estimation.lack_of_fit import USUAL_SCATTER
+from hotlever.estimation.diagnosis import USUAL_SCATTER
 from hotlever.figures.style import (
     MEASURED,
     MOST_NAMES,
