@@ -324,9 +324,13 @@ class Outcome(ABC):
     def file(self, request: dict[str, JsonValue] | None = None) -> ResultFile[Any]:
         """Return what the result file holds; `request` is what a batch was asked."""
 
+    def content(self, request: dict[str, JsonValue] | None = None) -> dict[str, Any]:
+        """Return the content of the result file in plain values."""
+        return self.file(request).content()
+
     def to_json(self, request: dict[str, JsonValue] | None = None) -> str:
         """Return the text of the result file."""
-        return json_text(self.file(request).content())
+        return json_text(self.content(request))
 
     def write(
         self, path: str | os.PathLike[str], request: dict[str, JsonValue] | None = None

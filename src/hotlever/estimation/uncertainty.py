@@ -148,7 +148,7 @@ class Uncertainty:
 
     def to_json(self) -> str:
         """Return the fit file with the keys ``posterior`` and ``profiles`` beside its own."""
-        content = self.fit.file().content()
+        content = self.fit.content()
         if self.posterior is not None:
             content["posterior"] = {
                 "samples": self.posterior.sizes["chain"] * self.posterior.sizes["draw"],
