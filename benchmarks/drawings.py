@@ -37,7 +37,7 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever3d import SolidLever
 from hotlever.materials import LOW_DOPED
-from hotlever.materials.silicon import STEP
+from hotlever.materials.heat import STEP
 from hotlever.probe import Layout, MeshOptions, Probe, mesh_layout
 from hotlever.probe.drawing import Drawing
 from hotlever.probe.drawing.layout_builder import build_layout

@@ -17,8 +17,7 @@ from hotlever.contact.resistances import (
 )
 from hotlever.errors import InputError
 from hotlever.materials.air import thermal_conductivity_of_air
-from hotlever.materials.silicon import thermal_conductivity
-from hotlever.materials.thin_silicon import thermal_conductivity_of_wire
+from hotlever.materials.heat import thermal_conductivity, thermal_conductivity_of_wire
 from hotlever.probe import Probe, Tip
 from hotlever.probe.tip import OUT_OF_CONTACT, interface_of
 

@@ -12,7 +12,7 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
-from hotlever.materials import radiation
+from hotlever.materials import heat as heat_laws
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, nuisances
 from hotlever.probe.tip import Tip
@@ -59,7 +59,7 @@ def test_derivatives_by_dimensions_have_taylor_order_two(kind, name):
 @pytest.mark.parametrize("name", RADIATING)
 def test_so_have_those_of_a_lever_that_radiates_most_of_its_heat(name, monkeypatch):
     """From faces and edges, whose lengths and heights change."""
-    monkeypatch.setattr(radiation, "STEFAN_BOLTZMANN", 1000.0 * radiation.STEFAN_BOLTZMANN)
+    monkeypatch.setattr(heat_laws, "STEFAN_BOLTZMANN", 1000.0 * heat_laws.STEFAN_BOLTZMANN)
     lever = Lever(PROBES["with a tip"].with_physics(("radiation",)), COARSE)
     found, rest = orders(lever, name)
     assert np.all(found > 1.6)

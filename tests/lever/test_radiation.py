@@ -14,7 +14,7 @@ from hotlever.lever.transient import integrate, simulate, step
 from hotlever.lever.transient.frequency_domain import spectrum
 from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever3d import SolidLever
-from hotlever.materials import radiation
+from hotlever.materials import heat as heat_laws
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.solid import SolidMeshOptions
 from hotlever.probe.surroundings import Physics
@@ -30,7 +30,7 @@ EMISSIVITY = 0.7
 def bright(monkeypatch) -> None:
     """Surfaces that radiate a thousand times as much: as much as the legs conduct, or more."""
     monkeypatch.setenv(CACHE_VARIABLE, "")
-    monkeypatch.setattr(radiation, "STEFAN_BOLTZMANN", 1000.0 * radiation.STEFAN_BOLTZMANN)
+    monkeypatch.setattr(heat_laws, "STEFAN_BOLTZMANN", 1000.0 * heat_laws.STEFAN_BOLTZMANN)
 
 
 def strip(width_um: float, thickness_um: float) -> Probe:
@@ -66,7 +66,7 @@ def exact_strip(width_um: float, thickness_um: float, bias: float) -> tuple[floa
     """
     A = width_um * thickness_um * 1e-8
     P = 2e-4 * (width_um + thickness_um)
-    losses = EMISSIVITY * radiation.STEFAN_BOLTZMANN * P / (KAPPA * A)
+    losses = EMISSIVITY * heat_laws.STEFAN_BOLTZMANN * P / (KAPPA * A)
     heat = bias**2 / (RESISTIVITY * (LENGTH * 1e-4) ** 2) / KAPPA
 
     def square(T: float, top: float) -> float:
@@ -106,7 +106,7 @@ def test_a_strip_that_radiates_most_of_its_heat_is_the_exact_one(bright):
 
 def test_a_solid_strip_radiates_as_a_flat_one_and_its_edges(bright, monkeypatch):
     """All its surface, the sides a fifth of it, is that of the exact strip; less bright."""
-    monkeypatch.setattr(radiation, "STEFAN_BOLTZMANN", 0.1 * radiation.STEFAN_BOLTZMANN)
+    monkeypatch.setattr(heat_laws, "STEFAN_BOLTZMANN", 0.1 * heat_laws.STEFAN_BOLTZMANN)
     probe, bias = strip(4.0, 1.0), 1.0
     expected, light = exact_strip(4.0, 1.0, bias)
     for lever in (Lever(probe), SolidLever(probe)):

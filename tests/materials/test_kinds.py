@@ -10,6 +10,7 @@ from test_silicon import BEYOND, TEMPERATURES, numerical_derivative
 
 from hotlever.errors import InputError
 from hotlever.materials import KINDS, PARAMETERS, published
+from hotlever.materials.heat import thermal_conductivity_of_layer
 from hotlever.materials.kinds import LowDopedSilicon, PSilicon
 from hotlever.materials.p_silicon import (
     band_gap_p,
@@ -19,7 +20,6 @@ from hotlever.materials.p_silicon import (
 from hotlever.materials.presets import PRESETS
 from hotlever.materials.sections import material_of
 from hotlever.materials.silicon import band_gap, inversion_temperature
-from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
 
 OPTION_III = published("option III").material
 #: One material of each kind, and of each choice that a kind offers.
@@ -160,7 +160,7 @@ def test_a_layer_conducts_as_the_integral_of_fuchs_and_sondheimer_says():
     """Averaged over the layer: carriers that leave a surface count less within a mean free path."""
     from scipy.integrate import dblquad
 
-    from hotlever.materials.silicon import thermal_conductivity
+    from hotlever.materials.heat import thermal_conductivity
 
     depth = 0.4 / 0.3
 

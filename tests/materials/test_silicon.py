@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.laws import limited_temperature
 from hotlever.materials.silicon import (
     band_gap,
@@ -23,7 +24,6 @@ from hotlever.materials.silicon import (
     minimos_mobility,
     mobility,
     phonon_mobility,
-    thermal_conductivity,
 )
 
 DOPING = np.array([1e16, 3.3e17, 5.75e17, 1e19, 2.2e20])

@@ -10,7 +10,7 @@ import xarray as xr
 
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.materials.silicon import thermal_conductivity
+from hotlever.materials.heat import thermal_conductivity
 from hotlever.probe import Probe
 from hotlever.studies.linear_branch import (
     Line,

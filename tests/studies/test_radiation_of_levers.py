@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.materials.radiation import (
+from hotlever.materials.heat import (
     FREE_SPACE_OHM,
     STEFAN_BOLTZMANN,
     grey_emission,

@@ -64,7 +64,8 @@ def exact_high_doped(voltage):
     from scipy.integrate import quad
     from scipy.optimize import brentq
 
-    from hotlever.materials.silicon import conductivity_high_doped, thermal_conductivity
+    from hotlever.materials.heat import thermal_conductivity
+    from hotlever.materials.silicon import conductivity_high_doped
 
     material = published("option III").material
 

@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hotlever.materials.air import kirchhoff_variable
-from hotlever.materials.thin_silicon import MEAN_FREE_PATH_UM, thermal_conductivity_of_wire
+from hotlever.materials.heat import MEAN_FREE_PATH_UM, thermal_conductivity_of_wire
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM

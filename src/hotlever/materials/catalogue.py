@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from hotlever.errors import InputError, shown, unknown_name
+from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.kind import Kind
 from hotlever.materials.kinds import KINDS
 from hotlever.materials.laws import Law
 from hotlever.materials.parameters import STATED, Parameter
 from hotlever.materials.presets import PRESETS
 from hotlever.materials.sections import material_of
-from hotlever.materials.silicon import thermal_conductivity
 from hotlever.materials.stated import StatedLaw
 from hotlever.spieser2017 import DOI
 from hotlever.text import aligned

@@ -11,9 +11,9 @@ from pydantic import ConfigDict, model_validator
 
 from hotlever.errors import unknown_name
 from hotlever.materials.formulas import TEMPERATURE
+from hotlever.materials.heat import grey_emission
 from hotlever.materials.laws import Evaluated, Law
 from hotlever.materials.parameters import STATED, Parameter, constant_of, declare
-from hotlever.materials.radiation import grey_emission
 from hotlever.materials.silicon import MELTING_POINT, Carrier
 from hotlever.materials.stated import StatedLaw, names_stated, number_or_law
 from hotlever.records import Record
@@ -43,7 +43,6 @@ class Kind(Record):
     usual: ClassVar[tuple[str, ...]]
     #: Whether it carries a current.
     conducts: ClassVar[bool] = True
-
     #: By property that may be a law: the parameters that only its number has a use for.
     of_numbers: ClassVar[dict[str, tuple[str, ...]]] = {}
 
@@ -185,8 +184,6 @@ class Kind(Record):
 
     def emission(self, T: Array, surroundings_K: float) -> Evaluated:
         """Return what a face radiates less what it takes up (W cm⁻²), with its derivatives."""
-        if not isinstance(self.emissivity, StatedLaw):
-            return grey_emission(T, self.emissivity, surroundings_K)
         emissivity, by = self.property_at("emissivity", T)
         emission, by_emissivity = grey_emission(T, emissivity, surroundings_K)
         black = by_emissivity.pop("emissivity")
@@ -207,18 +204,19 @@ class Kind(Record):
     # --- what a section may hold ------------------------------------------------------------------
 
     @classmethod
-    def without_use(cls, values: Mapping[str, Any]) -> list[str]:
-        """Return what means nothing in a section of values: beside a law, or without one.
+    def without_use(cls, values: Mapping[str, Any]) -> dict[str, str]:
+        """Return what means nothing in a section of values, beside a law or without one, and why.
 
         With a law of the resistivity a temperature coefficient has no use, unless a formula names
         it; a scale has none without a law.
         """
-        used = names_stated(values)
-        useless = list[str]()
+        useless = dict[str, str]()
         for name, others in cls.of_numbers.items():
             is_law = isinstance(values.get(name), str | Mapping | StatedLaw)
-            useless += others if is_law else [f"{name}_scale"]
-        return [name for name in useless if name not in used]
+            for other in others if is_law else [f"{name}_scale"]:
+                useless[other] = f"{name} is {'a law' if is_law else 'no law'}"
+        used = names_stated(values)
+        return {name: why for name, why in useless.items() if name not in used}
 
     @model_validator(mode="before")
     @classmethod
@@ -230,15 +228,9 @@ class Kind(Record):
             if key not in cls.model_fields and key not in named:
                 raise ValueError(str(unknown_name("key", str(key), cls.model_fields)))
         useless = cls.without_use(values)
-        for name in useless:
+        for name, why in useless.items():
             if values.get(name) is not None:
-                other = next(
-                    own
-                    for own, others in cls.of_numbers.items()
-                    if name in (*others, f"{own}_scale")
-                )
-                stated = "a law" if name in cls.of_numbers[other] else "no law"
-                raise ValueError(f"{name} means nothing where {other} is {stated}, expected none")
+                raise ValueError(f"{name} means nothing where {why}, expected none")
         scales = {
             f"{name}_scale": 1.0
             for name in cls.of_numbers

@@ -27,7 +27,12 @@ from hotlever.materials.films import (
     reciprocal,
     wiedemann_franz,
 )
-from hotlever.materials.heat import enthalpy, enthalpy_by_capacity
+from hotlever.materials.heat import (
+    enthalpy,
+    enthalpy_by_capacity,
+    thermal_conductivity,
+    thermal_conductivity_of_layer,
+)
 from hotlever.materials.kind import Kind
 from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
 from hotlever.materials.p_silicon import conductivity_p
@@ -45,7 +50,6 @@ from hotlever.materials.silicon import (
     conductivity_high_doped,
     conductivity_low_doped,
     inversion_temperature,
-    thermal_conductivity,
 )
 from hotlever.materials.stated import StatedLaw, number_or_law
 from hotlever.materials.thermopower import (
@@ -54,7 +58,6 @@ from hotlever.materials.thermopower import (
     thermoelectric_n_silicon,
     thermoelectric_p_silicon,
 )
-from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
 from hotlever.types import Array
 
 #: In place of c_κ: κ follows from the thickness.

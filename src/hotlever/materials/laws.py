@@ -32,25 +32,11 @@ LEVELLING = 100.0
 class Law(Protocol):
     """A material law, ``value, partials = law(T, ...)``; the rest is what `law` notes."""
 
-    @property
-    def temperature_range(self) -> tuple[float, float]:
-        """See `law`."""
-        ...
-
-    @property
-    def steps(self) -> tuple[float, ...]:
-        """See `law`."""
-        ...
-
-    @property
-    def source(self) -> str:
-        """See `law`."""
-        ...
-
-    @property
-    def formula(self) -> Callable[..., Evaluated]:
-        """What it is within the range of its formula."""
-        ...
+    temperature_range: tuple[float, float]
+    steps: tuple[float, ...]
+    source: str
+    #: What it is within the range of its formula.
+    formula: Callable[..., Evaluated]
 
     def __call__(self, *args: Any, **kwargs: Any) -> Evaluated:
         """Evaluate the law and its partial derivatives."""

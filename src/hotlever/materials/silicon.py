@@ -1,6 +1,6 @@
-"""Silicon: thermal conductivity, carriers, mobilities and electrical conductivity.
+"""Silicon: carriers, mobilities and electrical conductivity.
 
-Equations 4 to 11 of Spieser et al., J. Appl. Phys. 121, 174503 (2017),
+Equations 5 to 11 of Spieser et al., J. Appl. Phys. 121, 174503 (2017),
 doi:10.1063/1.4981883, called "the paper" below. Units are the paper's: cm, V, A, W, K.
 
 The laws take arrays of the temperature `T` (K), the local doping concentration `n` (cm⁻³, see
@@ -38,43 +38,12 @@ ELEMENTARY_CHARGE = 1.6e-19
 #: give 0.775. The printed number is kept because the published parameters were fitted with it.
 IMPURITY_RATIO: dict[Carrier, float] = {"electron": 1.0, "hole": 0.746}
 PHONON_RATIO: dict[Carrier, float] = {"electron": 1.0, "hole": 0.279}  # (m_e/m_h)^(5/2)
-#: Where the slope of Eq. 4 steps (K), through a tanh that is 1 K wide.
-STEP = 680.0
 #: Of MINIMOS, electrons and holes: lattice mobility at 300 K, how its exponent differs from that of
 #: electrons, mobility at the highest doping, and the doping that halves what is between (cm⁻³).
 _MINIMOS: dict[Carrier, tuple[float, float, float, float]] = {
     "electron": (1430.0, 0.0, 80.0, 1.12e17),
     "hole": (460.0, 0.18, 45.0, 2.23e17),
 }
-
-
-@law(
-    meant_for=(290.0, 1300.0),
-    source="Eq. 4; Fulkerson et al., Phys. Rev. 167, 765 (1968)",
-    steps=(STEP,),
-)
-def thermal_conductivity(T: ArrayLike, c_kappa: float = 1.0) -> Evaluated:
-    """Thermal conductivity of silicon, c_κ κ_Si(T), in W cm⁻¹ K⁻¹ (Eq. 4).
-
-    Parameters
-    ----------
-    T : array_like
-    c_kappa : float
-        Reduction by phonon scattering in a thin structure.
-
-    Examples
-    --------
-    >>> kappa, _ = thermal_conductivity([300.0, 680.0, 1000.0])
-    >>> (100 * kappa).round(1).tolist()  # W/(m K)
-    [141.4, 52.5, 30.8]
-    """
-    T = np.asarray(T, dtype=float)
-    above = T - STEP
-    step = np.tanh(above)
-    resistivity = 0.707 + 3.15e-3 * (T - 300.0) + 5.25e-4 * (1.0 + step) * above
-    slope = 3.15e-3 + 5.25e-4 * (1.0 + step + above * (1.0 - step**2))
-    silicon = 1.0 / resistivity
-    return c_kappa * silicon, {"T": -c_kappa * slope * silicon**2, "c_kappa": silicon}
 
 
 @law(

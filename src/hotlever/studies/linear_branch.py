@@ -26,7 +26,7 @@ from hotlever.datasets import labelled
 from hotlever.lever import Branch, Lever
 from hotlever.lever.dataset import dataset_of_branch
 from hotlever.lever.lever import COARSE, HOTTEST
-from hotlever.materials.silicon import thermal_conductivity
+from hotlever.materials.heat import thermal_conductivity
 from hotlever.probe import Probe
 from hotlever.probe.drawing import Drawing, Layer
 from hotlever.probe.shapes import Shape, ThreeLeg, UShape

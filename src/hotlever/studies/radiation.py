@@ -16,8 +16,8 @@ from hotlever.datasets import labelled
 from hotlever.errors import ComputationError
 from hotlever.lever import Lever
 from hotlever.lever.equations import BALANCES, balance_columns
+from hotlever.materials.heat import sheet_emissivity
 from hotlever.materials.kinds import LowDopedSilicon
-from hotlever.materials.radiation import sheet_emissivity
 from hotlever.probe import Probe
 from hotlever.probe.parameters import of_materials
 
@@ -93,7 +93,7 @@ def _stated(dimensions: Any, values: Any, unit: str, meaning: str) -> tuple[Any,
 def sheet_emissivities(probe: Probe, temperature_K: ArrayLike) -> xr.Dataset:
     """Compute the emissivity of each of a lever's conducting materials as a thin sheet.
 
-    By its resistance for a direct current, see `hotlever.materials.radiation.sheet_emissivity`.
+    By its resistance for a direct current, see `hotlever.materials.heat.sheet_emissivity`.
 
     Returns
     -------

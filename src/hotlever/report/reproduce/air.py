@@ -12,7 +12,7 @@ from hotlever import spieser2017 as paper
 from hotlever.calibration.power_law import EQ12
 from hotlever.lever.air_fields import AirFields
 from hotlever.materials.air import thermal_conductivity_of_air
-from hotlever.materials.silicon import thermal_conductivity
+from hotlever.materials.heat import thermal_conductivity
 from hotlever.report.reproduce.findings import MANY, Findings
 from hotlever.studies import air_scaling, disc
 from hotlever.studies.air_scaling import COLD, HOT

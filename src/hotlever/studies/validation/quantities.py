@@ -18,8 +18,8 @@ from hotlever.lever.noise import johnson_without_feedback
 from hotlever.lever.reader import Reader
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.materials.air import thermal_conductivity_of_air
+from hotlever.materials.heat import thermal_conductivity_of_layer
 from hotlever.materials.silicon import conductivity_low_doped
-from hotlever.materials.thin_silicon import thermal_conductivity_of_layer
 from hotlever.probe import Probe
 from hotlever.probe.tip import EXAMPLE
 from hotlever.raman import anharmonic
