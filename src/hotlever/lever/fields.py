@@ -33,6 +33,9 @@ from hotlever.materials.kinds import HighDopedSilicon
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
+#: Parts that each side of a triangle is cut into.
+_CUTS = 3
+
 
 @dataclass(frozen=True)
 class FieldMap:
@@ -87,9 +90,9 @@ class Surface:
 
 
 @singledispatch
-def seen_from_above(lever: Lever, cuts: int = 3) -> Surface:
-    """Return a lever as it is drawn: every triangle of its mesh is cut into ``cuts²`` of them."""
-    reference = _cut_triangle(cuts)
+def seen_from_above(lever: Lever) -> Surface:
+    """Return a lever as it is drawn: every triangle of its mesh is cut into smaller ones."""
+    reference = _cut_triangle()
     rule = reference.p, np.full(reference.p.shape[1], 1.0)
     mesh, element = lever.space.mesh, lever.space.elements.basis.elem
     corners = FiniteElements(mesh.elements, element, rule)
@@ -99,7 +102,7 @@ def seen_from_above(lever: Lever, cuts: int = 3) -> Surface:
 
 
 class FieldMapper:
-    """Draws states of one lever: every triangle of the mesh is cut into ``cuts²`` smaller ones.
+    """Draws states of one lever: every triangle of its mesh is cut into smaller ones.
 
     Raises
     ------
@@ -107,14 +110,14 @@ class FieldMapper:
         If it is one of tetrahedra.
     """
 
-    def __init__(self, lever: Lever, cuts: int = 3) -> None:
+    def __init__(self, lever: Lever) -> None:
         if lever.space.mesh.elements.dim() != 2:
             raise InputError("found a lever of tetrahedra, expected a flat one")
-        reference = _cut_triangle(cuts)
-        self._surface = seen_from_above(lever, cuts)
+        reference = _cut_triangle()
+        self._surface = seen_from_above(lever)
         mesh, element = lever.space.mesh, lever.space.elements.basis.elem
         centres = reference.p[:, reference.t].mean(axis=1)
-        middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
+        middle = centres, np.full(centres.shape[1], 0.5 / _CUTS**2)
         elements = FiniteElements(mesh.elements, element, middle)
         space = FullSpace(mesh, elements, lever.space.wiring)
         self._centres = LeverEquations.of_probe(space, lever.probe)
@@ -151,17 +154,17 @@ def _resistivity(thickness_um: float | Array, sigma: Array) -> Array:
     return np.divide(sheet, sigma, out=nothing, where=sigma > 0).ravel()
 
 
-def _cut_triangle(cuts: int) -> MeshTri:
+def _cut_triangle() -> MeshTri:
     """The reference triangle, cut into equal ones."""
-    points = [(i, j) for j in range(cuts + 1) for i in range(cuts + 1 - j)]
+    points = [(i, j) for j in range(_CUTS + 1) for i in range(_CUTS + 1 - j)]
     number = {point: index for index, point in enumerate(points)}
     triangles = []
     for i, j in points:
-        if i + j < cuts:
+        if i + j < _CUTS:
             triangles.append((number[i, j], number[i + 1, j], number[i, j + 1]))
-        if i + j < cuts - 1:
+        if i + j < _CUTS - 1:
             triangles.append((number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]))
-    return MeshTri(np.array(points, dtype=float).T / cuts, np.array(triangles).T)
+    return MeshTri(np.array(points, dtype=float).T / _CUTS, np.array(triangles).T)
 
 
 def write_vtu(fields: FieldMap, path: str | os.PathLike[str]) -> None:

@@ -67,25 +67,16 @@ class FilmLaws:
         }
         self.doping: Array | float = 0.0
         self.doping_by: dict[str, Array | float] = {}
-        if isinstance(self.kind, LowDopedSilicon):
-            self.doping = self.kind.n_d
-            self.doping_by[full_name(film.material, "n_d")] = 1.0
-            if film.dopant_from is not None:
-                self._taper(film.dopant_from, materials, number, motions)
-
-    def _taper(
-        self,
-        source: str,
-        materials: Mapping[str, Kind],
-        number: int,
-        motions: Mapping[str, Motion],
-    ) -> None:
-        """Find the doping that diffusion from another material leaves."""
-        film, kind, beside = self.film, self.kind, materials[source]
-        # a layout has no other tapers
-        assert isinstance(kind, LowDopedSilicon)
+        if not isinstance(self.kind, LowDopedSilicon):
+            return
+        self.doping = self.kind.n_d
+        self.doping_by[full_name(film.material, "n_d")] = 1.0
+        if (source := film.dopant_from) is None:
+            return
+        # what diffusion from another material leaves; a layout has no other tapers
+        n_d, delta, beside = self.kind.n_d, self.kind.delta, materials[source]
         assert isinstance(beside, HighDopedSilicon)
-        self.doping, by = tapered_doping(film.distances, kind.n_d, kind.delta, n_hd=beside.n_hd)
+        self.doping, by = tapered_doping(film.distances, n_d, delta, n_hd=beside.n_hd)
         owners = {"n_d": film.material, "delta": film.material, "n_hd": source}
         self.doping_by = {full_name(owner, own): by[own] for own, owner in owners.items()} | {
             name: (by["distances"] * motion.distances[number]).sum(axis=0)

@@ -285,15 +285,10 @@ def rows_of(data: xr.Dataset) -> xr.Dataset:
     import xarray as xr
 
     columns = [*READER_COLUMNS, *(["pressure_mbar"] if "pressure" in data.sizes else [])]
-    full = xr.broadcast(*(data[name] for name in columns))
     order = [name for name in ("pressure", "distance", "bias") if name in data.sizes]
-    return labelled(
-        {
-            name: values.transpose(*order).values.ravel()
-            for name, values in zip(columns, full, strict=True)
-        },
-        "row",
-    )
+    (full,) = xr.broadcast(data[columns])
+    rows = full.stack(row=order)
+    return labelled({name: rows[name].values for name in columns}, "row")
 
 
 def best_bias(

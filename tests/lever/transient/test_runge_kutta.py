@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError
-from hotlever.lever.transient.runge_kutta import StepController, Stepper
+from hotlever.lever.transient.runge_kutta import Stepper, step_change
 from hotlever.lever.transient.tableau import ARK436L2SA
 
 TIMES, STAGES, EMBEDDED = ARK436L2SA.times, ARK436L2SA.stages, ARK436L2SA.embedded
@@ -87,13 +87,13 @@ class Pendulum:
         return x[1:]
 
 
-def test_the_controller_keeps_changes_of_the_step_in_bounds():
-    control = StepController()
-    assert control.change(0.0) == control.most
-    assert control.change(1.0) == control.safety
-    assert control.change(1.001) < control.safety
-    assert control.change(1e9) == control.least
-    assert control.change(np.inf) == control.failed
+def test_changes_of_the_step_are_in_bounds():
+    safety, least, most, failed = 0.9, 0.2, 6.0, 0.25
+    assert step_change(0.0) == most
+    assert step_change(1.0) == safety
+    assert step_change(1.001) < safety
+    assert step_change(1e9) == least
+    assert step_change(np.inf) == failed
 
 
 START = np.array([[0.0], [1.0]])

@@ -54,7 +54,7 @@ def proper_orthogonal_modes(snapshots: Array, most: int | None = None, least: fl
 
 
 def empirical_cubature(
-    integrands: Iterable[Array], weights: Array, tolerance: float = 1e-6, seed: int = 0
+    integrands: Iterable[Array], weights: Array, tolerance: float = 1e-6
 ) -> tuple[Index, Array]:
     """Choose points and positive weights that integrate given integrands as all points do.
 
@@ -68,15 +68,13 @@ def empirical_cubature(
         Of all points.
     tolerance : float
         Relative accuracy on the integrals.
-    seed : int
-        Of the random combinations.
 
     Returns
     -------
     points : ndarray of int, shape (m,)
     weights : ndarray, shape (m,)
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     sketch = np.zeros((_SKETCH, weights.size))
     for some in integrands:
         rows = rng.integers(0, _SKETCH, len(some))

@@ -124,20 +124,23 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
         "frequency_Hz": frequency,
         "impedance_real_ohm": impedance.real,
         "impedance_imag_ohm": impedance.imag,
-        "tip_per_power_K_per_mW": np.abs(per_power),
-        "tip_per_power_deg": np.degrees(np.unwrap(np.angle(per_power))),
-        "tip_per_bias_K_per_V": np.abs(per_bias),
-        "tip_per_bias_deg": np.degrees(np.unwrap(np.angle(per_bias))),
     }
+    columns |= _polar("tip_per_power", "K_per_mW", per_power)
+    columns |= _polar("tip_per_bias", "K_per_V", per_bias)
     if state.lever.circuit.has_bridge:
         out = state.lever.circuit.bridge_change(1.0 / bias, 1.0)
-        columns["bridge_per_bias_V_per_V"] = np.abs(out)
-        columns["bridge_per_bias_deg"] = np.degrees(np.unwrap(np.angle(out)))
+        columns |= _polar("bridge_per_bias", "V_per_V", out)
     seen: dict[str, Any] = {
         name: getattr(state, name) for name in ("bias_V", "lever_V", "current_mA", "tip_K")
     }
     seen |= probe_attributes(state.lever.probe)
     return labelled(columns, "frequency", {"frequency": frequency}, **seen)
+
+
+def _polar(name: str, unit: str, values: Complex) -> dict[str, Array]:
+    """Return columns of sizes and of phases (degrees) without jumps."""
+    phases = np.degrees(np.unwrap(np.angle(values)))
+    return {f"{name}_{unit}": np.abs(values), f"{name}_deg": phases}
 
 
 def checked_frequencies(frequency_Hz: ArrayLike) -> Array:
@@ -227,9 +230,7 @@ def harmonics(
         seen["bridge_"] = lever.circuit.bridge_change(lever_V, driven_V)
     for of, volts in seen.items():
         for number, name in enumerate(HARMONICS):
-            angle = np.angle(volts[:, number])
-            columns[f"{name}_{of}harmonic_V"] = np.abs(volts[:, number])
-            columns[f"{name}_{of}harmonic_deg"] = np.degrees(np.unwrap(angle))
+            columns |= _polar(f"{name}_{of}harmonic", "V", volts[:, number])
     shown: dict[str, Any] = {"bias_V": offset_V, "amplitude_V": amplitude_V}
     shown |= probe_attributes(lever.probe)
     return labelled(columns, "frequency", {"frequency": frequency}, **shown)

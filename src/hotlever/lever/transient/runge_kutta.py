@@ -186,7 +186,7 @@ class Stepper:
                 share = error / self._tolerance
             except NewtonError:
                 share = np.inf
-            self.length = _step_change(share) * (then - here.t)
+            self.length = step_change(share) * (then - here.t)
             if share <= 1.0:
                 yield step
                 self.accepted, here = self.accepted + 1, there
@@ -314,7 +314,7 @@ class _Reached:
     monitored_slopes: Array
 
 
-def _step_change(share: float) -> float:
+def step_change(share: float) -> float:
     """Return by which factor a step changes whose error is a share of the tolerance."""
     if not np.isfinite(share):
         return _FAILED
