@@ -33,7 +33,7 @@ from hotlever.materials.kinds import HighDopedSilicon
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
-#: Parts that each side of a triangle is cut into.
+#: Parts that each side of a triangle is cut into for a drawing, unless told otherwise.
 _CUTS = 3
 
 
@@ -90,9 +90,9 @@ class Surface:
 
 
 @singledispatch
-def seen_from_above(lever: Lever) -> Surface:
-    """Return a lever as it is drawn: every triangle of its mesh is cut into smaller ones."""
-    reference = _cut_triangle()
+def seen_from_above(lever: Lever, cuts: int = _CUTS) -> Surface:
+    """Return a lever as it is drawn: every triangle of its mesh is cut into ``cuts²`` of them."""
+    reference = _cut_triangle(cuts)
     rule = reference.p, np.full(reference.p.shape[1], 1.0)
     mesh, element = lever.space.mesh, lever.space.elements.basis.elem
     corners = FiniteElements(mesh.elements, element, rule)
@@ -113,7 +113,7 @@ class FieldMapper:
     def __init__(self, lever: Lever) -> None:
         if lever.space.mesh.elements.dim() != 2:
             raise InputError("found a lever of tetrahedra, expected a flat one")
-        reference = _cut_triangle()
+        reference = _cut_triangle(_CUTS)
         self._surface = seen_from_above(lever)
         mesh, element = lever.space.mesh, lever.space.elements.basis.elem
         centres = reference.p[:, reference.t].mean(axis=1)
@@ -154,17 +154,17 @@ def _resistivity(thickness_um: float | Array, sigma: Array) -> Array:
     return np.divide(sheet, sigma, out=nothing, where=sigma > 0).ravel()
 
 
-def _cut_triangle() -> MeshTri:
+def _cut_triangle(cuts: int) -> MeshTri:
     """The reference triangle, cut into equal ones."""
-    points = [(i, j) for j in range(_CUTS + 1) for i in range(_CUTS + 1 - j)]
+    points = [(i, j) for j in range(cuts + 1) for i in range(cuts + 1 - j)]
     number = {point: index for index, point in enumerate(points)}
     triangles = []
     for i, j in points:
-        if i + j < _CUTS:
+        if i + j < cuts:
             triangles.append((number[i, j], number[i + 1, j], number[i, j + 1]))
-        if i + j < _CUTS - 1:
+        if i + j < cuts - 1:
             triangles.append((number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]))
-    return MeshTri(np.array(points, dtype=float).T / _CUTS, np.array(triangles).T)
+    return MeshTri(np.array(points, dtype=float).T / cuts, np.array(triangles).T)
 
 
 def write_vtu(fields: FieldMap, path: str | os.PathLike[str]) -> None:

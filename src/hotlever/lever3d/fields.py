@@ -38,7 +38,7 @@ def _(lever: SolidLever, states: Sequence[State], folder: Path, draw_slices: Dra
 
 
 @seen_from_above.register
-def _(lever: SolidLever) -> Surface:
+def _(lever: SolidLever, cuts: int = 1) -> Surface:
     """See its upper side, whose triangles are not cut."""
     mesh, elements = lever.solid.elements, lever.space.elements
     facets = mesh.facets[:, mesh.boundary_facets()]

@@ -102,29 +102,24 @@ def with_sensitivities(
                 f"no derivatives in time by {name} are known, expected parameters of materials, "
                 "series_resistance_ohm or gas_conductivity"
             )
-    shown, slopes, bias = [], [], []
-    along = _Along(lever, names)
-    stops = times.tolist()
-    wanted = set(stops)
+    rows, along, stops = [], _Along(lever, names), times.tolist()
     for piece, step in time_steps(lever, waveform, float(times[-1]), tolerance_K, stops=stops):
         first = along.time is None
         along.add(piece, step)
-        if first and 0.0 in wanted:
-            bias.append(piece.bias(0.0))
-            shown.append(along.shown(step.x[:, :1]))
-            slopes.append(along.slopes_at_start)
+        if first and stops[0] == 0.0:
+            rows.append((piece.bias(0.0), along.shown(step.x[:, :1]), along.slopes_at_start))
         limit_K, end = lever.equations.laws.limit
-        if lever.circuit.base_temperature_K + along.hottest(step.x[:, 1:]) > limit_K:
+        x = step.x[:, 1:]
+        if lever.circuit.base_temperature_K + along.hottest(x) > limit_K:
             raise HistoryEndError(f"{end} before {step.end:.6g} µs", step.start, None)
-        if step.end in wanted:
-            bias.append(piece.bias(step.end))
-            shown.append(along.shown(step.x[:, 1:]))
-            slopes.append(along.slopes(step.x[:, 1:]))
+        if step.end in stops:
+            rows.append((piece.bias(step.end), along.shown(x), along.slopes(x)))
+    bias, shown, slopes = zip(*rows, strict=True)
     values = dict(zip(OBSERVABLES, np.array(shown).T, strict=True))
     table = np.array(slopes).transpose(1, 0, 2)
     return labelled(
         {
-            "bias_V": bias,
+            "bias_V": list(bias),
             **{OBSERVABLES[name].name: values[name] for name in lever.probe.observables},
             "sensitivity": (("observable", "time", "parameter"), table),
         },
