@@ -237,14 +237,14 @@ class MeasuredPage(Page):
         with self._result:
             await self.show(name)
             if turn == self._shows:
-                await _ResultBlocks(self, self.kind, name).show()
+                await _ResultBlocks(self, name).show()
 
 
 class _ResultBlocks:
     """The page of a result, a fit or a calibration, in the element that is open."""
 
-    def __init__(self, page: Page, kind: str, name: str) -> None:
-        self._page, self._kind, self._name = page, kind, name
+    def __init__(self, page: MeasuredPage, name: str) -> None:
+        self._page, self._name = page, name
 
     async def show(self) -> None:
         """Show it as it is drawn."""
@@ -257,7 +257,8 @@ class _ResultBlocks:
                     self._show_block(block)
 
         with self._page.banner.caught():
-            await self._page.session.ask("full", "showing:page", self._kind, self._name, heard=hear)
+            asked = "showing:page", self._page.kind, self._name
+            await self._page.session.ask("full", *asked, heard=hear)
         if not waiting.is_deleted:
             waiting.delete()
 
@@ -281,7 +282,7 @@ class _ResultBlocks:
 
     async def _give_figure(self, shown: str, suffix: str) -> None:
         with self._page.banner.caught():
-            asked = self._kind, self._name, shown, suffix
+            asked = self._page.kind, self._name, shown, suffix
             drawn = self._page.session.ask("full", "showing:drawn", *asked)
             await hand_over(drawn, f"{Path(self._name).name.split('.')[0]}-{shown}{suffix}")
 
