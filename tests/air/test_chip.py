@@ -21,9 +21,9 @@ COARSE = 0.4
 @pytest.mark.parametrize("angle", [0.0, 0.6, np.pi / 2, -2.5])
 def test_the_base_line_goes_through_the_leg_ends(angle):
     line = BaseLine.of(turned(LAYOUT, angle, (10.0, 20.0)), "a test")
-    assert line.along == pytest.approx([np.cos(angle), np.sin(angle)])
-    assert line.across == pytest.approx([-np.sin(angle), np.cos(angle)])
-    np.testing.assert_allclose(lever_axes(turned(LAYOUT, angle))[0], line.along, atol=1e-12)
+    assert line.axes[0] == pytest.approx([np.cos(angle), np.sin(angle)])
+    assert line.axes[1] == pytest.approx([-np.sin(angle), np.cos(angle)])
+    np.testing.assert_allclose(lever_axes(turned(LAYOUT, angle))[0], line.axes[0], atol=1e-12)
 
 
 def test_the_chip_turns_with_the_lever():

@@ -48,15 +48,13 @@ class BaseLine:
     ----------
     origin : ndarray, shape (2,)
         A point on it (µm).
-    along : ndarray, shape (2,)
-        Unit vector normal to it, towards the lever: the lever's direction.
-    across : ndarray, shape (2,)
-        Unit vector on it, to the left of `along`.
+    axes : ndarray, shape (2, 2)
+        Unit vectors: normal to it, towards the lever, which is the lever's direction; and on it,
+        to the left of that.
     """
 
     origin: Array
-    along: Array
-    across: Array
+    axes: Array
 
     @classmethod
     def of(cls, layout: Layout, needed_by: str) -> BaseLine:
@@ -81,7 +79,7 @@ class BaseLine:
         along = np.array([y, -x])
         if (np.array(layout.tip) - origin) @ along < 0:
             along = -along
-        line = cls(origin, along, np.array([-along[1], along[0]]))
+        line = cls(origin, np.array([along, [-along[1], along[0]]]))
         off = np.abs(line.seen(points)[:, 0])
         if off.max() > _OFF_LINE:
             x, y = points[off.argmax()]
@@ -101,21 +99,21 @@ class BaseLine:
 
     def seen(self, points: Array) -> Array:
         """Return points (n, 2) by their distances along the lever and across it (µm)."""
-        return (points - self.origin) @ np.stack([self.along, self.across], axis=1)
+        return (points - self.origin) @ self.axes.T
 
     def placed(self, corners: Array) -> Array:
         """Return points (..., 3), given along, across and up, in space."""
-        level = corners[..., :1] * self.along + corners[..., 1:2] * self.across + self.origin
+        along, across = self.axes
+        level = corners[..., :1] * along + corners[..., 1:2] * across + self.origin
         return np.concatenate([level, corners[..., 2:]], axis=-1)
 
 
 def lever_axes(layout: Layout) -> Array:
     """Return unit vectors along a lever and across it, (2, 2); x and y where that means nothing."""
     try:
-        line = BaseLine.of(layout, "the direction of the lever")
+        return BaseLine.of(layout, "the direction of the lever").axes
     except InputError:
         return np.eye(2)
-    return np.stack([line.along, line.across])
 
 
 def chip_panels(layout: Layout, refinement: float = 1.0) -> Panels:

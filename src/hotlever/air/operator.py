@@ -309,7 +309,7 @@ def _mirrors_below(
     tilt = math.radians(surroundings.surface_tilt_deg)
     normal = np.array([0.0, 0.0, 1.0])
     if tilt != 0:
-        along = BaseLine.of(layout, "surface_tilt_deg").along
+        along, _ = BaseLine.of(layout, "surface_tilt_deg").axes
         normal = np.array([*(-math.sin(tilt) * along), math.cos(tilt)])
     below_tip = np.array([*layout.tip, -layout.thickness_um / 2 - surroundings.surface_gap_um])
     point = below_tip - surroundings.jump_length_um(base_temperature_K) * normal

@@ -210,7 +210,7 @@ class _Line:
         self._origin, self._along = np.zeros(2), np.array([1.0, 0.0])
         with suppress(InputError):  # leg ends that are not on one line
             base = BaseLine.of(layout, "the drawing")
-            self._origin, self._along = base.origin, base.along
+            self._origin, self._along = base.origin, base.axes[0]
         outline = self.of(np.array([point for ring in layout.outline for point in ring]))
         self.start, self.end = float(outline.min()), float(outline.max())
         self.tip = float(self.of(np.array(layout.tip)))

@@ -68,7 +68,7 @@ def sections(materials: Mapping[str, Kind] | None = None) -> dict[str, list[str]
     """Return the lines of each kind and of the presets, or of each of some materials."""
     if materials is not None:
         return {name: _own_lines(name, kind) for name, kind in materials.items()}
-    lines = {name: _kind_lines(name, kind) for name, kind in KINDS.items()}
+    lines = {name: _kind_lines(name) for name in KINDS}
     rows = []
     for name, preset in PRESETS.items():
         values = ", ".join(f"{key} {value:g}" for key, value in preset.values.items())
@@ -76,13 +76,16 @@ def sections(materials: Mapping[str, Kind] | None = None) -> dict[str, list[str]
     return {**lines, "presets": ["presets:", *aligned(rows)]}
 
 
-def _kind_lines(name: str, kind: type[Kind]) -> list[str]:
-    example = _example(name)
+def _kind_lines(name: str) -> list[str]:
+    kind, example = KINDS[name], _example(name)
     preset = PRESETS[_EXAMPLES[name]].values if name in _EXAMPLES else {}
     values = {own: getattr(example, own) for own in kind.declared if own not in preset}
     head = f"{name}: {(kind.__doc__ or '').partition('.')[0]}"
-    laws = _laws(name, example)
-    return _lines(head, kind.declared, "left out", values, {law: law.source for law in laws})
+    # the laws of its options are among its own
+    options = {"metal-film": {"kappa": 0.5}, "dielectric": {}}.get(name, {"c_kappa": "thickness"})
+    other = example.model_copy(update=options)
+    laws = {law: law.source for law in (*example.laws, *other.laws, *example.effects)}
+    return _lines(head, kind.declared, "left out", values, laws)
 
 
 def _own_lines(name: str, kind: Kind) -> list[str]:
@@ -114,13 +117,6 @@ def _lines(
         first = "" if isinstance(law, StatedLaw) else f"{title}: "
         lines.append(f"  {first}{said}; {low:g} to {high:g} K")
     return lines
-
-
-def _laws(name: str, example: Kind) -> list[Law | StatedLaw]:
-    """Return the laws of a kind, those of its options among them."""
-    options = {"metal-film": {"kappa": 0.5}, "dielectric": {}}.get(name, {"c_kappa": "thickness"})
-    other = example.model_copy(update=options)
-    return list(dict.fromkeys((*example.laws, *other.laws, *example.effects)))
 
 
 def examples() -> dict[str, Kind]:

@@ -40,8 +40,6 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 _NODES, _WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
 #: Part of a value that a law may lose while it levels off.
 _MAY_LOSE = 0.5
-#: Width (K) of levelling off from a value of zero.
-_NARROWEST_K = 1e-3
 #: Rows that a table may have, and temperatures (K).
 _MOST_ROWS, _LEAST_K, _MOST_K = 2000, 1.0, 1e4
 

@@ -12,7 +12,7 @@ Units are those of `hotlever.materials.silicon`; S is in V/K, β in A cm⁻¹ K�
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -171,12 +171,10 @@ def _add(to: Partials, by: Partials, factor: Array) -> None:
         to[name] = to.get(name, np.zeros(())) + factor * value
 
 
-def _summed(carried: Sequence[Carried], states: Evaluated, exponent: float) -> Evaluated:
-    """Return σ, β and γ of carriers beside each other, (3, ...)."""
+def _summed(beside: Iterable[tuple[Evaluated, Evaluated]]) -> Evaluated:
+    """Return σ, β and γ, (3, ...), by σ (S cm⁻¹) and S (V/K) of carriers beside each other."""
     total, total_by = [np.zeros(()) for _ in range(3)], [Partials() for _ in range(3)]
-    for carriers, mobility, carrier in carried:
-        sigma, d_sigma = conducted([(carriers, mobility, carrier)])
-        S, d_S = seebeck_of_band(carriers, states, exponent, carrier)
+    for (sigma, d_sigma), (S, d_S) in beside:
         for power in range(3):
             total[power] = total[power] + sigma * S**power
             _add(total_by[power], d_sigma, S**power)
@@ -206,7 +204,10 @@ def _less_pure(carried: Sequence[Carried], T: Array, exponent: float) -> Evaluat
 
     See `_beside_pure`.
     """
-    summed, by = _summed(carried, density_of_states.formula(T), exponent)
+    states = density_of_states.formula(T)
+    summed, by = _summed(
+        (conducted([each]), seebeck_of_band(each[0], states, exponent, each[2])) for each in carried
+    )
     pure, pure_by = _bipolar((summed[:, 1], {name: d[:, 1] for name, d in by.items()}))
     pure_by.pop("n")
     values, by = summed[1:, 0], {name: d[1:, 0] for name, d in by.items()}
@@ -273,16 +274,12 @@ def thermoelectric_high_doped(
 ) -> Evaluated:
     """Thermoelectricity of high-doped silicon, whose carriers are those of its dopant alone."""
     T = np.asarray(T, dtype=float)
-    sigma, d_sigma = conductivity_high_doped.formula(T, a0, a1)
     carriers = np.full_like(T, n_hd), {"n_hd": np.ones_like(T)}
-    S, d_S = seebeck_of_band(carriers, density_of_states.formula(T), scattering_exponent, carrier)
-    return of_one_carrier((sigma, d_sigma), (S, d_S))
+    seebeck = seebeck_of_band(carriers, density_of_states.formula(T), scattering_exponent, carrier)
+    return of_one_carrier(conductivity_high_doped.formula(T, a0, a1), seebeck)
 
 
 def of_one_carrier(conductivity: Evaluated, seebeck: Evaluated) -> Evaluated:
     """Return β and γ by σ (S cm⁻¹) and S (V/K) of one kind of carrier, and their derivatives."""
-    (sigma, d_sigma), (S, d_S) = conductivity, seebeck
-    by: Partials = {}
-    _add(by, d_sigma, np.stack([S, S**2]))
-    _add(by, d_S, np.stack([sigma, 2.0 * sigma * S]))
-    return np.stack([sigma * S, sigma * S**2]), by
+    (_, *values), by = _summed([(conductivity, seebeck)])
+    return np.stack(values), {name: d[1:] for name, d in by.items()}
