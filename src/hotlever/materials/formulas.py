@@ -45,7 +45,15 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[[Any, Any], Any]]] = {
 CONSTANTS = {"pi": np.pi}
 #: What no parameter can be called.
 TAKEN = {TEMPERATURE, *FUNCTIONS, *CONSTANTS}
-_OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+#: Operators, and their derivatives by what stands before and behind them.
+_OPERATORS: dict[type[ast.operator], Callable[[Any, Any], tuple[Any, Any, Any]]] = {
+    ast.Add: lambda x, y: (x + y, 1.0, 1.0),
+    ast.Sub: lambda x, y: (x - y, 1.0, -1.0),
+    ast.Mult: lambda x, y: (x * y, y, x),
+    ast.Div: lambda x, y: (x / y, 1.0 / y, -x / (y * y)),
+    # 0**y is flat by y
+    ast.Pow: lambda x, y: (x**y, y * x ** (y - 1.0), x**y * np.log(np.where(x == 0, 1.0, x))),
+}
 
 
 class Expression(NamedTuple):
@@ -177,32 +185,17 @@ def _value(node: ast.AST, values: Mapping[str, Dual]) -> Dual:
             x, dx = _value(operand, values)
             return (x, dx) if isinstance(op, ast.UAdd) else (-x, _chain((-1.0, dx)))
         case ast.BinOp(op=op, left=left, right=right):
-            return _binary(type(op), _value(left, values), _value(right, values))
+            (x, dx), (y, dy) = _value(left, values), _value(right, values)
+            if isinstance(op, ast.Pow) and not dy:
+                return _power(x, dx, y)
+            z, by_x, by_y = _OPERATORS[type(op)](x, y)
+            return z, _chain((by_x, dx), (by_y, dy))
         case ast.Call(func=ast.Name(id=name), args=[argument]):
             function, derivative = FUNCTIONS[name]
             x, dx = _value(argument, values)
             y = function(x)
             return y, _chain((derivative(x, y), dx)) if dx else {}
     raise AssertionError(f"{node} was not checked")
-
-
-def _binary(operator: type, first: Dual, second: Dual) -> Dual:
-    """Return the sum, difference, product, quotient or power of two steps."""
-    (x, dx), (y, dy) = first, second
-    if operator is ast.Add:
-        return x + y, _chain((1.0, dx), (1.0, dy))
-    if operator is ast.Sub:
-        return x - y, _chain((1.0, dx), (-1.0, dy))
-    if operator is ast.Mult:
-        return x * y, _chain((y, dx), (x, dy))
-    if operator is ast.Div:
-        return x / y, _chain((1.0 / y, dx), (-x / (y * y), dy))
-    if not dy:
-        return _power(x, dx, y)
-    z = x**y
-    # 0**y is flat by y
-    logarithm = np.log(np.where(x == 0, 1.0, x))
-    return z, _chain((y * x ** (y - 1.0), dx), (z * logarithm, dy))
 
 
 def _power(x: Any, dx: dict[str, Any], y: Any) -> Dual:
