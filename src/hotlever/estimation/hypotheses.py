@@ -69,13 +69,15 @@ class Hypothesis:
 
 def hypotheses_of(rows: MeasuredRows, probe: Probe, names: Sequence[str]) -> list[Hypothesis]:
     """Return all that may be wrong; names are those of the parameters that have priors."""
+    dimensions = probe.shape.dimensions()
     return [
         *_of_units(),
         *_of_the_meter(rows),
         _of_the_resistor(rows),
         *_of_the_rows(rows),
         *_of_the_lever(probe),
-        *(_of_a_parameter(probe, name) for name in names if _stated(probe, name)),
+        # of those that a user states of a lever
+        *(_of_a_parameter(probe, name) for name in names if name in ("n_d", *dimensions)),
     ]
 
 
@@ -207,8 +209,3 @@ def _of_a_parameter(probe: Probe, name: str) -> Hypothesis:
         ),
         parameter=name,
     )
-
-
-def _stated(probe: Probe, name: str) -> bool:
-    """Whether a parameter is one that a user states of a lever."""
-    return name == "n_d" or name in probe.shape.dimensions()

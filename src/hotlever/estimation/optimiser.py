@@ -236,6 +236,9 @@ class Optimiser:
         # without priors a robust search begins anew with each choice of weights
         in_all = _MOST_IN_ALL * (1 if objective.informed else _GENTLE_ROUNDS)
         most = min(self.predictor.evaluations + options.most_branches, in_all)
+        # the noise of some observables may be found with the optimum
+        unknown = bool(self.residuals.errors.without.any())
+        takes_scatter = unknown and objective.informed and options.scatter_rounds > 0
         at, region = self.predictor.predict(start), options.first_region
         while True:
             # without priors residuals have no size that says what is near
@@ -243,7 +246,7 @@ class Optimiser:
             near = Subproblem(objective, at, others)
             room = objective.coordinates.room(near.origin)
             target, least = near.minimum(region=region * room)
-            if self._takes_scatter:
+            if takes_scatter:
                 target, least = self._with_scatter(target, region * room, near)
             squares, step = objective.squares(at), target - near.origin
             inner = bool(np.all(np.abs(step) < 0.99 * region * room))
@@ -269,12 +272,6 @@ class Optimiser:
             if trial is not None and better < squares:
                 self.steps += 1
                 at = trial
-
-    @property
-    def _takes_scatter(self) -> bool:
-        """Whether the noise of some observables is found with the optimum."""
-        unknown = bool(self.residuals.errors.without.any())
-        return unknown and self.objective.informed and self._options.scatter_rounds > 0
 
     def _check_start(self, start: Probe) -> None:
         values = start.values(self.objective.varied).tolist()

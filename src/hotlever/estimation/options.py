@@ -10,12 +10,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
 from hotlever.measurands import FITTED
 from hotlever.probe import Probe
-from hotlever.probe.parameters import (
-    heat_capacities,
-    of_materials,
-    parameter_of,
-    usual_parameters,
-)
+from hotlever.probe.parameters import heat_capacities, of_materials, parameter_of, usual_parameters
 from hotlever.probe.priors import SCALES, Prior
 from hotlever.probe.surroundings import Medium
 

@@ -167,11 +167,9 @@ class Residuals:
     def difference(self, values: Array) -> Array:
         """Return data minus prediction minus drifting zeros, NaN where nothing was measured."""
         difference: Array = self.data - values[self.rows]
-        return (
-            difference - self._lines.line(difference, self.errors.weights)
-            if self._drift
-            else difference
-        )
+        if self._drift:
+            difference = difference - self._lines.line(difference, self.errors.weights)
+        return difference
 
     def weighted(self, values: Array) -> Array:
         """Return the weighted differences, prediction minus data, shape (N,)."""
@@ -202,11 +200,9 @@ class Residuals:
     def _each_by(self, slopes: Array) -> Array:
         """Return the derivatives of `_each`, (N, p)."""
         jacobian = (self.errors.weights[:, :, None] * slopes[self.rows])[self.present]
-        return (
-            self._lines.removed(jacobian, self.errors.weights)
-            if self._drift
-            else np.asarray(jacobian)
-        )
+        if self._drift:
+            jacobian = self._lines.removed(jacobian, self.errors.weights)
+        return np.asarray(jacobian)
 
     @property
     def _common_covariance(self) -> CommonCovariance:
@@ -256,9 +252,8 @@ class Residuals:
     def drifting_zeros(self, values: Array, slopes: Array) -> list[str]:
         """Say how the zeros drift, or that they seem to."""
         if self._drift:
-            return self._lines.in_words(
-                self._lines.line(self.data - values[self.rows], self.errors.weights)
-            )
+            line = self._lines.line(self.data - values[self.rows], self.errors.weights)
+            return self._lines.in_words(line)
         if self.size <= slopes.shape[2] + 2 * len(self.rows):
             return []
         noticed = self._lines.noticed(

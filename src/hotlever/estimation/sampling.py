@@ -26,13 +26,7 @@ from hotlever.estimation.chains import (
     sample,
     worth,
 )
-from hotlever.estimation.experiment import (
-    TIP,
-    ExperimentAtRest,
-    Predictor,
-    experiment_of,
-    named,
-)
+from hotlever.estimation.experiment import TIP, ExperimentAtRest, Predictor, experiment_of, named
 from hotlever.estimation.objective import Quantity, Subproblem
 from hotlever.estimation.over_a_sample import with_distances
 from hotlever.estimation.posterior import Posterior
