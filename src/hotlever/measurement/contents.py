@@ -1,7 +1,4 @@
-"""A measurement file while it is read: its settings, its rows, and what no lever can show.
-
-Settings are circuit and surroundings, as comments of the file give them.
-"""
+"""A measurement file while it is read: settings in its comments, rows, what no lever can show."""
 
 from __future__ import annotations
 

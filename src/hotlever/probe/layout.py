@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hotlever.errors import InputError
 from hotlever.materials import HIGH_DOPED
-from hotlever.probe.circuit import Circuit, Wiring
+from hotlever.probe.circuit import Wiring
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
 
@@ -293,14 +293,12 @@ class Layout:
         """The names of the terminals, each once."""
         return tuple(dict.fromkeys(terminal.name for terminal in self.terminals))
 
-    @property
-    def usual_wiring(self) -> Wiring:
-        """Which terminals are what unless a circuit says something else."""
-        return Circuit().wiring(self.terminal_names)
+    def heaters(self, wiring: Wiring | None = None) -> tuple[Region, ...]:
+        """Return the regions that a current heats much: with other circuits not the heater only.
 
-    def heaters(self, wiring: Wiring) -> tuple[Region, ...]:
-        """Return the regions that a current heats much: with other circuits not the heater only."""
-        beside = wiring.held or len(wiring.grounds) > 1
+        The wiring is as in the paper unless it is given.
+        """
+        beside = wiring is not None and (wiring.held or len(wiring.grounds) > 1)
         return tuple(
             region
             for region in self.regions

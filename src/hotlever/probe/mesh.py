@@ -118,7 +118,7 @@ def mesh_layout(
         If Netgen cannot mesh it, or a terminal has no edge on the outline.
     """
     try:
-        heaters = layout.heaters(wiring or layout.usual_wiring)
+        heaters = layout.heaters(wiring)
         mesh, region = _netgen(layout, heaters, options or MeshOptions())
     except RuntimeError as error:
         raise ComputationError(f"{_NOT_MESHED} ({error})") from error

@@ -105,7 +105,7 @@ def mesh_solid(
     options = options or SolidMeshOptions()
     middle, reach = middle_and_reach(layout)
     centre = (float(middle[0]), float(middle[1]), 0.0)
-    shape = _silicon(layout, layout.heaters(wiring or layout.usual_wiring), options)
+    shape = _silicon(layout, layout.heaters(wiring), options)
     largest = options.lever * np.ptp(layout.box, axis=0).max() / options.refinement
     if sphere_radius_um is not None:
         if not sphere_radius_um > 1.1 * reach:

@@ -252,18 +252,17 @@ def below_a_header(lines: list[Line]) -> list[Line]:
     becomes comments above them. Other lines stay as they are. Each keeps the number of a line of
     the file.
     """
-    cells = next((dialect.cells(lines[0][1]) for dialect in _separated(lines[0][1])), None) or []
-    first = [cell.strip().lower() for cell in cells]
-    separator = next((dialect.separator for dialect in _separated(lines[0][1])), None)
-    if len(first) > 3 and (first[0], first[3]) == _FIELDS and separator is not None:
-        return _columns_of_fields(lines, separator)
-    if len(first) > _IN_FRONT + 1 and first[0] == _BESIDE and separator is not None:
-        return _rows_beside_settings(lines, separator)
+    first_line = lines[0][1]
+    dialects = (each for each in DIALECTS if each.separator and each.separator in first_line)
+    dialect = next(dialects, None)
+    if dialect is None or dialect.separator is None:
+        return lines
+    first = [cell.strip().lower() for cell in dialect.cells(first_line) or []]
+    if len(first) > 3 and (first[0], first[3]) == _FIELDS:
+        return _columns_of_fields(lines, dialect.separator)
+    if len(first) > _IN_FRONT + 1 and first[0] == _BESIDE:
+        return _rows_beside_settings(lines, dialect.separator)
     return lines
-
-
-def _separated(line: str) -> list[Dialect]:
-    return [each for each in DIALECTS if each.separator is not None and each.separator in line]
 
 
 def _columns_of_fields(lines: list[Line], separator: str) -> list[Line]:

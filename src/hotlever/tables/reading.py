@@ -174,7 +174,11 @@ class _Reader:
             cells += [""] * (width - len(cells))
         has_number = self._words or any(map(begins_number, cells))
         if not (self.rows or has_number) and len(cells) <= width:
-            self._remark(number, line, cells)
+            units = [cell.strip("()[]{}<> ") for cell in cells]
+            if not self._units and any(map(is_unit, units)):
+                self._units = units
+            else:
+                self.remarks.append((number, line))
             return True
         if len(cells) != width:
             halves = self._separator == "," and len(cells) == 2 * width
@@ -185,13 +189,6 @@ class _Reader:
             )
         self.rows.append((number, line))
         return True
-
-    def _remark(self, number: int, line: str, cells: list[str]) -> None:
-        units = [cell.strip("()[]{}<> ") for cell in cells]
-        if not self._units and any(map(is_unit, units)):
-            self._units = units
-        else:
-            self.remarks.append((number, line))
 
     def with_units(self, comments: list[Line]) -> list[str]:
         """Return the headings with the units that stand in a row of their own."""

@@ -11,6 +11,7 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from hotlever.errors import counted
 from hotlever.probe.drawing.edges import outline_edges, terminal_edges
 from hotlever.probe.drawing.layers import BODY, HEATER, SILICON, terminal_part
 from hotlever.probe.drawing.outlines import DrawingError, Ring, healed, parts_of, polygons, snapped
@@ -64,9 +65,10 @@ def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
     body = SILICON if film is None else BODY
     inferred.layers[body] = best.name
     touched = len(best.cutters) + len(best.touching)
+    verbs = ("lies", "touches") if touched == 1 else ("lie", "touch")
     inferred.reasons[body] = (
-        f"{best.shape.area:.4g} µm²; {touched} other layer{'s' * (touched != 1)} lie"
-        f"{'s' * (touched == 1)} across it or touch{'es' * (touched == 1)} its outline"
+        f"{best.shape.area:.4g} µm²; {counted(touched, 'other layer')} {verbs[0]} across it or "
+        f"{verbs[1]} its outline"
     )
     if len(best.pieces) > 1:
         inferred.doubts.append(
@@ -258,12 +260,12 @@ def _named(
     best: _Silicon, inferred: LayerInference, rings: dict[str, tuple[Ring, ...]]
 ) -> dict[str, tuple[str, str]]:
     """Return the terminal for each role, and why."""
-    low = {
+    parts = {
         part: snapped(best.areas[name], best.shape, 1.5 * best.tolerance)
         for part, name in inferred.layers.items()
         if part not in (SILICON, BODY, FILM) and isinstance(name, str)
     }
-    partition = partitioned((SILICON, best.shape), low)
+    partition = partitioned((SILICON, best.shape), parts)
     ends = terminal_edges(best.shape, rings, best.tolerance)
     at = partition.touched_by(ends, best.tolerance)
     heaters = {number for number, piece in enumerate(partition.pieces) if HEATER in piece.layers}
@@ -275,7 +277,14 @@ def _named(
     named = {SUPPLY: (supply, "alone on its side of the heater" if len(at) > 2 else "")}
     if not rest:
         return named
-    behind = [name for name in rest if _behind_low_doped(partition, at[name], heaters)]
+    # terminals that reach the heater through another low-doped part only
+    low = {number for number, piece in enumerate(partition.pieces) if SILICON not in piece.layers}
+    around = {name: partition.reached(at[name], low) for name in rest}
+    behind = [
+        name
+        for name, numbers in around.items()
+        if not any(partition.neighbours(number) & heaters for number in numbers)
+    ]
     ground = _hinted(rest, ("ground", "gnd")) or next(
         (name for name in rest if name not in behind), rest[0]
     )
@@ -302,13 +311,6 @@ def _grouped(partition: Partition, at: dict[str, set[int]], heaters: set[int]) -
         else:
             group.append(name)
     return groups
-
-
-def _behind_low_doped(partition: Partition, numbers: set[int], heaters: set[int]) -> bool:
-    """Whether a terminal reaches the heater through another low-doped part only."""
-    low = {number for number, piece in enumerate(partition.pieces) if SILICON not in piece.layers}
-    reached = partition.reached(numbers, low)
-    return not any(partition.neighbours(number) & heaters for number in reached)
 
 
 def _base(silicon: Polygon, heater: BaseGeometry) -> list[tuple[Point, Point]]:
