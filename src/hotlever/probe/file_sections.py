@@ -10,7 +10,7 @@ from typing import Any
 
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text
-from hotlever.materials import REFERENCE, Kind
+from hotlever.materials import REFERENCE
 from hotlever.materials.sections import LAWS, classes_at_hand, materials_of
 from hotlever.materials.stated import names_stated
 from hotlever.probe.circuit import Contact
@@ -81,57 +81,6 @@ def sections_of(text: str, path: str) -> dict[str, Any]:
     return values
 
 
-def shape_of(
-    sections: Mapping[str, Any],
-    where: str,
-    folder: Path | None = None,
-    materials: Mapping[str, Kind] | None = None,
-    like: Shape | None = None,
-) -> Shape:
-    """Make the shape that some sections of a probe file describe.
-
-    Parameters
-    ----------
-    sections : mapping
-        ``[probe]``, and ``[layers]`` and ``[terminals]`` of a drawing.
-    where : str
-        Names the file in an error.
-    folder : path, optional
-        What the name of a drawing's file is relative to.
-    materials : mapping of str to Kind, optional
-        Those that the layers of a drawing may be made of.
-    like : Shape, optional
-        One whose class it is to have, if both are drawn by one function.
-
-    Raises
-    ------
-    InputError
-        If the shape is unknown, a dimension is missing, misspelt or impossible, or a drawing is
-        at fault.
-    """
-    values, here = sections["probe"], f"{where}: [probe]"
-    name = values.get("shape")
-    if name is None:
-        raise InputError(f"{here}: shape is missing (one of: {', '.join(SHAPES)})")
-    if not isinstance(name, str) or name not in (*SHAPES, PARAMETRIC_DRAWING):
-        raise unknown_name("shape", str(name), SHAPES, here)
-    kinds = {of: kind.kind for of, kind in (materials or {}).items()}
-    if name == DRAWING:
-        # imported here: most probes are drawn by their dimensions
-        from hotlever.probe.drawing.shape import DrawnShape
-
-        return DrawnShape.read(sections, where, folder, kinds)
-    for section in SHAPE_SECTIONS[1:]:
-        if section in sections:
-            raise InputError(f'{where}: section [{section}] means nothing with shape = "{name}"')
-    if name == PARAMETRIC_DRAWING:
-        from hotlever.probe.drawing.parametric import ParametricDrawing
-
-        own = type(like) if isinstance(like, ParametricDrawing) else ParametricDrawing
-        return own.read(values, where, kinds)
-    return PARAMETRIC[name].from_values(values, here)
-
-
 def parts_of(
     values: Mapping[str, Any], where: str, folder: Path | None, like: ProbeParts | None
 ) -> dict[str, Any]:
@@ -159,8 +108,8 @@ def parts_of(
     if "probe" not in values:
         raise InputError(f"{where}: section [probe] is missing")
     materials = materials_of(values.get(MATERIALS, {}), where, SECTIONS, folder, classes)
-    drawn = {name: values[name] for name in SHAPE_SECTIONS if name in values}
-    shape = shape_of(drawn, where, folder, materials, None if like is None else like.shape)
+    kinds = {name: kind.kind for name, kind in materials.items()}
+    shape = _shape_of(values, where, folder, kinds, like)
     for name in materials:
         if name not in shape.materials:
             raise InputError(
@@ -173,6 +122,37 @@ def parts_of(
         made = classes.get(name, PARTS[name])
         parts[name] = made.from_values({**usual, **values[name]}, f"{where}: [{name}]")
     return parts
+
+
+def _shape_of(
+    sections: Mapping[str, Any],
+    where: str,
+    folder: Path | None,
+    kinds: Mapping[str, str],
+    like: ProbeParts | None,
+) -> Shape:
+    """Make the shape that some sections of a probe file describe; `kinds` are of its materials."""
+    values, here = sections["probe"], f"{where}: [probe]"
+    name = values.get("shape")
+    if name is None:
+        raise InputError(f"{here}: shape is missing (one of: {', '.join(SHAPES)})")
+    if not isinstance(name, str) or name not in (*SHAPES, PARAMETRIC_DRAWING):
+        raise unknown_name("shape", str(name), SHAPES, here)
+    if name == DRAWING:
+        # imported here: most probes are drawn by their dimensions
+        from hotlever.probe.drawing.shape import DrawnShape
+
+        return DrawnShape.read(sections, where, folder, kinds)
+    for section in SHAPE_SECTIONS[1:]:
+        if section in sections:
+            raise InputError(f'{where}: section [{section}] means nothing with shape = "{name}"')
+    if name == PARAMETRIC_DRAWING:
+        from hotlever.probe.drawing.parametric import ParametricDrawing
+
+        drawn = None if like is None else like.shape
+        own = type(drawn) if isinstance(drawn, ParametricDrawing) else ParametricDrawing
+        return own.read(values, where, kinds)
+    return PARAMETRIC[name].from_values(values, here)
 
 
 def check_together(probe: ProbeParts, stated: Mapping[str, Any], where: str) -> None:
