@@ -293,10 +293,10 @@ class Layout:
         """The names of the terminals, each once."""
         return tuple(dict.fromkeys(terminal.name for terminal in self.terminals))
 
-    def heaters(self, wiring: Wiring | None = None) -> tuple[Region, ...]:
+    def heaters(self, wiring: Wiring | None) -> tuple[Region, ...]:
         """Return the regions that a current heats much: with other circuits not the heater only.
 
-        The wiring is as in the paper unless it is given.
+        Without a wiring that is as in the paper.
         """
         beside = wiring is not None and (wiring.held or len(wiring.grounds) > 1)
         return tuple(

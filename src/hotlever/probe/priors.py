@@ -46,8 +46,7 @@ _LEAST, _MOST, _LARGEST_SHARE = 1e-6, 10.0, 0.5
 _AS_A_FACTOR = 0.4
 #: How a spread is written: in the parameter's unit, as a share of its value, or as a factor.
 Written = Literal["unit", "share", "factor"]
-_SPREAD = re.compile(r"([^±]{0,40})±([^±]{1,40})")
-_FACTOR = re.compile(r"([^/]{0,40})[×xX*] ?/([^/]{1,40})")
+_PRIOR = re.compile(r"([^±/]{0,40}?)(±|[×xX*] ?/)([^±/]{1,40})")
 _LARGEST_FACTOR = 1000.0
 
 
@@ -317,18 +316,14 @@ def parsed(text: str, where: str) -> tuple[float | None, float, Written]:
         f"{where} = '{text[:60]}', expected a value and its spread such as '3.3e17 ± 15%', "
         "'0.40 ± 0.02', '± 5%' or '1e17 ×/ 3'"
     )
-    plain = text.replace("+-", "±").replace("+/-", "±")
-    written: Written = "unit"
-    if (match := _FACTOR.fullmatch(plain)) is not None:
-        written = "factor"
-    elif (match := _SPREAD.fullmatch(plain)) is None:
+    match = _PRIOR.fullmatch(text.replace("+-", "±").replace("+/-", "±"))
+    if match is None:
         raise wrong
-    first, second = (part.strip() for part in match.groups())
-    if written == "unit" and second.endswith("%"):
-        written, second = "share", second.removesuffix("%")
+    first, sign, second = (part.strip() for part in match.groups())
+    written: Written = "factor" if "/" in sign else "share" if second.endswith("%") else "unit"
     try:
         value = float(first) if first else None
-        spread = float(second)
+        spread = float(second.removesuffix("%") if written == "share" else second)
     except ValueError:
         raise wrong from None
     if value is not None and not math.isfinite(value):

@@ -55,11 +55,9 @@ def read_stream(path: str, kind: str, cell: str | None, unit_um: float | None) -
     counts: dict[str, int] = {}
     for each in library.cells:
         _count(each, counts, ())
-    if cell is None:
-        if len(top) != 1:
-            return sheet | {"cell": None, "layers": {}, "labels": []}
+    if cell is None and len(top) == 1:
         cell = top[0]
-    if cell not in cells:
+    if cell is None or cell not in cells:
         return sheet | {"cell": cell, "layers": {}, "labels": []}
     if counts[cell] > MOST_POLYGONS:
         raise Refusal(
