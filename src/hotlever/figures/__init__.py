@@ -1,25 +1,40 @@
 """All of hotlever's figures on one shelf, each drawn from what the package returns.
 
 Nothing is solved here: datasets and results go in, a matplotlib figure comes out. `save_figure`
-writes one as PNG, SVG or PDF.
+writes one as PNG, SVG or PDF. What a dataset shows follows from what it holds, since each quantity
+has one name everywhere.
 """
 # ruff: noqa: F401 (what is imported here is what the shelf offers)
 
-from hotlever.figures.air import air_loss, disc_between_planes, scale_factor, temperature_slices
+from __future__ import annotations
+
+from collections.abc import Callable
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hotlever.errors import InputError
 from hotlever.figures.calibration import (
     calibrated_levers,
     calibration_curves,
     judged_calibrations,
+    planned_measurements,
 )
 from hotlever.figures.claims import (
+    disc_between_planes,
     knee_discrepancy,
     linear_branches,
     parameter_deviations,
+    predicted_and_published,
     radiated_shares,
+    residuals_of_current,
+    scale_factor,
     thermoelectric_shift,
 )
-from hotlever.figures.contact import contact_overview
-from hotlever.figures.datasets import figure_of
+from hotlever.figures.contact import contact_overview, reader_overview
 from hotlever.figures.design import design_optimum, design_study
 from hotlever.figures.drawing import outlines_drawing, probe_drawing
 from hotlever.figures.fit import (
@@ -30,20 +45,114 @@ from hotlever.figures.fit import (
     profile_curves,
     tip_band,
 )
-from hotlever.figures.holding import gain_map, held_states
 from hotlever.figures.lever import (
     doping_profile,
     heater_profiles,
+    held_states,
     iv_curves,
     material_curves,
     resistances,
     sweep_overview,
     temperature_power,
 )
-from hotlever.figures.maps import field_maps, pulse_film, save_film, temperature_map
-from hotlever.figures.planning import planned_measurements
+from hotlever.figures.maps import (
+    air_loss,
+    field_maps,
+    pulse_film,
+    save_film,
+    temperature_map,
+    temperature_slices,
+)
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
-from hotlever.figures.reader import reader_overview
-from hotlever.figures.style import save_figure
-from hotlever.figures.transient import harmonics, history_overview, small_signals
-from hotlever.figures.validation import predicted_and_published, residuals_of_current
+from hotlever.figures.style import COLOURS, entitle, figure, save_figure
+from hotlever.figures.transient import gain_map, harmonics, history_overview, small_signals
+from hotlever.lever import probe_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: The first figure counts for which a dataset holds all that is named.
+_FIGURES: dict[str, Callable[[Any], Figure]] = {
+    "apex_K current_change_mA": lambda data: contact_overview(data, probe_of(data)),
+    "state set_ohm tip_K": held_states,
+    "state set_mW tip_K": held_states,
+    "growth_per_us settling_us overshoot": gain_map,
+    "supplied_nJ air_stored_nJ bias_V lever_V reader_V tip_K": history_overview,
+    "bias_V current_mA lever_V reader_V tip_K heater_ohm": sweep_overview,
+    "dlnR_dz_per_um source_V_per_rtHz": reader_overview,
+    "impedance_real_ohm tip_per_bias_deg": small_signals,
+    "first_harmonic_V third_harmonic_V": harmonics,
+    "doping inversion_temperature": doping_profile,
+    "knee_K knee_mW knee_bias_V inversion_K": design_study,
+    "temperature along_um z_um": temperature_slices,
+    "paper_error reads_at_hottest": raman_check,
+    "loss near far": disc_between_planes,
+    "moved_nm share_nm": thermoelectric_shift,
+    "log_probability rhat": posterior_corner,
+    "delta_chi_square parabola": lambda profile: profile_curves([profile]),
+    "described birge_ratio": lever_parameters,
+    "coverage largest_K": judged_calibrations,
+    "current_mA tip_K tip_stderr_K lever_V": tip_band,
+}
+#: Panels that a figure of any dataset has, curves of one of them, and characters of a label.
+_PANELS, _CURVES, _WIDE = 12, 8, 30
+
+
+def figure_of(data: xr.Dataset) -> Figure:
+    """Draw a dataset that the package has made; ``data.hotlever.plot()`` does the same.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        A sweep, a history, a spectrum, a study, … has the figure that the command line draws. Of
+        any other each quantity is drawn along its dimension.
+
+    Raises
+    ------
+    InputError
+        If it holds no curve.
+    """
+    for names, draw in _FIGURES.items():
+        if all(name in data.variables for name in names.split()):
+            return draw(data)
+    return _every_quantity(data)
+
+
+def _every_quantity(data: xr.Dataset) -> Figure:
+    """Draw each quantity along its dimension, with a curve for each value of another one."""
+    drawn = {
+        str(name): values
+        for name, values in data.data_vars.items()
+        if values.dtype.kind in "fi" and 1 <= values.ndim <= 2 and values.notnull().any()
+    }
+    drawn = dict(list(drawn.items())[:_PANELS])
+    if not drawn:
+        raise InputError("found a dataset without curves, expected one of the package")
+    columns = min(len(drawn), 3)
+    rows = -(-len(drawn) // columns)
+    size = 3.2 * columns, 2.4 * rows
+    with figure(*size, rows, columns, squeeze=False, letters=True) as (made, grid):
+        for axes, (name, values) in zip(grid.ravel(), drawn.items(), strict=False):
+            _panel(axes, name, values)
+        for axes in grid.ravel()[len(drawn) :]:
+            axes.remove()
+        entitle(made, data)
+    return made
+
+
+def _panel(axes: Axes, name: str, values: xr.DataArray) -> None:
+    # the longest dimension is that of the curve
+    along, *others = sorted(map(str, values.dims), key=lambda dim: -values.sizes[dim])
+    curves = values.transpose(*others, along).values.reshape(-1, values.sizes[along])
+    x = values[along] if values[along].dtype.kind in "fi" else np.arange(values.sizes[along])
+    for number, curve in enumerate(curves[:_CURVES]):
+        label = f"{others[0]} {values[others[0]].values[number]}" if others else None
+        axes.plot(x, curve, ".-", label=label, color=COLOURS[number % len(COLOURS)])
+    axes.set(xlabel=_label(along, values[along]), ylabel=_label(name, values))
+    if others:
+        axes.legend()
+
+
+def _label(name: str, values: xr.DataArray) -> str:
+    meaning, unit = values.attrs.get("long_name", name), values.attrs.get("units", "1")
+    return fill(meaning if unit == "1" else f"{meaning} ({unit})", _WIDE)

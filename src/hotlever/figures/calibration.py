@@ -1,7 +1,8 @@
-"""Figures of calibrations: of one with its error budget, of many levers, and judged ones."""
+"""Figures of calibrations: of one, of many levers, of judged ones, and of what to measure next."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
@@ -12,15 +13,16 @@ from matplotlib.figure import Figure
 
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.levers import tips_along
+from hotlever.calibration.next_measurement import SURE, Plan
 from hotlever.calibration.pulses import PulseCalibration
-from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION
+from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.estimation.diagnosis import USUAL_SCATTER
 from hotlever.figures.style import (
     LINES,
     MEASURED,
-    NOT_DESCRIBED,
     axis_label,
     curve,
+    entitle,
     figure,
     from_zero,
     values_by_lever,
@@ -37,6 +39,13 @@ _COMPARED = ("tip_K", "knee_lever_V", "knee_current_mA", "knee_power_mW")
 _OF_THE_CONTACT = {"apex_K": ("apex", GREEN), "surface_K": ("the sample under it", VERMILION)}
 #: Colour of each way of calibrating.
 _BY_WAY = (BLUE, GREEN, ORANGE, VERMILION)
+#: How each kind of measurement is marked, and colours of errors, now and after more of them.
+_MARKS: dict[str, Any] = {
+    "bias": {"marker": "o", "color": BLUE},
+    "reader": {"marker": "s", "color": GREEN},
+    "spectra": {"marker": "^", "color": PURPLE},
+}
+_BY_ADDED = (BLACK, ORANGE, GREEN, BLUE, SKY)
 
 
 def calibration_curves(calibration: Calibration) -> Figure:
@@ -51,9 +60,7 @@ def calibration_curves(calibration: Calibration) -> Figure:
     measured = calibration.measurement.dataset(calibration.probe.circuit)
     with figure(8.0, 6.0, 2, 2, letters=True) as (made, grid):
         by_power, by_bias, iv, budget = grid.ravel()
-        title = [calibration.probe.title, *([] if described else [NOT_DESCRIBED])]
-        colour = BLACK if described else VERMILION
-        made.suptitle("; ".join(title), x=0.01, ha="left", color=colour)
+        entitle(made, more=calibration.probe.title, is_described=bool(described))
         name = "calibration and 95 % band" if described else "the nearest lever"
         if described and "apex_K" in table:
             name = "tip and 95 % band"
@@ -121,12 +128,11 @@ def calibrated_levers(calibrations: Mapping[str, Calibration], levers: xr.Datase
         band: Any = {"color": "0.88", "lw": 0, "label": "95 % of a lever"}
         differences.fill_between(tips[along], -half, half, **band)
         differences.legend(loc="upper left")
-        for axes, label in (
-            (curves, axis_label("tip_K")),
-            (differences, "difference from the mean (K)"),
-        ):
+        curves.set(ylabel=axis_label("tip_K"))
+        differences.set(ylabel="difference from the mean (K)")
+        for axes in (curves, differences):
             axes.axvline(levers[along].values[0], color="0.6", lw=0.8, ls=":")
-            axes.set(xlabel=axis_label(along), ylabel=label)
+            axes.set(xlabel=axis_label(along))
         if not many:
             made.legend(*curves.get_legend_handles_labels(), loc="outside lower center", ncols=6)
         for name, axes in zip(_COMPARED, by_lever, strict=True):
@@ -218,3 +224,47 @@ def _difference(axes: Axes, calibration: Calibration, measured: xr.Dataset) -> N
     axes.plot(data.bias_V[off], share[off], "o", color=VERMILION, ms=5.0, label="off")
     axes.set(xlabel=axis_label("bias_V"), ylabel="I$_h$: data − lever (% of the largest)")
     axes.legend(loc="best")
+
+
+def planned_measurements(plan: Plan) -> Figure:
+    """Draw the error by temperature now and after more measurements, and how hot the tip may get.
+
+    The proposed measurements are marked, with how often each is proposed, and the limit.
+    """
+    errors, proposals = plan.errors, plan.proposals
+    shown = np.isfinite(errors.tip_limit_K.values)
+    kinds = proposals.what.values.tolist()
+    counts = Counter(zip(kinds, proposals.bias_V.values.tolist(), strict=True))
+    with figure(8.0, 3.8, 1, 2, letters=True) as (made, (by_tip, by_bias)):
+        entitle(made, more=plan.lever)
+        for added, colour in zip(errors.added.values.tolist(), cycle(_BY_ADDED), strict=False):
+            label = f"after {added} more" if added else "now"
+            stderr = errors.tip_stderr_K.sel(added=added)
+            by_tip.plot(errors.tip_K[shown], stderr[shown], color=colour, label=label)
+        last = errors.tip_stderr_K.isel(added=-1)
+        by_tip.axvline(plan.at_K, color="0.6", lw=0.9, ls=":")
+        above: Any = {"xycoords": by_tip.get_xaxis_transform(), "color": "0.4", "fontsize": 7}
+        by_tip.annotate(f"{plan.at_K:.0f} K, where it counts", (plan.at_K, 1.0), **above)
+        by_bias.plot(errors.bias[shown], errors.tip_K[shown], color=BLACK, label="expected")
+        limit: Any = {"color": VERMILION, "label": f"no hotter, by {SURE:.0%}"}
+        by_bias.plot(errors.bias[shown], errors.tip_limit_K[shown], "--", **limit)
+        by_bias.axvspan(plan.safe_V, float(errors.bias[shown].max()), color="0.92", lw=0)
+        if plan.stay_below_K is not None:
+            by_bias.axhline(plan.stay_below_K, color=VERMILION, lw=0.9)
+            text = f" limit {plan.stay_below_K:.0f} K"
+            by_bias.annotate(text, (errors.bias.values[0], plan.stay_below_K), va="bottom")
+        for (kind, bias), times in counts.items():
+            tip = float(np.interp(bias, errors.bias, errors.tip_K))
+            stderr_K = float(np.interp(bias, errors.bias, last))
+            style = {"ls": "none", "ms": 7.0, "mec": "white", **_MARKS[kind], "zorder": 3}
+            for axes, at in ((by_bias, (bias, tip)), (by_tip, (tip, stderr_K))):
+                axes.plot(*at, **style)
+                if times > 1:
+                    axes.annotate(f" {times}×", at, fontsize=7, va="top")
+        for kind in dict.fromkeys(kinds):
+            by_bias.plot([], [], ls="none", label=f"{kind}, proposed", **_MARKS[kind])
+        by_tip.set(xlabel=axis_label("tip_K"), ylabel="standard error (K)", ylim=(0, None))
+        by_bias.set(xlabel=axis_label("bias_V"), ylabel=axis_label("tip_K"))
+        for axes in (by_tip, by_bias):
+            axes.legend(loc="upper left")
+    return made

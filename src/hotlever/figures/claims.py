@@ -1,8 +1,9 @@
-"""Figures of the paper's claims: other levers, the discrepancy at the knee, thermoelectricity."""
+"""Figures of claims: the paper's of its levers and of air, and published numbers of others."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,20 +11,64 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION
-from hotlever.figures.style import COLOURS, axis_label, beside, figure, parameter_label
+from hotlever.figures.style import COLOURS, LINES, axis_label, beside, figure, parameter_label
 from hotlever.studies.linear_branch import Regression
 from hotlever.studies.parameter_consistency import largest_deviation
+from hotlever.types import Array
 
 if TYPE_CHECKING:
     import xarray as xr
 
 #: Marker of each shape, colour of each type of the heater.
 _BY_SHAPE, _BY_DOPANT = {"three-leg": "o", "u-shape": "s"}, {"n": BLUE, "p": VERMILION}
-
 #: Of the bars of each medium.
 _BY_MEDIUM = {"vacuum": BLUE, "air": ORANGE}
-#: Slopes (K/mW) that are marked.
-_TICKS = (50, 100, 150, 200, 300, 400, 600, 800)
+#: Slopes (K/mW) that are marked, and ratios of published and predicted numbers.
+_SLOPES = (50, 100, 150, 200, 300, 400, 600, 800)
+_RATIOS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
+#: Colour of each verdict.
+_BY_VERDICT = {"inside 68 %": GREEN, "inside 95 %": ORANGE, "outside": VERMILION}
+#: Inches for each published number, and above and below them.
+_EACH, _MORE = 0.24, 0.9
+
+
+def disc_between_planes(loss: xr.Dataset) -> Figure:
+    """Draw the loss of a disc between two planes over their distance (paper's Fig. 8)."""
+    distance = loss.distance.values
+    with figure(4.4, 3.2) as (made, axes):
+        axes.plot(distance, loss.loss, color=BLUE, label="exact")
+        axes.plot(distance, loss.near, "--", color=ORANGE, label="near planes, 2π r/h")
+        axes.plot(distance, loss.far, ":", color=VERMILION, label="free space, 8")
+        axes.axhline(4.0, color="0.6", lw=0.8)
+        where: Any = {"xytext": (4, 3), "textcoords": "offset points"}
+        axes.annotate("4 (one face)", (distance[0], 4.0), color="0.4", fontsize=8, **where)
+        axes.set(xscale="log", yscale="log", ylim=(3.0, 1.2 * float(loss.loss.max())))
+        axes.set(xlabel="distance of the planes over radius, h/r", ylabel="heat loss / (κ r ΔT)")
+        axes.legend()
+    return made
+
+
+def scale_factor(curves: Mapping[str, xr.DataArray], published: float) -> Figure:
+    """Draw k over the tip temperature for some surroundings.
+
+    Parameters
+    ----------
+    curves : mapping of str to xarray.DataArray
+        k on ``tip_K``, see `hotlever.studies.air_scaling`.
+    published : float
+        The paper's single k.
+    """
+    many = len(curves) > 1
+    with figure(6.4 if many else 4.4, 3.4) as (made, axes):
+        for (name, k), (line, colour) in zip(curves.items(), cycle(LINES), strict=False):
+            axes.plot(k.tip_K, k, line, color=colour, label=name)
+        axes.axhline(published, color="0.5", ls=":", label=f"paper, {published}")
+        axes.set(xlabel=axis_label("tip_K"), ylabel="k = P$_{air}$ / P$_{vacuum}$")
+        if many:
+            beside(axes)
+        else:
+            axes.legend(loc="upper left")
+    return made
 
 
 def linear_branches(study: xr.Dataset, regression: Regression, spread_K: float) -> Figure:
@@ -56,7 +101,7 @@ def linear_branches(study: xr.Dataset, regression: Regression, spread_K: float) 
         ends = [np.nanmin(expected), np.nanmax(expected)]
         slope.plot(ends, ends, color="0.5", lw=0.8)
         slope.set(xscale="log", yscale="log")
-        ticks = [tick for tick in _TICKS if ends[0] < 1.2 * tick and tick < 1.2 * ends[1]]
+        ticks = [tick for tick in _SLOPES if ends[0] < 1.2 * tick and tick < 1.2 * ends[1]]
         for axis in (slope.xaxis, slope.yaxis):
             axis.set_ticks(ticks, [f"{tick}" for tick in ticks])
             axis.set_ticks([], minor=True)
@@ -92,8 +137,9 @@ def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: floa
     ours, theirs = 100 * largest_deviation(study), 100 * largest_deviation(published)
     symbols = [parameter_label(name)[0].partition(" (")[0] for name in study.parameter.values]
     position = np.arange(len(symbols))
-    with figure(8.4, 3.6, 1, study.sizes["doping"], letters=True, sharey=True) as (made, panels):
-        for axes, doping in zip(np.atleast_1d(panels), study.doping.values, strict=True):
+    shape: Any = {"sharey": True, "squeeze": False}
+    with figure(8.4, 3.6, 1, study.sizes["doping"], letters=True, **shape) as (made, [panels]):
+        for axes, doping in zip(panels, study.doping.values, strict=True):
             columns = [
                 (str(name), ours.sel(error=name, doping=doping)) for name in study.error.values
             ]
@@ -101,16 +147,14 @@ def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: floa
             colours = [*COLOURS[: len(columns) - 1], BLACK]
             beside_each = np.linspace(-0.3, 0.3, len(columns))
             for (name, values), colour, aside in zip(columns, colours, beside_each, strict=True):
-                style: Any = {"ls": "none", "marker": "_" if colour == BLACK else "o"}
-                axes.plot(
-                    position + aside, values.where(values > 0), color=colour, label=name, **style
-                )
+                at, shown = position + aside, values.where(values > 0)
+                axes.plot(at, shown, "_" if colour == BLACK else "o", color=colour, label=name)
             axes.axhline(100 * claimed, color=ORANGE, ls=":")
             axes.set_xticks(position, symbols)
             axes.set_title(str(doping), loc="center")
             axes.set_ylim(0.0, None)
-        np.atleast_1d(panels)[0].set(ylabel="largest distance from the mean (%)")
-        beside(np.atleast_1d(panels)[-1])
+        panels[0].set(ylabel="largest distance from the mean (%)")
+        beside(panels[-1])
     return made
 
 
@@ -149,16 +193,10 @@ def knee_discrepancy(studies: Mapping[str, xr.Dataset]) -> Figure:
     with figure(7.4, 0.42 * len(names) + 1.0) as (made, axes):
         for number, (medium, study) in enumerate(studies.items()):
             lengths = np.append(study.shift_K.values, study.left_K)
-            error = np.where(rows == rows[-1], study.total_stderr_K, 0.0)
+            error = np.where(rows == rows[-1], study.total_stderr_K, np.nan)
             offset = (number - (len(studies) - 1) / 2) * height
-            axes.barh(
-                *(rows + offset, lengths, height),
-                xerr=np.where(error > 0, error, np.nan),
-                color=_BY_MEDIUM[medium],
-                label=f"in {medium}",
-                ecolor=BLACK,
-                capsize=2,
-            )
+            style: Any = {"color": _BY_MEDIUM[medium], "ecolor": BLACK, "capsize": 2}
+            axes.barh(rows + offset, lengths, height, xerr=error, label=f"in {medium}", **style)
         axes.axvline(0.0, color=BLACK, lw=0.6)
         axes.axvline(first.discrepancy_K, color=BLACK, lw=0.8, ls=":", label="in the paper")
         axes.set_yticks(rows, names)
@@ -180,9 +218,8 @@ def thermoelectric_shift(shift: xr.Dataset, other: xr.Dataset | None = None) -> 
     """
     by_heat = shift.share_nm.sum("side").sel(polarity=1)
     with figure(7.6, 3.4, 1, 2, letters=True) as (made, (position, moved)):
-        position.plot(
-            shift.bias, shift.plain_um, ":", color=BLACK, label="without thermoelectricity"
-        )
+        without = "without thermoelectricity"
+        position.plot(shift.bias, shift.plain_um, ":", color=BLACK, label=without)
         for polarity, mark, colour in ((1, "o-", BLUE), (-1, "s-", ORANGE)):
             label = f"{'positive' if polarity > 0 else 'negative'} bias"
             at_um = shift.at_um.sel(polarity=polarity)
@@ -201,4 +238,48 @@ def thermoelectric_shift(shift: xr.Dataset, other: xr.Dataset | None = None) -> 
         moved.axhline(0.0, color=BLACK, lw=0.6)
         moved.set(xlabel="bias (V)", ylabel=axis_label("moved_nm").replace(" in the", "\nin the"))
         moved.legend()
+    return made
+
+
+def predicted_and_published(cases: xr.Dataset) -> Figure:
+    """Draw bands of predictions and published values, each over the predicted median.
+
+    Parameters
+    ----------
+    cases : xarray.Dataset
+        From `hotlever.studies.validation.prediction.comparison`.
+    """
+    cases = cases.sortby("group")
+    with figure(7.4, _EACH * cases.sizes["case"] + _MORE) as (made, axes):
+        rows = np.arange(cases.sizes["case"])[::-1]
+        low, high, middle = (
+            (cases[name] / cases.predicted).values for name in ("low_95", "high_95", "published")
+        )
+        axes.hlines(rows, low, high, color="0.75", lw=6, label="predicted, 95 %")
+        axes.plot(np.ones_like(middle), rows, "|", color=BLACK, ms=9, label="predicted median")
+        error = (cases.published_error / cases.predicted).values
+        # as a share, below and above, so that what is uncertain to all of it stays on the page
+        lower = middle - middle / (1.0 + error / middle)
+        for verdict, colour in _BY_VERDICT.items():
+            of = (cases.verdict == verdict).values
+            style: Any = {"fmt": "o", "color": colour, "lw": 1.2, "label": f"published, {verdict}"}
+            axes.errorbar(middle[of], rows[of], xerr=[lower[of], error[of]], **style)
+        axes.axvline(1.0, color="0.5", lw=0.6)
+        axes.set(xscale="log", xlabel="over the predicted median", ylim=(-0.6, len(rows) - 0.4))
+        ticks = [tick for tick in _RATIOS if low.min() < tick < high.max()]
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.set_xticks([], minor=True)
+        axes.set_yticks(rows, cases.case.values)
+        axes.grid(False, axis="y")
+        made.legend(loc="outside upper center", ncols=3)
+    return made
+
+
+def residuals_of_current(bias_V: Array, residuals_uA: Array, error_uA: float) -> Figure:
+    """Draw measured less calibrated currents (µA) and the error of reading them off."""
+    with figure(7.4, 2.4) as (made, axes):
+        axes.axhspan(-error_uA, error_uA, color="0.9")
+        axes.axhline(0.0, color="0.5", lw=0.6)
+        axes.plot(bias_V, residuals_uA, "o", color=BLACK, ms=4)
+        axes.set(xlabel="V$_b$ (V)", ylabel="residual of I$_h$ (µA)")
     return made

@@ -20,11 +20,12 @@ from hotlever.colours import BLACK, BLUE, ORANGE, SKY, VERMILION
 from hotlever.figures.style import COLOURS, figure
 from hotlever.materials import HIGH_DOPED
 from hotlever.probe import Layout, ProbeMesh, Region
-from hotlever.types import Array
 
 Ring = Sequence[tuple[float, float]]
 #: Characters of a title that have room above a drawing.
 _TITLE = 90
+#: Axes of the plane of a lever.
+_PLANE: Any = {"aspect": "equal", "xlabel": "x (µm)", "ylabel": "y (µm)"}
 #: Room around a drawing as a share of its extent, and a terminal's name over its height.
 _MARGIN, _NAME = 0.04, 0.33
 
@@ -57,7 +58,8 @@ def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = N
             axes.annotate(name, at, xytext=shift, textcoords="offset points", color=BLUE, **beside)
         handles["terminal"] = Line2D([], [], color=BLUE, lw=4, label="terminal (base temperature)")
         (handles["tip"],) = axes.plot(*layout.tip, "^", color=BLACK, label="tip")
-        _plane(axes, low - room[0], high + room[1])
+        (left, below), (right, above) = low - room[0], high + room[1]
+        axes.set(**_PLANE, xlim=(left, right), ylim=(below, above))
         if title:
             made.suptitle(fill(title, _TITLE), x=0.01, ha="left", fontsize=9, parse_math=False)
         made.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
@@ -102,15 +104,8 @@ def outlines(axes: Axes, layout: Layout) -> None:
         axes.add_patch(_patch(region, fill=False, edgecolor="0.45", lw=0.4))
     tip: Any = {"marker": "^", "mfc": "white", "mec": "black", "ms": 4, "ls": "none"}
     axes.plot(*layout.tip, label="tip", **tip)
-    _plane(axes)
+    axes.set(**_PLANE)
     axes.grid(False)
-
-
-def _plane(axes: Axes, low: Array | None = None, high: Array | None = None) -> None:
-    """Show the plane of a lever, from one corner to another if these are given."""
-    axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)")
-    if low is not None and high is not None:
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
 def outlines_drawing(
@@ -153,9 +148,9 @@ def outlines_drawing(
             ring: Any = {"mec": VERMILION, "mfc": "none", "ms": 18, "mew": 2, "ls": "none"}
             axes.plot(*fault_at, marker="o", label="at fault", **ring)
             axes.plot(*fault_at, marker="+", color=VERMILION, ms=8, mew=1.5)
-        low, high = points.min(axis=0), points.max(axis=0)
-        margin = 1.5 * _MARGIN * max(high - low)
-        _plane(axes, low - margin, high + margin)
+        margin = 1.5 * _MARGIN * np.ptp(points, axis=0).max()
+        (left, below), (right, above) = points.min(axis=0) - margin, points.max(axis=0) + margin
+        axes.set(**_PLANE, xlim=(left, right), ylim=(below, above))
         axes.set_title(fill(fault, _TITLE) if fault else title, color=VERMILION if fault else BLACK)
         made.legend(loc="outside lower center", ncols=4)
     return made

@@ -19,7 +19,6 @@ from hotlever.estimation.diagnosis import USUAL_SCATTER
 from hotlever.figures.style import (
     MEASURED,
     MOST_NAMES,
-    NOT_DESCRIBED,
     axis_label,
     curve,
     entitle,
@@ -97,9 +96,7 @@ def data_and_model(
             lower.set(xlabel=axis_label(along))
         if in_time and settled(measured):
             grid[0, 0].set_xscale("log")
-        stated = band is None or _stated(band)
-        style: Any = {} if stated else {"color": VERMILION}
-        entitle(made, model, more="" if stated else NOT_DESCRIBED, **style)
+        entitle(made, model, is_described=band is None or _stated(band))
         panel_letters(grid[0])
         # the tip has a band of its own
         for axes in {grid[0, 0], grid[0, 0 if band is None else list(panels).index("tip")]}:
@@ -119,11 +116,7 @@ def _tip_in_time(axes: Axes, band: xr.Dataset) -> None:
 
 def _differences(axes: Axes, measured: xr.Dataset, model: xr.Dataset, name: str) -> None:
     """Draw data minus model of an observable, and mark what is off by more than is usual."""
-    (along,), column, (unit, factor) = (
-        measured.sizes,
-        FITTED[name].name,
-        FITTED[name].small,
-    )
+    (along,), column, (unit, factor) = measured.sizes, FITTED[name].name, FITTED[name].small
     x, data = measured[along].values, measured[column].values
     difference = data - model[column].values
     axes.axhline(0, color="0.4", lw=0.8)
@@ -194,13 +187,9 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
         panels.append(("power_mW", by_power, "power P$_l$ (mW)"))
     ratios = (1.8, 1.0) if stated else (1.0,)
     shape: Any = {"sharex": "col", "height_ratios": ratios, "squeeze": False}
-    height = 5.0 if stated else 3.6
-    with figure(3.7 * len(panels), height, len(ratios), len(panels), letters=True, **shape) as (
-        made,
-        grid,
-    ):
-        style: Any = {} if stated else {"color": VERMILION}
-        entitle(made, band, more="" if stated else NOT_DESCRIBED, **style)
+    size = 3.7 * len(panels), 5.0 if stated else 3.6
+    with figure(*size, len(ratios), len(panels), letters=True, **shape) as (made, grid):
+        entitle(made, band, is_described=stated)
         for (upper, *lower), (name, rows, label) in zip(grid.T, panels, strict=True):
             x = band[name].values
             upper.plot(x, rows[2], color=BLUE, label=middle_name)
@@ -372,10 +361,8 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
         if many:
             column[-1].set(xlabel="lever", xlim=(0, count + 1))
         else:
-            names = levers.lever.values
-            column[-1].set_xticks(
-                np.arange(1, count + 1), names, rotation=45, ha="right", parse_math=False
-            )
+            named: Any = {"rotation": 45, "ha": "right", "parse_math": False}
+            column[-1].set_xticks(np.arange(1, count + 1), levers.lever.values, **named)
             column[-1].set_xlim(0.5, count + 0.5)
         made.align_ylabels()
         handles, labels = column[0].get_legend_handles_labels()

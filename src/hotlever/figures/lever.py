@@ -1,4 +1,4 @@
-"""Figures of a lever: what it is made of, and what a sweep gives."""
+"""Figures of a lever at rest: what it is made of, what a sweep gives, and states that are held."""
 
 from __future__ import annotations
 
@@ -211,4 +211,40 @@ def heater_profiles(profiles: Mapping[str, xr.Dataset]) -> Figure:
         lower.set_ylim(low, high + 0.35 * (high - low))
         entitle(made, *profiles.values())
         lower.legend(loc="upper left")
+    return made
+
+
+def held_states(data: xr.Dataset, curve: xr.Dataset | None = None) -> Figure:
+    """Draw the states at set points: the held quantity and the bias against the tip temperature.
+
+    Parameters
+    ----------
+    data, curve : xarray.Dataset
+        Of `hotlever.lever.set_points.hold`.
+    """
+    of_power = "set_mW" in data
+    column, scale = ("set_mW", 1.0) if of_power else ("set_ohm", 1000.0)
+    with figure(7.4, 3.4, 1, 2, letters=True) as (made, (quantity, bias)):
+        if curve is not None:
+            whole = curve.power_mW if of_power else curve.lever_V / curve.current_mA
+            style: Any = {"color": "0.6", "lw": 1.0, "label": "all states"}
+            quantity.plot(curve.tip_K, whole, **style)
+            bias.plot(curve.tip_K, curve.bias_V, **style)
+        for number, colour in zip(np.unique(data.state).tolist(), cycle(COLOURS), strict=False):
+            some = data.isel(bias=data.state.values == number)
+            label = f"state {number:g} of a set point"
+            for axes, values in ((quantity, some[column] / scale), (bias, some.bias_V)):
+                axes.plot(some.tip_K, values, "o", color=colour, label=label)
+        highest = 1.25 * float(data[column].max()) / scale
+        if curve is not None:
+            # a resistance has poles where other supplies turn the current: no room for these
+            highest = max(highest, min(whole.max().item(), 1.5 * whole.quantile(0.9).item()))
+        quantity.set(
+            xlabel=axis_label("tip_K"),
+            ylabel="power P$_l$ (mW)" if of_power else "resistance V$_l$/I$_h$ (kΩ)",
+            ylim=(0.0, 1.05 * highest),
+        )
+        bias.set(xlabel=axis_label("tip_K"), ylabel=axis_label("bias_V"))
+        quantity.legend()
+        entitle(made, data)
     return made

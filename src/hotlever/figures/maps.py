@@ -1,4 +1,4 @@
-"""Maps of what is inside a lever: its fields, its temperature alone, and that in time as a film.
+"""Maps of a lever and of the air around it: fields, heat flux, and temperature in time as a film.
 
 States come from `hotlever.lever.lever.Lever.solve`, or from the ``callback`` of
 `hotlever.lever.transient.simulate`.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,18 +18,29 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import TriMesh
-from matplotlib.colors import LogNorm, to_rgb
+from matplotlib.collections import PolyCollection, TriMesh
+from matplotlib.colors import LogNorm, SymLogNorm, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from PIL import Image
 
-from hotlever.colours import HEAT, VERMILION
+from hotlever.air.panels import Panels
+from hotlever.colours import BLACK, HEAT, VERMILION
 from hotlever.errors import InputError
 from hotlever.figures.drawing import outlines
-from hotlever.figures.style import STYLE, curve, figure, settled
+from hotlever.figures.style import (
+    COLOURS,
+    STYLE,
+    axis_label,
+    beside,
+    curve,
+    entitle,
+    figure,
+    settled,
+)
 from hotlever.files import FILM_TYPES, whole_file
 from hotlever.lever.fields import FieldMapper, Surface, seen_from_above
+from hotlever.probe import Layout
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
@@ -48,6 +60,8 @@ _COLOURS = np.concatenate(
         np.linspace(to_rgb(VERMILION), (1.0, 1.0, 1.0), 20),
     ]
 )
+#: Rises above the base temperature at which isotherms are drawn, as a share of the tip's.
+ISOTHERMS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8)
 
 
 def field_maps(state: State) -> Figure:
@@ -109,6 +123,80 @@ def temperature_map(state: State) -> Figure:
         axes.plot(*hottest, label=f"hottest, {T.max():.0f} K", **style)
         made.legend(loc="outside lower center", ncols=2)
         made.suptitle(_title(state), x=0.01, ha="left")
+    return made
+
+
+def air_loss(
+    layout: Layout, panels: Panels, flux: Array, shares: xr.Dataset, title: str = ""
+) -> Figure:
+    """Draw the heat flux from the top face, and heat into air by region along a sweep.
+
+    Parameters
+    ----------
+    layout : Layout
+    panels : Panels
+    flux : ndarray, shape (len(panels),)
+        mW/µm², of one state.
+    shares : xarray.Dataset
+        See `hotlever.lever.air_fields.AirFields.shares`.
+    title : str
+        Of the map.
+    """
+    heights = panels.corners[..., 2]
+    top = heights.min(axis=1) > heights.max() * (1 - 1e-9)
+    values = 1e3 * flux[top]
+    strongest = float(np.abs(values).max())
+    with figure(7.0, 6.0, 2, 1, height_ratios=(1.5, 1.0), letters=True) as (made, (upper, lower)):
+        scale = SymLogNorm(0.01 * strongest, vmin=-strongest, vmax=strongest)
+        style: Any = {"cmap": "RdBu_r", "norm": scale, "edgecolors": "face", "linewidths": 0.2}
+        cells = PolyCollection(list(panels.corners[top][:, :, :2]), array=values, **style)
+        cells.set_rasterized(True)
+        upper.add_collection(cells)
+        outlines(upper, layout)
+        upper.autoscale_view()
+        label = "heat flux from the top (µW/µm²)"
+        # powers of ten that the linear middle of the scale does not press together
+        powers = 10.0 ** np.arange(np.ceil(np.log10(0.02 * strongest)), np.log10(strongest))
+        ticks = [*-powers[::-1], 0.0, *powers]
+        bar: dict[str, Any] = {"location": "bottom", "shrink": 0.8, "aspect": 40, "ticks": ticks}
+        made.colorbar(cells, ax=upper, label=label, **bar)
+        upper.set_title(title, loc="right")
+        colours = [colour for colour in COLOURS if colour != BLACK] + ["0.5"]
+        names = shares.region.values.tolist()
+        for name, colour in zip(names, cycle(colours), strict=False):
+            share = 100 * shares.air_heat_mW.sel(region=name) / shares.power_mW
+            lower.plot(shares.tip_K, share, label=name, color=colour, marker=".")
+        whole = 100 * shares.air_heat_mW.sum("region") / shares.power_mW
+        lower.plot(shares.tip_K, whole, color=BLACK, ls="--", label="whole lever")
+        lower.axhline(0.0, color="0.6", lw=0.6)
+        lower.set(xlabel=axis_label("tip_K"), ylabel="share of the power\nlost to air (%)")
+        beside(lower)
+        entitle(made, shares)
+    return made
+
+
+def temperature_slices(slices: xr.Dataset) -> Figure:
+    """Draw the temperature of the air along and across a lever, far and near.
+
+    Parameters
+    ----------
+    slices : xarray.Dataset
+        From `hotlever.lever3d.fields.temperature_slices`.
+    """
+    base, tip = slices.attrs["base_K"], slices.attrs["tip_K"]
+    levels = [base + share * (tip - base) for share in ISOTHERMS]
+    with figure(7.2, 6.4, 2, 2, letters=True) as (made, grid):
+        for axes, name in zip(grid.ravel(), slices.slice.values, strict=True):
+            cut = slices.sel(slice=name)
+            at: Any = (cut.along_um, cut.z_um, cut.temperature)
+            image = axes.pcolormesh(*at, cmap=HEAT, vmin=base, vmax=tip, rasterized=True)
+            lines = axes.contour(*at, levels=levels, colors="white", linewidths=0.5)
+            axes.clabel(lines, fmt="%.0f", fontsize=6)
+            axes.set(aspect="equal", xlabel=f"{cut.axis.item()} (µm)", ylabel="z (µm)")
+            axes.grid(False)
+            axes.set_title(name, loc="center")
+        made.colorbar(image, ax=grid, label="temperature (K)", shrink=0.7)
+        entitle(made, slices, more=f"bias {slices.attrs['bias_V']:.3g} V, tip at {tip:.0f} K")
     return made
 
 

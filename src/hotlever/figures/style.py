@@ -30,9 +30,6 @@ LINES = [(line, colour) for line in ("-", "--") for colour in COLOURS]
 #: How measured points look.
 MEASURED: Any = {"ls": "none", "marker": "o", "mfc": "none", "color": BLACK, "label": "measured"}
 
-#: Title of what is drawn of a lever that does not show its data.
-NOT_DESCRIBED = "the data are not described: the nearest lever, without errors"
-
 #: More levers than this are numbered instead of named along an axis.
 MOST_NAMES = 24
 #: Points of a curve that are marked at most.
@@ -138,12 +135,16 @@ def bridge_beside(axes: Axes, data: xr.Dataset, along: str, **style: Any) -> Non
         right.grid(False)
 
 
-def entitle(made: Figure, *datasets: xr.Dataset | None, more: str = "", **style: Any) -> None:
-    """Write above a figure of which levers its datasets are, as far as these say so, and more."""
-    told = [data.attrs["lever"] for data in datasets if data is not None and "lever" in data.attrs]
-    text = "; ".join(filter(None, [" and ".join(dict.fromkeys(told)), more]))
+def entitle(made: Figure, *datasets: xr.Dataset, more: str = "", is_described: bool = True) -> None:
+    """Write above a figure of which levers its datasets are, as far as these say so, and more.
+
+    Where the levers do not show their data, the title says so.
+    """
+    told = [data.attrs["lever"] for data in datasets if "lever" in data.attrs]
+    doubt = "" if is_described else "the data are not described: the nearest lever, without errors"
+    text = "; ".join(filter(None, [" and ".join(dict.fromkeys(told)), more, doubt]))
     if text:
-        made.suptitle(text, x=0.01, ha="left", **style)
+        made.suptitle(text, x=0.01, ha="left", color=BLACK if is_described else VERMILION)
 
 
 def marker(data: xr.Dataset, along: str, mark: str = "o") -> str:

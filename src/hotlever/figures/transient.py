@@ -1,13 +1,15 @@
-"""Figures of levers in time and frequency."""
+"""Figures of levers in time and frequency, and of the controllers that hold them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from hotlever.colours import BLUE, GREEN, ORANGE, PURPLE, VERMILION
+from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION
 from hotlever.figures.style import (
     axis_label,
     bridge_beside,
@@ -20,6 +22,9 @@ from hotlever.figures.style import (
 
 if TYPE_CHECKING:
     import xarray as xr
+
+#: Share of a step of which a line is drawn; and of the gains, whose times are told apart.
+_OVERSHOOT, _SHOWN = 0.1, 0.8
 
 
 def history_overview(history: xr.Dataset) -> Figure:
@@ -86,11 +91,10 @@ def small_signals(spectrum: xr.Dataset) -> Figure:
             phase.plot(spectrum.frequency, spectrum[f"{name}_deg"], color=colour, label=label)
         changes = "change of T$_{tip}$ (K/mW, K/V)"
         if "bridge_per_bias_deg" in spectrum:
-            change, style = spectrum.bridge_per_bias_V_per_V, {"color": ORANGE}
-            size.plot(spectrum.frequency, change, label="V$_{bridge}$ by bias (V/V)", **style)
-            phase.plot(
-                spectrum.frequency, spectrum.bridge_per_bias_deg, label="V$_{bridge}$", **style
-            )
+            change, turn = spectrum.bridge_per_bias_V_per_V, spectrum.bridge_per_bias_deg
+            label = "V$_{bridge}$ by bias (V/V)"
+            size.plot(spectrum.frequency, change, color=ORANGE, label=label)
+            phase.plot(spectrum.frequency, turn, color=ORANGE, label="V$_{bridge}$")
             changes = "change of T$_{tip}$, V$_{bridge}$"
         size.set(ylabel=changes, yscale="log")
         phase.set(ylabel="phase (°)")
@@ -127,4 +131,38 @@ def harmonics(data: xr.Dataset) -> Figure:
         _along_frequency(size, phase)
         driven = f"bias {data.attrs['bias_V']:.3g} V + {data.attrs['amplitude_V']:.3g} V sine"
         entitle(made, data, more=driven)
+    return made
+
+
+def gain_map(data: xr.Dataset, gains: tuple[float, float] | None = None) -> Figure:
+    """Draw over gains how fast a closed loop settles, and where it is not stable.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Of `hotlever.lever.transient.closed_loop.ClosedLoop.gain_map`.
+    gains : tuple of float, optional
+        P (V/kΩ) and I (V/(kΩ ms)) to mark.
+    """
+    P, per_ms = (np.abs(data[name].values) for name in ("proportional", "integral"))
+    settling, minus = data.settling_us.values.T, "−" if data.integral.values[0] < 0.0 else ""
+    with figure(5.4, 4.4) as (made, axes):
+        lowest, highest = np.nanquantile(settling, [0.0, _SHOWN])
+        cells: Any = {"norm": LogNorm(lowest, highest), "cmap": "cividis_r", "rasterized": True}
+        colours = axes.pcolormesh(P, per_ms, settling, shading="nearest", **cells)
+        made.colorbar(colours, extend="max").set_label("time until a step has settled to 2 % (µs)")
+        axes.set(facecolor="0.85", xscale="log", yscale="log")
+        style: Any = {"colors": BLACK, "linewidths": 1.2}
+        axes.contour(P, per_ms, data.growth_per_us.values.T, [0.0], **style)
+        axes.contour(P, per_ms, data.overshoot.values.T, [_OVERSHOOT], linestyles="--", **style)
+        if gains is not None:
+            at = np.clip(abs(gains[0]), *P[[0, -1]]), np.clip(abs(gains[1]), *per_ms[[0, -1]])
+            mark: Any = {"color": VERMILION, "mec": "w", "ms": 7, "ls": "none", "clip_on": False}
+            axes.plot(*at, "o", label=f"P, I = {gains[0]:g}, {gains[1]:g}", **mark)
+        axes.plot([], [], "--", color=BLACK, lw=1.2, label=f"overshoot {_OVERSHOOT:.0%}")
+        axes.fill_between([], [], color="0.85", label="not stable")
+        axes.set(xlabel=f"{minus}P (V/kΩ)", ylabel=f"{minus}I (V/(kΩ ms))")
+        made.legend(loc="outside lower center", ncols=3)
+        held = f"{data.attrs['set_ohm']:.5g} Ω, tip at {data.attrs['tip_K']:.0f} K"
+        entitle(made, data, more=f"{held}, filter {data.attrs['filter_us']:g} µs")
     return made
