@@ -132,5 +132,7 @@ OPERATING_POINTS = (
 )
 #: Tip temperature of the simulated knee (K).
 [KNEE_PREDICTED_K] = [point.tip_K for point in OPERATING_POINTS if point.tip_K is not None]
+#: How far the measured knee lies above the predicted one (K).
+KNEE_OFF_K = KNEE_MEASURED_K - KNEE_PREDICTED_K
 #: Shift of the temperature by thermoelectricity that is not exceeded (nm), Section IV.
 SHIFT_NM = 500.0

@@ -7,7 +7,7 @@ import pytest
 
 from hotlever.datasets import labelled
 from hotlever.materials import PARAMETERS
-from hotlever.report.reproduce import claims
+from hotlever.report.reproduce import air, claims
 from hotlever.report.reproduce.findings import Findings
 from hotlever.studies.parameter_consistency import FREE, HELD
 
@@ -68,8 +68,8 @@ def test_parameters_are_judged_apart_from_the_doping(page, monkeypatch, scatter,
 
 
 def test_k_with_a_surface_is_judged_by_what_the_best_one_leaves(quick_page, monkeypatch):
-    monkeypatch.setattr(claims, "_FEW_GAPS_UM", (1.0, np.inf))
-    claims.one_sided_section(quick_page)
+    monkeypatch.setattr(air, "_FEW_GAPS_UM", (1.0, np.inf))
+    air.one_sided_section(quick_page)
     assert set(kinds(quick_page)) == {"figure", "table", "text"}
     [claim] = quick_page.claims
     assert claim[2].startswith("does not hold here")

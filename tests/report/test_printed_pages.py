@@ -10,8 +10,7 @@ import pytest
 
 import hotlever
 from hotlever.calibration import calibrate
-from hotlever.report.budget_pages import budget_page
-from hotlever.report.calibration_pages import calibration_page
+from hotlever.report.calibration_pages import budget_page, calibration_page
 
 pytest.importorskip("playwright", reason="the extra test-app is not installed")
 

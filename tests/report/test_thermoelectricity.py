@@ -7,7 +7,7 @@ import pytest
 
 from hotlever import figures
 from hotlever.datasets import labelled
-from hotlever.report.reproduce import LONG_SECTIONS, thermoelectricity
+from hotlever.report.reproduce import LONG_SECTIONS, claims
 from hotlever.report.reproduce.findings import Findings
 from hotlever.studies.thermoelectric_shift import HEATS, POLARITIES, SIDES
 
@@ -38,14 +38,14 @@ def verdicts(coarse, monkeypatch):
 
     def judge(moved_nm):
         monkeypatch.setattr(
-            *(thermoelectricity, "shift_by_heat"),
+            *(claims, "shift_by_heat"),
             lambda lever, bias: made_up_shift(bias, moved_nm),
         )
         strip = labelled({"moved_nm": [-10.0, -5.0, 15.0]}, "tip_K", {"tip_K": [500.0, 800, 900]})
-        monkeypatch.setattr(thermoelectricity, "self_heated", lambda silicon, tip: strip)
+        monkeypatch.setattr(claims, "self_heated", lambda silicon, tip: strip)
         page = Findings(coarse)
         page.heading("here")
-        thermoelectricity.shift_section(page)
+        claims.shift_section(page)
         return page.claims
 
     return judge

@@ -42,8 +42,7 @@ from hotlever.raman.lineshape import WINDOW, in_window
 from hotlever.raman.reading import read_file, spectrum_files
 from hotlever.raman.series import Line
 from hotlever.raman.spectrum import Spectrum
-from hotlever.report.budget_pages import budget_page
-from hotlever.report.calibration_pages import calibration_page
+from hotlever.report.calibration_pages import budget_page, calibration_page
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.page import Block, Page
 from hotlever.tasks.reporter import Silence

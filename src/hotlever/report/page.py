@@ -29,23 +29,6 @@ _PAGE = re.compile(r"\b(\w+\.html)\b")
 _DOI = re.compile(r"doi:(10\.\d{4,9}/[^\s,;]*[^\s,;.])")
 
 
-class Linked(str):
-    """A cell of a table that leads to a section of the page, by its `anchor`."""
-
-    anchor: str
-
-    def __new__(cls, text: str, anchor: str) -> Linked:
-        """Make a cell of a text and what it leads to."""
-        made = super().__new__(cls, text)
-        made.anchor = anchor
-        return made
-
-
-def _anchor(text: str) -> str:
-    """Return what a link to a section of this heading ends in."""
-    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
-
-
 def _with_links(text: str) -> Markup:
     """Return a text whose DOIs and other pages are links."""
     link = r'<a href="https://doi.org/\1">doi:\1</a>'
@@ -78,14 +61,14 @@ class Page:
             self.added(self.blocks[-1])
 
     def heading(self, text: str) -> None:
-        """Start a section."""
-        self._add("heading", text=text, anchor=_anchor(text))
+        """Start a section, to which links lead by its anchor."""
+        anchor = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+        self._add("heading", text=text, anchor=anchor)
 
-    @property
-    def anchor(self) -> str:
-        """That of the section being filled; nothing before the first."""
+    def linked(self, text: str) -> Markup:
+        """Return a cell of a table that leads to the section being filled."""
         anchors = [block["anchor"] for block in self.blocks if block["kind"] == "heading"]
-        return anchors[-1] if anchors else ""
+        return Markup('<a href="#{}">{}</a>').format(anchors[-1] if anchors else "", text)
 
     def text(self, text: str) -> None:
         """Add a paragraph."""

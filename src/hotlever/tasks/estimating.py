@@ -191,8 +191,7 @@ def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
 
 def _write_pages(result: Calibration, folder: Path) -> Path:
     """Write the page of a calibration, and that of its uncertainty budget; return the former."""
-    from hotlever.report.budget_pages import budget_page
-    from hotlever.report.calibration_pages import calibration_page
+    from hotlever.report.calibration_pages import budget_page, calibration_page
 
     page = calibration_page(result)
     if result.gum is not None:

@@ -8,7 +8,7 @@ from hotlever.lever import Lever
 from hotlever.materials import published
 from hotlever.probe import Probe
 from hotlever.report.page import Page
-from hotlever.report.reproduce import air, claims, discrepancy, inference, thermoelectricity, vacuum
+from hotlever.report.reproduce import air, claims, inference, vacuum
 from hotlever.report.reproduce.findings import Findings
 from hotlever.steps import each
 from hotlever.types import Progress
@@ -29,10 +29,10 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
     "Heat into air depends on the surroundings (Fig. 8)": air.disc_section,
     "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
     "Is air one factor of the power? (Fig. 10b)": air.scale_section,
-    "A surface on one side (Section V)": claims.one_sided_section,
+    "A surface on one side (Section V)": air.one_sided_section,
     "Radiation (Section IV)": claims.radiation_section,
     "Where the heat goes": air.map_section,
-    "What remains of the 50 K that the knee is off": discrepancy.discrepancy_section,
+    "What remains of the 50 K that the knee is off": vacuum.discrepancy_section,
     "A lever never seen: how wrong is its calibration?": inference.levers_section,
     "Balances": vacuum.balance_section,
 }
@@ -40,8 +40,8 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
 LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
     "k by size and pressure": air.geometry_section,
     "The missing tip": air.tip_section,
-    "Thermoelectricity: which way the hot spot moves": thermoelectricity.shift_section,
-    "Thermoelectricity: what a fit gains by it": thermoelectricity.prediction_section,
+    "Thermoelectricity: which way the hot spot moves": claims.shift_section,
+    "Thermoelectricity: what a fit gains by it": claims.prediction_section,
     "Mesh": vacuum.mesh_section,
 }
 
@@ -67,8 +67,8 @@ def reproduce_page(quick: bool, progress: Progress, within: Progress | None = No
         section(page)
     filled, page.blocks = page.blocks, []
     page.heading("What the paper says, and what was found")
-    page.tabulate(
-        "claims", ("where", "claim", "verdict", "found in this run"), page.claims, prose=True
-    )
+    caption = "Every verdict is computed from the sections below."
+    columns = ("where", "claim", "verdict", "found in this run")
+    page.table(columns, page.claims, caption, prose=True)
     page.blocks += filled
     return page

@@ -1,16 +1,19 @@
-"""What the paper says of other levers and other surroundings."""
+"""What the paper says of other levers, and leaves out: radiation and thermoelectricity."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from hotlever import figures
 from hotlever import spieser2017 as paper
+from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe.priors import default_priors
-from hotlever.report.reproduce.findings import Findings
-from hotlever.studies.air_scaling import COLD, GAPS_UM, HOT, one_sided_study
+from hotlever.report.reproduce.findings import Findings, example
+from hotlever.report.reproduce.vacuum import published_biases
 from hotlever.studies.linear_branch import (
     SPAN_K,
     WITHIN_K,
@@ -29,15 +32,24 @@ from hotlever.studies.parameter_consistency import (
 )
 from hotlever.studies.radiation import radiated_heat, sheet_emissivities
 from hotlever.studies.simulation_based_calibration import NOISE, RAMAN
+from hotlever.studies.thermoelectric_fit import described_without, fits_with_and_without
+from hotlever.studies.thermoelectric_shift import of_p_silicon, shift_by_heat
+from hotlever.studies.thermoelectric_strip import self_heated
 
-#: Of the quick form: every so many levers, the first geometries, errors of the model, gaps (µm).
-_EVERY, _FIRST, _FEW_ERRORS, _FEW_GAPS_UM = 5, 3, ("none", "all"), (1.0, 10.0, np.inf)
+#: Of the quick form: every so many levers, the first geometries, and errors of the model.
+_EVERY, _FIRST, _FEW_ERRORS = 5, 3, ("none", "all")
 #: What explains the slope.
 _EXPLAINED = ("resistance_K_per_mW", "knee_share")
 #: The error of the model that is the same on all levers.
 _SHARED = "mobility"
 #: How near to their mean the paper's levers are said to be.
 _CLAIMED = 0.1
+#: Biases (V) beside those of the published points, the lowest first.
+_BIAS = (4.0, 5.0, 6.0, 9.0, 10.0)
+#: Temperatures (K) of a strip of one doping.
+_STRIP_K = np.arange(500.0, 1301.0, 25.0)
+#: A change of a mean residual by less, relative to it, is none.
+_MATTERS = 0.1
 
 
 def linear_section(page: Findings) -> None:
@@ -46,55 +58,32 @@ def linear_section(page: Findings) -> None:
     study = linear_branch_study(cases, progress=page.progress)
     regression, alone = (slope_regression(study, names) for names in (_EXPLAINED, _EXPLAINED[:1]))
     spread = paper.POWER_LAW_SPREAD_K
-    page.draw("linear_branches", figures.linear_branches(study, regression, spread), spread=spread)
+    page.draw("linear_branches", figures.linear_branches(study, regression, spread))
     solved = study.isel(case=study.knee_K.notnull().values)
-    numbers = {
-        "count": solved.sizes["case"],
-        "p_type": int((solved.dopant == "p").sum()),
-        "total": study.sizes["case"],
-        "span": SPAN_K,
-        "worst": solved.straight_K.max().item(),
-        "usual": solved.straight_K.median().item(),
-        "within": WITHIN_K,
-        "shortest": solved.reach_K.min().item(),
-        "longest": solved.reach_K.max().item(),
-        "least": solved.proportional_K.min().item(),
-        "most": solved.proportional_K.max().item(),
-        "flattest": solved.slope_K_per_mW.min().item(),
-        "steepest": solved.slope_K_per_mW.max().item(),
-        "low_ratio": solved.slope_ratio.min().item(),
-        "high_ratio": solved.slope_ratio.max().item(),
-        "kappa": solved.kappa_ratio.median().item(),
-        "knee_share": solved.knee_share.median().item(),
-        "end_share": solved.end_share.median().item(),
-        "by_resistance": regression.exponents["resistance_K_per_mW"],
-        "by_share": regression.exponents["knee_share"],
-        "factor": regression.factor,
-        "determination": regression.determination,
-        "scatter": regression.scatter,
-        "scatter_alone": alone.scatter,
-    }
+    least, most = solved.min(), solved.max()
+    numbers: Any = {"study": study, "solved": solved, "p_type": int((solved.dopant == "p").sum())}
+    numbers |= {"least": least, "median": solved.median(), "most": most}
+    numbers |= {"regression": regression, "alone": alone, "span": SPAN_K, "within": WITHIN_K}
     page.say("linear_branch", **numbers)
     numbers["by_doping"] = _tabulate_slopes(page, solved)
-    page.claim("linear_branch", holds=numbers["worst"] < spread, **numbers)
-    page.claim("proportional_branch", holds=numbers["most"] < spread, spread=spread, **numbers)
+    page.claim("linear_branch", holds=most.straight_K.item() < spread, **numbers)
+    page.claim("proportional_branch", holds=most.proportional_K.item() < spread, **numbers)
 
 
 def _tabulate_slopes(page: Findings, solved: xr.Dataset) -> float:
     """Tabulate slopes by doping; return the largest change by it alone, a share."""
-    rows, most = [], 0.0
-    by_doping = solved.isel(case=np.isin(solved.changed, ("", "n_d")))
-    kinds = zip(by_doping["shape"].values, by_doping.dopant.values, strict=True)
-    for shape, dopant in sorted(set(kinds)):
-        here = ((by_doping["shape"] == shape) & (by_doping.dopant == dopant)).values
-        same = by_doping.slope_K_per_mW.values[here]
-        low, high = same.min(), same.max()
-        most = max(most, high / low - 1.0)
-        cells = (f"{same.size}", f"{low:.0f} to {high:.0f}", f"{high / low - 1.0:.0%}")
-        rows += [(str(shape), str(dopant), *cells)] if same.size > 1 else []
+    by_doping = solved.slope_K_per_mW.isel(case=np.isin(solved.changed, ("", "n_d")))
+    kinds = by_doping.to_dataframe().groupby(["shape", "dopant"]).slope_K_per_mW
+    slopes = kinds.agg(["size", "min", "max"])
+    slopes["growth"] = slopes["max"] / slopes["min"] - 1.0
+    rows = [
+        (*kind, f"{row['size']:.0f}", f"{row['min']:.0f} to {row['max']:.0f}", f"{row.growth:.0%}")
+        for kind, row in slopes.iterrows()
+        if row["size"] > 1
+    ]
     heads = ("shape", "type", "dopings", "slope (K/mW)", "from the lowest to the highest")
     page.tabulate("slopes_by_doping", heads, rows)
-    return float(most)
+    return float(slopes.growth.max())
 
 
 def consistency_section(page: Findings) -> None:
@@ -104,20 +93,10 @@ def consistency_section(page: Findings) -> None:
     probe = page.lever.probe
     study = consistency_study(probe, geometries, errors, progress=page.progress)
     published = published_levers()
-    tolerances = {
-        "dimensions": default_priors(probe)["thickness_um"].spread,
-        "common": RAMAN[1],
-    }
-    page.say(
-        "consistency",
-        count=len(geometries),
-        hottest=paper.HOTTEST_TIP_K,
-        noise=NOISE,
-        thermometer=RAMAN[0],
-        **tolerances,
-        nominal=paper.NOMINAL_DOPING,
-        doping=probe.material.n_d,
-    )
+    numbers: Any = {"count": len(geometries), "common": RAMAN[1]}
+    numbers["dimensions"] = default_priors(probe)["thickness_um"].spread
+    doping = probe.material.n_d
+    page.say("consistency", noise=NOISE, thermometer=RAMAN[0], doping=doping, **numbers)
     figure = figures.parameter_deviations(study, published, _CLAIMED)
     page.draw("parameter_deviations", figure, claimed=_CLAIMED)
     ours, theirs = largest_deviation(study), largest_deviation(published)
@@ -135,18 +114,17 @@ def consistency_section(page: Findings) -> None:
         scatter, _ = _worst(ours.sel(error=_SHARED, doping=FREE))
         page.say("consistent_but_wrong", scatter=scatter, off=off, symbol=symbol)
     worst, symbol = _worst(ours.sel(error="all", doping=FREE))
-    doping = ours.sel(doping=FREE, parameter="n_d")
+    of_doping = ours.sel(doping=FREE, parameter="n_d")
     page.claim(
         "consistent_parameters",
         holds=worst < _CLAIMED,
-        count=len(geometries),
-        **tolerances,
+        **numbers,
         without=_worst(ours.sel(error="none", doping=FREE))[0],
         worst=worst,
         symbol=symbol,
         held=_worst(ours.sel(error="all", doping=HELD))[0],
-        doping=doping.sel(error="none").item(),
-        doping_worst=doping.sel(error="all").item(),
+        doping=of_doping.sel(error="none"),
+        doping_worst=of_doping.sel(error="all"),
         paper_free=_worst(theirs.sel(doping=FREE))[0],
         paper_held=_worst(theirs.sel(doping=HELD))[0],
     )
@@ -162,65 +140,108 @@ def _shares(values: xr.DataArray) -> list[str]:
     return [f"{value:.1%}" if value > 0 else "" for value in values.values]
 
 
-def one_sided_section(page: Findings) -> None:
-    """k with a surface below the lever."""
-    gaps_um = _FEW_GAPS_UM if page.quick else GAPS_UM
-    study = one_sided_study(page.lever.probe, gaps_um, page.progress)
-    names = ["free" if np.isinf(gap) else f"{gap:g} µm" for gap in study.gap_um.values]
-    curves = {name: study.k.isel(gap_um=number) for number, name in enumerate(names)}
-    page.draw("one_sided", figures.scale_factor(curves, paper.K_IN_AIR))
-    growth = study.k.max("tip_K") / study.k.min("tip_K") - 1.0
-    columns = {
-        "gap": (study.gap_um.copy(data=names), ""),
-        **{f"k at {tip:.0f} K": (study.k.interp(tip_K=tip), ".3f") for tip in (COLD, HOT)},
-        "growth of k": (growth, ".0%"),
-        "growth of k − 1": (study.unevenness, ".2f"),
-        "best single k": (study.best_k, ".3f"),
-        "error it leaves (K)": (study.best_error_K, ".0f"),
-    }
-    page.columns("one_sided", columns, HOT=HOT)
-    free, near = growth.sel(gap_um=np.inf), growth.where(np.isfinite(study.gap_um))
-    worst, error = near.idxmax("gap_um").item(), study.best_error_K
-    near_growth, free_growth = (study.unevenness.sel(gap_um=gap).item() for gap in (worst, np.inf))
-    page.say("one_sided", gap=worst, near_growth=near_growth, free_growth=free_growth)
-    page.claim(
-        "one_sided",
-        holds=error.max().item() < paper.POWER_LAW_SPREAD_K,
-        free=free.item(),
-        least=near.min().item(),
-        most=near.max().item(),
-        gap=worst,
-        COLD=COLD,
-        HOT=HOT,
-        free_error=error.sel(gap_um=np.inf).item(),
-        error=error.max().item(),
-        spread=paper.POWER_LAW_SPREAD_K,
-    )
-
-
 def radiation_section(page: Findings) -> None:
     """What the lever radiates, as a black body and as silicon."""
     tip = paper.HOTTEST_TIP_K
-    black, grey = (radiated_heat(page.lever.probe, [tip], epsilon) for epsilon in (1.0, None))
+    black, grey = (
+        radiated_heat(page.lever.probe, [tip], epsilon).squeeze() for epsilon in (1.0, None)
+    )
     sheets = sheet_emissivities(page.lever.probe, [paper.BASE_TEMPERATURE_K, tip]).emissivity
-    light, power = black.radiated_mW.item(), black.power_mW.item()
+    share = (black.radiated_mW / black.power_mW).item()
     page.claim(
         "radiation",
-        holds=power > 1e3 * light,
-        tip=tip,
-        light=1e3 * light,
-        ratio=power / light,
-        power=power,
-        heater=1e3 * black.heater_mW.item(),
-        share=light / power,
-        grey=1e3 * grey.radiated_mW.item(),
-        grey_ratio=grey.power_mW.item() / grey.radiated_mW.item(),
-        fall=black.cooler_K.item(),
-        grey_fall=grey.cooler_K.item(),
+        holds=share < 1e-3,
+        black=black,
+        grey=grey,
+        light_uW=1e3 * black.radiated_mW,
+        grey_uW=1e3 * grey.radiated_mW,
+        heater_uW=1e3 * black.heater_mW,
+        share=share,
+        ratio=1.0 / share,
     )
-    page.say(
-        "radiation",
-        edges=(black.edges_mW / black.radiated_mW).item(),
-        least=sheets.min().item(),
-        most=sheets.max().item(),
+    edges = black.edges_mW / black.radiated_mW
+    page.say("radiation", edges=edges, least=sheets.min(), most=sheets.max())
+
+
+def shift_section(page: Findings) -> None:
+    """The shift of the hot spot, heat by heat, for either kind of silicon."""
+    points = published_biases(page.lever)
+    biases = sorted([*_BIAS, *points])
+    n_type = shift_by_heat(page.lever, biases)
+    p_type = shift_by_heat(Lever(of_p_silicon(page.lever.probe)), biases)
+    page.draw("thermoelectric_shift", figures.thermoelectric_shift(n_type, p_type))
+    base = page.lever.circuit.base_temperature_K
+    columns = ["doped with", "bias (V)", "T_tip (K)", "moved along the current (nm)"]
+    columns += ["by Peltier heat, supply", "ground", "by Thomson heat"]
+    columns += ["Peltier heat, supply (mW)", "ground (mW)"]
+    rows = [
+        _row(name, shift.sel(polarity=polarity).sel(bias=bias, method="nearest"), base)
+        for name, shift in (("phosphorus", n_type), ("boron", p_type))
+        for polarity in (1, -1)
+        for bias in points
+    ]
+    page.tabulate("thermoelectric_shift", columns, rows)
+    moved, at_bias = abs(n_type.moved_nm).max("polarity"), n_type.bias[0]
+    at_points = n_type.sel(bias=points, method="nearest")
+    largest = abs(at_points.moved_nm).max().item()
+    found: Any = {"largest": largest, "cold": moved[0], "bias": at_bias}
+    page.claim("thermoelectric_size", holds=largest < paper.SHIFT_NM, **found)
+    thomson = at_points.share_nm.sel(heat="Thomson").sum("side")
+    silicon = page.lever.probe.heater_silicon
+    assert silicon is not None
+    strip = self_heated(silicon, _STRIP_K)
+    boron = [p_type.sel(polarity=1).sel(bias=bias, method="nearest") for bias in points[:2]]
+    page.claim(
+        "thermoelectric_direction",
+        holds=bool((at_points.moved_nm > 0.0).all()),
+        least=at_points.moved_nm.max(),
+        most=at_points.moved_nm.min(),
+        thomson=thomson.min(),
+        strip=_turn(strip),
+        boron=boron,
+        boron_K=[base + at.centre_rise_K for at in boron],
+    )
+
+
+def _row(name: str, at: xr.Dataset, base: float) -> tuple[str, ...]:
+    """Return what thermoelectricity does at a bias, as cells."""
+    moved = [f"{value:+.0f}" for value in at.share_nm.sel(heat="Peltier").values]
+    heats = [f"{value:+.3f}" for value in at.heat_mW.sel(heat="Peltier").values]
+    bias, tip = f"{at.polarity * at.bias:+.2f}", f"{base + at.centre_rise_K:.0f}"
+    thomson = at.share_nm.sel(heat="Thomson").sum()
+    return (name, bias, tip, f"{at.moved_nm:+.0f}", *moved, f"{thomson:+.0f}", *heats)
+
+
+def _turn(strip: xr.Dataset) -> float:
+    """Return the temperature (K) at which the shift of a strip turns for the last time."""
+    moved, tip = strip.moved_nm.values, strip.tip_K.values
+    before = int(np.flatnonzero(np.diff(np.sign(moved)))[-1])
+    near = slice(before, before + 2)
+    order = np.argsort(moved[near])
+    return float(np.interp(0.0, moved[near][order], tip[near][order]))
+
+
+def prediction_section(page: Findings) -> None:
+    """What a fit gains by thermoelectricity."""
+    fits = fits_with_and_without(example("lever-a.csv"), page.lever.probe)
+    rms = {with_it: result.residual_rms for with_it, result in fits.items()}
+    values = {
+        with_it: np.array([result.parameters[name].value for name in PARAMETERS])
+        for with_it, result in fits.items()
+    }
+    rows = []
+    for with_it, model in ((False, "without"), (True, "with thermoelectricity")):
+        cells = [f"{value:.3g}" for value in rms[with_it].values()]
+        rows.append([model, *cells, *(f"{value:.4g}" for value in values[with_it])])
+    columns = ["model", *(f"rms {name}" for name in rms[False]), *PARAMETERS]
+    page.tabulate("thermoelectric_fit", columns, rows)
+    moved = abs(values[True] / values[False] - 1.0)
+    page.claim(
+        "thermoelectric_prediction",
+        holds=1.0 - rms[True]["tip_K"] / rms[False]["tip_K"] < _MATTERS,
+        without=rms[False],
+        with_it=rms[True],
+        symbol=list(PARAMETERS.values())[moved.argmax()].symbol,
+        moved=moved.max(),
+        off=described_without(page.lever.probe).off_K.max(),
     )

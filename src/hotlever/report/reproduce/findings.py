@@ -12,15 +12,15 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from hotlever import spieser2017 as paper
 from hotlever.estimation import Fit, Measurement, fit, read_measurement
 from hotlever.lever import Lever
-from hotlever.report.page import Linked, Page
-from hotlever.spieser2017 import DOI, RAMP
+from hotlever.report.page import Page
 from hotlever.types import Progress
 
 #: Biases (V) of a curve without visible corners.
-MANY = np.linspace(0.1, RAMP[-1], 110)
-#: Captions, paragraphs and claims by name, with what a run finds in braces.
+MANY = np.linspace(0.1, paper.RAMP[-1], 110)
+#: Captions, paragraphs and claims by name; in braces what a run finds, and numbers of the paper.
 _TEXTS = tomllib.loads(
     (files("hotlever") / "report" / "reproduce" / "texts.toml").read_text(encoding="utf-8")
 )
@@ -44,6 +44,11 @@ class Findings(Page):
         The same lever in still air, freely suspended.
     claims : list of tuple of str
         Where the paper says what, the verdict, and what was found in this run.
+
+    Notes
+    -----
+    Braces of a text name what its section found, or numbers of `hotlever.spieser2017`, as
+    ``{paper.SHIFT_NM:.0f}``; these may be parts of an object, as ``{factor.best_k:.2f}``.
     """
 
     def __init__(
@@ -51,7 +56,7 @@ class Findings(Page):
     ) -> None:
         super().__init__(
             "Joule-heated cantilever probes: the published results, computed",
-            f"Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:{DOI}, with hotlever's "
+            f"Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:{paper.DOI}, with hotlever's "
             "reference probe, whose dimensions are inferred: no drawing of the published lever "
             "exists.",
         )
@@ -64,42 +69,38 @@ class Findings(Page):
         """Option III on the virtual lab's first lever."""
         return fit(example("lever-a.csv"), self.lever.probe)
 
-    def say(self, name: str, /, **numbers: Any) -> None:
+    def say(self, name: str, /, **found: Any) -> None:
         """Add the paragraph of a name."""
-        self.text(_TEXTS["paragraphs"][name].format(**numbers))
+        self.text(_filled(_TEXTS["paragraphs"][name], found))
 
-    def draw(self, name: str, figure: Figure, /, file: str = "", **numbers: Any) -> None:
+    def draw(self, name: str, figure: Figure, /, file: str = "", **found: Any) -> None:
         """Add a figure with the caption of its name, which is that of its file by default."""
-        self.figure(file or name, figure, _TEXTS["figures"][name].format(**numbers))
+        self.figure(file or name, figure, _filled(_TEXTS["figures"][name], found))
 
     def tabulate(
-        self,
-        name: str,
-        columns: Sequence[str],
-        rows: Sequence[Sequence[str]],
-        /,
-        *,
-        prose: bool = False,
-        **numbers: Any,
+        self, name: str, columns: Sequence[str], rows: Sequence[Sequence[str]], /, **found: Any
     ) -> None:
         """Add a table with the caption of its name."""
-        self.table(columns, rows, _TEXTS["tables"][name].format(**numbers), prose=prose)
+        self.table(columns, rows, _filled(_TEXTS["tables"][name], found))
 
     def columns(
-        self, name: str, columns: Mapping[str, tuple[xr.DataArray, str]], /, **numbers: Any
+        self, name: str, columns: Mapping[str, tuple[xr.DataArray, str]], /, **found: Any
     ) -> None:
         """Add a table of some values and their format by heading."""
         cells = [[f"{value:{form}}" for value in data.values] for data, form in columns.values()]
-        self.tabulate(name, list(columns), list(zip(*cells, strict=True)), **numbers)
+        self.tabulate(name, list(columns), list(zip(*cells, strict=True)), **found)
 
-    def claim(self, name: str, /, *, holds: bool, **numbers: Any) -> None:
+    def claim(self, name: str, /, *, holds: bool, **found: Any) -> None:
         """Add the claim of a name, and whether it holds in this run."""
         claim = {"holds": "holds", **_TEXTS["claims"][name]}
-        text = {key: words.format(**numbers) for key, words in claim.items()}
+        text = {key: _filled(words, found) for key, words in claim.items()}
         verdict = text["holds"] if holds else f"does not hold here, because {text['fails']}"
-        self.claims.append(
-            (Linked(text["where"], self.anchor), text["claim"], verdict, text["ours"])
-        )
+        self.claims.append((self.linked(text["where"]), text["claim"], verdict, text["ours"]))
+
+
+def _filled(words: str, found: Mapping[str, Any]) -> str:
+    """Return a text with what was found, and what the paper has, in its braces."""
+    return words.format(paper=paper, **found)
 
 
 def example(name: str) -> Measurement:
