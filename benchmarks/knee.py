@@ -18,7 +18,7 @@ from hotlever.calibration.knee import IVCurve, find_knee
 from hotlever.lever import Branch, Lever
 from hotlever.materials import published
 from hotlever.probe import Probe
-from hotlever.studies.knee_reasons import reasons_of_the_knee, steps_to_the_knee
+from hotlever.studies.knee import reasons_of_the_knee, steps_to_the_knee
 from problems import processor_time
 from synthetic_curves import measured_curve
 

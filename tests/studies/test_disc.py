@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.studies.disc import loss_between_planes
+from hotlever.studies.air_scaling import loss_between_planes
 
 
 def disc_loss(distance):

@@ -9,8 +9,8 @@ from hotlever import Lever, Probe, figures, fit
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import Measurement
 from hotlever.spieser2017 import RAMP
-from hotlever.studies import knee_discrepancy
-from hotlever.studies.knee_discrepancy import (
+from hotlever.studies import knee
+from hotlever.studies.knee import (
     AWAY,
     IN_AIR,
     RAMAN,
@@ -81,10 +81,10 @@ def test_the_covariance_of_a_fit_gives_the_knee_a_standard_error_that_goes_with_
 
 def test_a_suspect_that_does_not_count_is_left_out_of_the_figure(tmp_path, monkeypatch):
     carried = {suspect: (1.0 + k, 2.0 + k) for k, suspect in enumerate(SUSPECTS)}
-    monkeypatch.setattr(knee_discrepancy, "carried_by", lambda probe, suspect, _: carried[suspect])
-    monkeypatch.setattr(knee_discrepancy, "by_covariance", lambda result: 3.0)
-    monkeypatch.setattr(knee_discrepancy, "by_layout", lambda probe, progress: 4.0)
-    study = knee_discrepancy.compare_suspects(Probe.reference(), None)
+    monkeypatch.setattr(knee, "carried_by", lambda probe, suspect, _: carried[suspect])
+    monkeypatch.setattr(knee, "by_covariance", lambda result: 3.0)
+    monkeypatch.setattr(knee, "by_layout", lambda probe, progress: 4.0)
+    study = knee.compare_suspects(Probe.reference(), None)
     assert np.isnan(study.shift_K.sel(suspect=IN_AIR))
     assert study.shift_K.sel(suspect=RAMAN).item() == 2.0
     assert study.left_K == pytest.approx(study.discrepancy_K - carried[TOGETHER][1])

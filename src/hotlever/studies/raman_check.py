@@ -75,7 +75,6 @@ def paper_check(calibration: RamanCalibration | None = None) -> xr.Dataset:
             f"the calibration's anharmonic law has no temperature at a shift of {min(at_knee):.1f} "
             "cm⁻¹, where the knee was read; expected one for silicon"
         )
-    gap = paper.KNEE_MEASURED_K - paper.KNEE_PREDICTED_K
     error = np.array([law.temperature(shift, room) - grid for law in laws.values()])
     names = [
         f"{name}: {law.constant_K:.1f} K − {-law.slope_K_cm:.1f} K cm · shift"
@@ -87,7 +86,7 @@ def paper_check(calibration: RamanCalibration | None = None) -> xr.Dataset:
             "error_at_hottest": reads - paper.HOTTEST_TIP_K,
             "true_at_knee": true,
             "discrepancy": true - paper.KNEE_PREDICTED_K,
-            "explained": (paper.KNEE_MEASURED_K - true) / gap,
+            "explained": (paper.KNEE_MEASURED_K - true) / paper.KNEE_OFF_K,
             "error": (("line", "temperature_K"), error),
             "paper_error": ("temperature_K", printed.band(grid - room)),
         },

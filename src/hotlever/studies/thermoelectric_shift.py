@@ -74,31 +74,21 @@ class HotSpot(NamedTuple):
     rise: float
 
 
-class Axis:
-    """The inner part of a heater's axis, from the supply to ground.
+def rises_along(space: FullSpace, taper: Taper, x: Array) -> list[Chebyshev]:
+    """Return temperatures by the position (µm) on the inner part of a heater's axis.
 
     Parameters
     ----------
     space : FullSpace
     taper : Taper
-        Centre, direction and length of the heater.
+        Centre, direction, from the supply to ground, and length of the heater.
+    x : ndarray, shape (size + 1, k)
+        States, or changes of them; temperatures count from that of the base.
     """
-
-    def __init__(self, space: FullSpace, taper: Taper) -> None:
-        self._space = space
-        half = 0.5 * _INNER * taper.length_um
-        self._position = np.linspace(-half, half, _POINTS)
-        along = np.outer(self._position, taper.axis)
-        self._positions = np.array(taper.centre) + along
-
-    def temperatures(self, x: Array) -> list[Chebyshev]:
-        """Return the temperature (K) of states, or of changes, (size + 1, k), by position (µm).
-
-        It counts from that of the base.
-        """
-        values, position = self._space.rise_at(self._positions, x), self._position
-        domain = position[[0, -1]]
-        return [Chebyshev.fit(position, column, _DEGREE, domain=domain) for column in values.T]
+    half = 0.5 * _INNER * taper.length_um
+    position = np.linspace(-half, half, _POINTS)
+    values = space.rise_at(np.array(taper.centre) + np.outer(position, taper.axis), x)
+    return [Chebyshev.fit(position, T, _DEGREE, domain=(-half, half)) for T in values.T]
 
 
 def hot_spot(rise: Chebyshev) -> HotSpot:
@@ -224,9 +214,13 @@ class _Way:
     def __init__(self, lever: Lever) -> None:
         self.lever = lever
         self.whole = self._at_share(1.0)
-        taper, sides = _from_supply(lever)
+        self._taper, sides = _from_supply(lever)
         own = lever.probe.kinds[lever.probe.layout().heater.material]
-        self.axis, self.heats = Axis(lever.space, taper), Heats(self.whole, own, sides)
+        self.heats = Heats(self.whole, own, sides)
+
+    def rises(self, x: Array) -> list[Chebyshev]:
+        """Return the temperature along the heater, see `rises_along`."""
+        return rises_along(self.lever.space, self._taper, x)
 
     def _at_share(self, share: float) -> LeverEquations:
         probe = self.lever.probe.with_physics(("thermoelectric",))
@@ -243,7 +237,7 @@ class _Way:
         each = list(self.heats.tested(x, current).values())
         causes = np.stack([*each, self._all(x, share)], axis=-1)
         changes = self._at_bias(equations, x, causes)[:, 0]
-        rise, *risen = self.axis.temperatures(np.hstack([x, changes]))
+        rise, *risen = self.rises(np.hstack([x, changes]))
         at = hot_spot(rise).at_um
         return np.array([-change.deriv()(at) / rise.deriv(2)(at) for change in risen])
 
@@ -347,13 +341,13 @@ def shift_by_heat(lever: Lever, bias: ArrayLike) -> xr.Dataset:
 
 def _shift(way: _Way, plain: State, polarity: int) -> dict[str, Any]:
     """Return a row of `shift_by_heat`."""
-    before = hot_spot(way.axis.temperatures(plain.x)[0])
+    before = hot_spot(way.rises(plain.x)[0])
     x, moved = plain.x, np.zeros(len(HEATS) * len(SIDES) + 1)
     for share, weight in _GAUSS:
         equations, x = way.state(polarity * share, plain.bias_V, x)
         moved += weight * way.rates(equations, x, polarity * share)
     equations, x = way.state(polarity, plain.bias_V, x)
-    after = hot_spot(way.axis.temperatures(x)[0])
+    after = hot_spot(way.rises(x)[0])
     heats = way.heats.tested(x, -equations.fluxes(x).charge).values()
     return {
         "plain_um": before.at_um,

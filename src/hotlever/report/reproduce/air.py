@@ -15,9 +15,9 @@ from hotlever.lever.air_fields import AirFields
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.heat import thermal_conductivity
 from hotlever.report.reproduce.findings import MANY, Findings
-from hotlever.studies import air_scaling, disc
+from hotlever.studies import air_scaling
 from hotlever.studies.air_scaling import COLD, GAPS_UM, HOT
-from hotlever.studies.tip_effect import tip_effects
+from hotlever.studies.knee import tip_effects
 
 #: Gaps to the surface (µm) of the quick form.
 _FEW_GAPS_UM = (1.0, 10.0, np.inf)
@@ -25,9 +25,9 @@ _FEW_GAPS_UM = (1.0, 10.0, np.inf)
 
 def disc_section(page: Findings) -> None:
     """A disc between two planes, from near to far (Fig. 8)."""
-    loss = disc.loss_between_planes()
+    loss = air_scaling.loss_between_planes()
     page.draw("disc", figures.disc_between_planes(loss))
-    far = disc.loss_between_planes(1e3).loss.item()
+    far = air_scaling.loss_between_planes(1e3).loss.item()
     page.claim("disc_far", holds=abs(far - 4.0) < 0.1, far=far)
     nearest = loss.isel(distance=0)
     near = (nearest.loss / nearest.near).item()

@@ -9,11 +9,13 @@ import xarray as xr
 
 from hotlever import figures
 from hotlever import spieser2017 as paper
+from hotlever.estimation import fit
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe.priors import default_priors
 from hotlever.report.reproduce.findings import Findings, example
 from hotlever.report.reproduce.vacuum import published_biases
+from hotlever.studies.knee import described_without
 from hotlever.studies.linear_branch import (
     SPAN_K,
     WITHIN_K,
@@ -32,7 +34,6 @@ from hotlever.studies.parameter_consistency import (
 )
 from hotlever.studies.radiation import radiated_heat, sheet_emissivities
 from hotlever.studies.simulation_based_calibration import NOISE, RAMAN
-from hotlever.studies.thermoelectric_fit import described_without, fits_with_and_without
 from hotlever.studies.thermoelectric_shift import of_p_silicon, shift_by_heat
 from hotlever.studies.thermoelectric_strip import self_heated
 
@@ -223,7 +224,11 @@ def _turn(strip: xr.Dataset) -> float:
 
 def prediction_section(page: Findings) -> None:
     """What a fit gains by thermoelectricity."""
-    fits = fits_with_and_without(example("lever-a.csv"), page.lever.probe)
+    probe = page.lever.probe
+    fits = {
+        with_it: fit(example("lever-a.csv"), probe.with_physics(effects))
+        for with_it, effects in ((False, ()), (True, ("thermoelectric",)))
+    }
     rms = {with_it: result.residual_rms for with_it, result in fits.items()}
     values = {
         with_it: np.array([result.parameters[name].value for name in PARAMETERS])
@@ -243,5 +248,5 @@ def prediction_section(page: Findings) -> None:
         with_it=rms[True],
         symbol=list(PARAMETERS.values())[moved.argmax()].symbol,
         moved=moved.max(),
-        off=described_without(page.lever.probe).off_K.max(),
+        off=described_without(probe).off_K.max(),
     )

@@ -16,8 +16,13 @@ from hotlever.materials import PARAMETERS, PUBLISHED
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import MeshOptions
 from hotlever.report.reproduce.findings import MANY, Findings
-from hotlever.studies.knee_discrepancy import IN_AIR, TOGETHER, compare_suspects
-from hotlever.studies.knee_reasons import reasons_of_the_knee, steps_to_the_knee
+from hotlever.studies.knee import (
+    IN_AIR,
+    TOGETHER,
+    compare_suspects,
+    reasons_of_the_knee,
+    steps_to_the_knee,
+)
 from hotlever.text import value_with_error
 
 #: Headings of the six parameters, in units of their scale.

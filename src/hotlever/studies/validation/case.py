@@ -8,8 +8,6 @@ are uncertain. The prediction is written down before the published number is.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 from typing import Any, Self
@@ -121,20 +119,14 @@ class Case(Record):
         return values, priors
 
 
-@contextmanager
-def _folder() -> Iterator[Path]:
-    with resources.as_file(resources.files(__package__)) as folder:
-        yield folder
-
-
 def cases() -> list[Case]:
     """Return the cases of the package, by name."""
-    with _folder() as folder:
+    with resources.as_file(resources.files(__package__)) as folder:
         return [Case.from_file(path) for path in sorted((folder / "cases").glob("*.toml"))]
 
 
 def sought() -> list[list[str]]:
     """Return the sources that were sought, what was wanted of each, and why it is no case."""
-    with _folder() as folder:
+    with resources.as_file(resources.files(__package__)) as folder:
         entries = read_sections(folder / "sought.toml")
     return [[name, entry["wanted"], entry["found"]] for name, entry in entries.items()]

@@ -1,0 +1,391 @@
+"""The knee of a lever: why it is not at the inversion temperature, and what it is off by.
+
+The paper (discussion of its Fig. 6) gives two reasons why its knee is not at T_i: the resistance of
+the legs rises with the temperature, and the doping of the heater is not uniform. Levers without the
+one, the other or both show what each accounts for. Two more remain without either: only the middle
+of the heater is as hot as the tip; and dV_l/dI_h = 0 is not dR_l/dT = 0, because with V² = P R the
+voltage still rises where the resistance is highest.
+
+The paper fits a model to a lever and predicts the temperature at its knee; the measured one is 50 K
+higher. Each suspect is a lever that has one thing more than the model, measured as the paper did:
+currents, reader voltages and tip temperatures of a bias ramp. The model is fitted to that, and what
+the knee is read to be above what the fit predicts is what the suspect carries; beside it stands
+what it would carry were the model not fitted. What is not known moves a prediction either way: such
+uncertainties are standard deviations, added in quadrature.
+
+Of a tip on the heater, which the paper suspects, three things are told apart: how it moves the knee
+of the same lever, how it moves the temperature at the same power, and by how much a tipless model
+*fitted* to a lever with a tip misses its knee. A tip conducts heat away from the middle of the
+heater, and in air its surface gives heat to the air; what the latter does by itself is told too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+
+from hotlever import spieser2017 as paper
+from hotlever.datasets import labelled
+from hotlever.errors import ComputationError
+from hotlever.estimation import Fit, Measurement, fit
+from hotlever.lever import Branch, Lever, OperatingPoint
+from hotlever.lever.lever import COARSE
+from hotlever.materials.silicon import inversion_temperature
+from hotlever.probe import Probe, Tip
+from hotlever.probe.parameters import nuisances, parameters_of
+from hotlever.raman.calibration import published_raman_calibration
+from hotlever.steps import each
+from hotlever.types import Array, Progress
+
+#: Diffusion length (µm) of a heater with uniform doping: far below the mesh size.
+_NO_DIFFUSION = 1e-3
+#: Leg resistivity, as a share of the true one, of legs without resistance.
+_NO_RESISTANCE = 1e-3
+#: Tip temperatures (K) over which the highest resistance is looked for, and their number.
+_COLDEST, _POINTS = 400.0, 400
+#: Plausible tips of lithography probes, cones: height (µm) and half-angle (degrees).
+SIZES = ((0.5, 15.0), (0.5, 30.0), (0.7, 20.0), (1.0, 15.0), (1.0, 30.0))
+#: Tips of other scanning probes, as slender as they must be to stand on the reference heater.
+TALL = ((2.0, 15.0), (3.0, 10.0), (5.0, 8.0))
+#: A tip of the usual size of lithography probes.
+TIP = Tip(height_um=0.7, half_angle_deg=20.0)
+#: A change by which derivatives of the knee are differenced, in standard errors.
+_STEP = 0.5
+#: What is read by a line and is curved, what has a tip, and what counts beyond the paper.
+RAMAN, IN_VACUUM, IN_AIR = "curved Raman law", "tip", "tip with its surface in air"
+TOWARDS, AWAY = "thermoelectricity, current to the bridge", "thermoelectricity, current from it"
+RADIATION, TOGETHER = "radiation", "all together"
+SUSPECTS = (RAMAN, IN_VACUUM, IN_AIR, TOWARDS, AWAY, RADIATION, TOGETHER)
+LAYOUT, COVARIANCE = "layout", "covariance of the fit"
+
+
+def knee_of(branch: Branch, which: str = "the lever") -> OperatingPoint:
+    """Return the knee of a branch.
+
+    Raises
+    ------
+    ComputationError
+        If it has none, saying of which lever.
+    """
+    if branch.knee is None:
+        raise ComputationError(f"{which} has no knee below {branch.hottest_K:.0f} K")
+    return branch.knee
+
+
+def knee_K(probe: Probe) -> float:
+    """Return the tip temperature at a probe's knee (K).
+
+    Raises
+    ------
+    ComputationError
+        If it has none.
+    """
+    return knee_of(Lever(probe).branch()).tip_K
+
+
+# --- why it is not at the inversion temperature ---------------------------------------------------
+
+
+def reasons_of_the_knee(lever: Lever) -> xr.Dataset:
+    """Solve the lever without leg resistance, without dopant diffusion, and without both.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``knee_K`` and ``resistance_K``, the tip temperatures at which V_l and R_l are highest, on
+        the dimension ``lever`` (``as it is``, ``no leg resistance``, ``uniform doping``,
+        ``neither``); the inversion temperature T_i of the heater's doping as the attribute
+        ``inversion_K``.
+
+    Raises
+    ------
+    ComputationError
+        If one of them has no knee.
+    """
+    material = lever.probe.material
+    ideal_legs = {"a0": _NO_RESISTANCE * material.a0, "a1": _NO_RESISTANCE * material.a1}
+    uniform = {"delta": _NO_DIFFUSION}
+    levers = {"as it is": {}, "no leg resistance": ideal_legs, "uniform doping": uniform}
+    levers["neither"] = ideal_legs | uniform
+    # none of these materials is possible, so none is checked
+    maxima = [
+        _highest(lever.with_material(material.model_copy(update=changes)).branch(), name)
+        for name, changes in levers.items()
+    ]
+    knee, resistance = zip(*maxima, strict=True)
+    return labelled(
+        {"knee_K": list(knee), "resistance_K": list(resistance)},
+        "lever",
+        {"lever": list(levers)},
+        inversion_K=float(inversion_temperature(material.n_d, material.p)),
+    )
+
+
+def steps_to_the_knee(reasons: xr.Dataset) -> list[tuple[str, float]]:
+    """Return the way from the inversion temperature to the knee: reason and kelvins."""
+    knee = dict(zip(reasons.lever.values, reasons.knee_K.values.tolist(), strict=True))
+    resistance = reasons.resistance_K.sel(lever="neither").item()
+    return [
+        ("the heater's ends are colder than its middle", resistance - reasons.inversion_K),
+        ("the voltage is highest above where the resistance is", knee["neither"] - resistance),
+        ("the doping is not uniform", knee["no leg resistance"] - knee["neither"]),
+        ("the legs have a resistance", knee["as it is"] - knee["no leg resistance"]),
+    ]
+
+
+def _highest(branch: Branch, name: str) -> tuple[float, float]:
+    """Tip temperatures (K) at the knee and at the first maximum of the resistance."""
+    tip = np.linspace(_COLDEST, branch.hottest_K, _POINTS)
+    curve = CubicSpline(tip, branch.lever_voltage(tip) / branch.current(tip))
+    roots = curve.derivative().roots(extrapolate=False)
+    maxima = roots[curve(roots, 2) < 0]
+    if not maxima.size:
+        raise ComputationError(f"the lever ({name}) has no knee below {branch.hottest_K:.0f} K")
+    return knee_of(branch, f"the lever ({name})").tip_K, float(maxima[0])
+
+
+# --- what a tip changes ---------------------------------------------------------------------------
+
+
+def tip_effects(probe: Probe, sizes: Sequence[tuple[float, float]] = SIZES) -> xr.Dataset:
+    """Compute what tips change on a lever, in the flat model and the probe's medium.
+
+    Parameters
+    ----------
+    probe : Probe
+        Without a tip.
+    sizes : sequence of (float, float)
+        Height (µm) and half-angle (degrees) of each tip.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimension ``tip`` its ``height_um`` and ``half_angle_deg``; ``knee_K`` and
+        ``knee_V``; how far the tip has ``moved_K`` and ``moved_V`` the knee; ``at_power_K``, the
+        largest change of the tip temperature at the same power. Of these three the parts
+        ``surface_moved_K``, ``surface_moved_V`` and ``surface_at_power_K`` that the tip's surface
+        has in air: against a tip that conducts only, zero in vacuum. ``fitted_knee_K`` of a tipless
+        lever fitted to the one with the tip, and ``missed_K``, how far the knee lies above it. The
+        knee without a tip as the attributes ``without_K`` and ``without_V``.
+
+    Raises
+    ------
+    ComputationError
+        If one of the levers has no knee.
+    """
+    bare = Lever(probe).branch()
+    without = knee_of(bare)
+    rows = []
+    for height, angle in sizes:
+        tip = Tip(height_um=height, half_angle_deg=angle, in_air=True)
+        lever = Lever(probe.model_copy(update={"tip": tip}))
+        data = Measurement.of_sweep(lever.sweep(paper.RAMP))
+        hottest, branch = float(data.tip_K.max()), lever.branch()
+        conducting = branch
+        if lever.medium == "air":
+            conducts = tip.model_copy(update={"in_air": False})
+            conducting = Lever(probe.model_copy(update={"tip": conducts})).branch()
+        fitted_K = knee_K(fit(data, probe).probe)
+        knee, by_conduction = knee_of(branch), knee_of(conducting)
+        rows.append(
+            {
+                "height_um": height,
+                "half_angle_deg": angle,
+                "knee_K": knee.tip_K,
+                "knee_V": knee.lever_V,
+                "moved_K": knee.tip_K - without.tip_K,
+                "moved_V": knee.lever_V - without.lever_V,
+                "at_power_K": _at_same_power(bare, branch, hottest),
+                "surface_moved_K": knee.tip_K - by_conduction.tip_K,
+                "surface_moved_V": knee.lever_V - by_conduction.lever_V,
+                "surface_at_power_K": _at_same_power(conducting, branch, hottest),
+                "fitted_knee_K": fitted_K,
+                "missed_K": knee.tip_K - fitted_K,
+            }
+        )
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
+    return labelled(columns, "tip", without_K=without.tip_K, without_V=without.lever_V)
+
+
+def _at_same_power(without: Branch, with_tip: Branch, hottest_K: float) -> float:
+    """Largest change of the tip temperature at the same power (K), with its sign."""
+    if with_tip is without:
+        return 0.0  # not what curves are off by
+    tip = np.linspace(without.base_temperature_K, hottest_K, 200)
+    change = tip - without.tip_temperature(with_tip.power(tip))
+    return float(change[np.nanargmax(np.abs(change))])
+
+
+# --- what remains of the 50 K ---------------------------------------------------------------------
+
+
+def read_by_the_line(tip_K: ArrayLike) -> Array:
+    """Return what the published line reads (K) where silicon's phonons soften anharmonically.
+
+    The paper calibrated the line up to 900 K; the anharmonic law has Balkanski's constants.
+    """
+    law = published_raman_calibration()
+    shift, _ = law.anharmonic.shift(np.asarray(tip_K, dtype=float), law.room_temperature_K)
+    return np.asarray(law.linear.temperature(shift, law.room_temperature_K))
+
+
+def suspect_lever(probe: Probe, suspect: str) -> tuple[Probe, bool]:
+    """Return a probe with what a suspect has beyond the paper's model, and if a line reads it."""
+    everything = suspect == TOGETHER
+    if suspect == IN_VACUUM or everything:
+        probe = probe.model_copy(update={"tip": TIP})
+    if suspect == IN_AIR or (everything and probe.surroundings.medium == "air"):
+        probe = probe.model_copy(update={"tip": TIP.with_(in_air=True)})
+    effects = ["thermoelectric"] if suspect in (TOWARDS, AWAY, TOGETHER) else []
+    effects += ["radiation"] if suspect in (RADIATION, TOGETHER) else []
+    return probe.with_physics(effects), suspect in (RAMAN, TOGETHER)
+
+
+def carried_by(probe: Probe, suspect: str, own_K: float | None = None) -> tuple[float, float]:
+    """Return how far the knee of a suspect's lever is read above two predictions (K).
+
+    That of the model with the lever's own parameters, which may be given where it is known, and
+    that of the model fitted to it.
+
+    Raises
+    ------
+    ComputationError
+        If one of the levers has no knee.
+    """
+    true, by_line = suspect_lever(probe, suspect)
+    lever, away = Lever(true), suspect == AWAY
+    data = Measurement.of_sweep(ramp_of(lever, -1 if away else 1))
+    branch = lever.branch_to(0.0, lowest=-paper.RAMP[-1]).mirrored if away else lever.branch()
+    shown = knee_of(branch, f"the lever ({suspect})").tip_K
+    if by_line:
+        data = replace(data, tip_K=read_by_the_line(data.tip_K))
+        shown = float(read_by_the_line(shown))
+    fitted = fit(data, probe).probe
+    own_K = knee_K(probe) if own_K is None else own_K
+    return shown - own_K, shown - knee_K(fitted)
+
+
+def ramp_of(lever: Lever, polarity: int) -> xr.Dataset:
+    """Return the paper's ramp of a lever as an instrument shows it that is wired either way round.
+
+    With −1 the current flows the other way, and all that is shown is positive.
+    """
+    sweep = lever.sweep([polarity * bias for bias in paper.RAMP])
+    for name in ("bias_V", "lever_V", "current_mA", "reader_V"):
+        sweep[name] = polarity * sweep[name]
+    return sweep
+
+
+def described_without(probe: Probe) -> xr.Dataset:
+    """Fit a model without thermoelectricity to a lever that has it, without noise.
+
+    Parameters
+    ----------
+    probe : Probe
+        Whether it has thermoelectricity does not matter.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimension ``polarity``: root mean squares of what the fit leaves,
+        ``rms_current_mA``, ``rms_reader_V`` and ``rms_tip_K``; and ``off_K``, the largest
+        difference of a tip temperature from the fitted one.
+    """
+    lever, plain = Lever(probe.with_physics(("thermoelectric",))), probe.with_physics(())
+    polarities, rows = (1, -1), []
+    for polarity in polarities:
+        sweep = ramp_of(lever, polarity)
+        result = fit(Measurement.of_sweep(sweep), plain)
+        off = abs(result.band.tip_K.values - sweep.tip_K.values)
+        rms = {f"rms_{name}": value for name, value in result.residual_rms.items()}
+        rows.append({**rms, "off_K": float(off.max())})
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
+    return labelled(columns, "polarity", {"polarity": list(polarities)})
+
+
+def by_layout(probe: Probe, progress: Progress | None = None) -> float:
+    """Return the standard deviation (K) of what a fit predicts, by dimensions that are not known.
+
+    Each is off by the standard deviation of its usual prior in the model that is fitted.
+    """
+    data, true, off = Measurement.of_sweep(Lever(probe).sweep(paper.RAMP)), knee_K(probe), []
+    parameters = parameters_of(probe)
+    for name in each(nuisances(probe), progress):
+        value, spread = float(probe.values([name])[0]), parameters[name].spread or 0.0
+        moved = probe.replace({name: value * (1.0 + spread)})
+        off.append(knee_K(fit(data, moved).probe) - true)
+    return float(np.linalg.norm(off))
+
+
+def by_covariance(result: Fit) -> float:
+    """Return the standard error (K) of the knee that a fit predicts, by its covariance."""
+    errors = {name: result.parameters[name].stderr or 0.0 for name in result.names}
+
+    def knee(**changes: float) -> float:
+        branch = Lever(result.probe.with_(**changes), COARSE).branch()
+        return float("nan") if branch.knee is None else branch.knee.tip_K
+
+    slopes = []
+    for name, error in errors.items():
+        value = result.parameters[name].value
+        ends = [knee(**{name: value + way * _STEP * error}) for way in (1.0, -1.0)]
+        slopes.append((ends[0] - ends[1]) / (2.0 * _STEP))
+    return float(np.sqrt(np.array(slopes) @ result.correlation @ slopes))
+
+
+def compare_suspects(
+    probe: Probe, example: Fit, *, layout: bool = True, progress: Progress | None = None
+) -> xr.Dataset:
+    """Compute what each suspect carries of the knee's discrepancy, in one medium.
+
+    Parameters
+    ----------
+    probe : Probe
+        In vacuum or in air.
+    example : Fit
+        Of a measurement with noise as the paper's, for the covariance.
+    layout : bool
+        Whether the uncertain layout is computed, a fit for each dimension.
+    progress : callable, optional
+        Called with the steps done and their number.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``moved_K`` and ``shift_K`` on the dimension ``suspect``, see `carried_by`; NaN where one
+        does not count in the medium;
+        ``stderr_K`` on ``uncertainty``; the published ``discrepancy_K``, the sum of the suspects
+        with the current to the bridge, and what is ``left_K`` after all together, as attributes.
+
+    Raises
+    ------
+    ComputationError
+        If a lever has no knee, or a fit does not come to an end.
+    """
+    shifts, own_K = [], knee_K(probe)
+    for suspect in each(SUSPECTS, progress):
+        counts = suspect != IN_AIR or probe.surroundings.medium == "air"
+        shifts.append(carried_by(probe, suspect, own_K) if counts else (np.nan, np.nan))
+    own, fitted = np.transpose(shifts)
+    errors = {COVARIANCE: by_covariance(example)}
+    if layout:
+        errors[LAYOUT] = by_layout(probe, progress)
+    stderr = list(errors.values())
+    return labelled(
+        {
+            "moved_K": ("suspect", own, {"units": "K", "long_name": "above the model's knee"}),
+            "shift_K": ("suspect", fitted, {"units": "K", "long_name": "above the fit's knee"}),
+            "stderr_K": ("uncertainty", stderr, {"units": "K", "long_name": "standard error"}),
+        },
+        "suspect",
+        {"suspect": list(SUSPECTS), "uncertainty": list(errors)},
+        medium=probe.surroundings.medium,
+        discrepancy_K=paper.KNEE_OFF_K,
+        left_K=paper.KNEE_OFF_K - float(fitted[-1]),
+        total_stderr_K=float(np.linalg.norm(stderr)),
+    )
