@@ -78,11 +78,14 @@ def data_and_model(
     with figure(size, 4.6, 2, len(panels), sharex=True, height_ratios=heights) as (made, grid):
         for (upper, lower), (name, column) in zip(grid.T, panels.items(), strict=True):
             seen = column in measured and measured[column].notnull().any()
+            complete = model.dropna(along, subset=[column])
             if band is not None and name == "tip":
-                _tip_in_time(upper, band)
-            else:
-                complete = model.dropna(along, subset=[column])
-                curve(upper, complete, along, column, color=BLUE, label="model")
+                complete = band
+                if _stated(band):
+                    width = BAND * band.tip_stderr_K
+                    low, high = band.tip_K - width, band.tip_K + width
+                    upper.fill_between(band.time, low, high, color=SKY, label="95 %")
+            curve(upper, complete, along, column, color=BLUE, label="model")
             if seen:
                 points = {**MEASURED, "ms": 2.5, "zorder": 1} if in_time else MEASURED
                 curve(upper, measured, along, column, **points)
@@ -102,16 +105,6 @@ def data_and_model(
         for axes in {grid[0, 0], grid[0, 0 if band is None else list(panels).index("tip")]}:
             axes.legend(loc="best")
     return made
-
-
-def _tip_in_time(axes: Axes, band: xr.Dataset) -> None:
-    """Draw the tip temperature that a fit predicts, with its band."""
-    if _stated(band):
-        width = BAND * band.tip_stderr_K
-        axes.fill_between(
-            band.time, band.tip_K - width, band.tip_K + width, color=SKY, label="95 %"
-        )
-    curve(axes, band, "time", "tip_K", color=BLUE, label="model")
 
 
 def _differences(axes: Axes, measured: xr.Dataset, model: xr.Dataset, name: str) -> None:

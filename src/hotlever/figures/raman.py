@@ -20,7 +20,8 @@ from hotlever.studies.raman_check import conclusion
 from hotlever.types import Array
 
 GREY = "0.4"
-STACKED = 9
+#: Spectra above each other at most, and characters of the name of one.
+STACKED, _LONGEST = 9, 22
 #: Scaled intensity at which a line is cut off, as a cosmic ray would hide the next spectrum.
 _HIGHEST = 1.25
 #: The paper's error of a temperature.
@@ -46,20 +47,18 @@ def thermometry(
     series : sequence of Line
         The hot-plate spectra, to be stacked in place of `lines`.
     """
-    names = [str(name) for name in table.file.values]
     used = np.array([line.used for line in lines], dtype=bool)
-    names = [name for name, kept in zip(names, used, strict=True) if kept]
     lines, table = [line for line in lines if line.used], table.isel(spectrum=used)
+    names = list(map(str, table.file.values))
     if calibration is None:
         with figure(4.2, 5.4) as (made, axes):
             _stack(axes, list(zip(names, lines, strict=True)))
         return made
     if series:
         stated = {point.file: point.temperature_K for point in calibration.points}
-        with_temperature = [line for line in series if line.spectrum.name in stated]
-        heated = [(stated[line.spectrum.name], line) for line in with_temperature]
-        heated.sort(key=lambda pair: pair[0])
-        stacked = [(f"{temperature:.0f} K", line) for temperature, line in heated]
+        heated = [line for line in series if line.spectrum.name in stated]
+        heated.sort(key=lambda line: stated[line.spectrum.name])
+        stacked = [(f"{stated[line.spectrum.name]:.0f} K", line) for line in heated]
     else:
         read = zip(names, table.temperature_K.values, lines, strict=True)
         stacked = [(f"{t:.0f} K" if np.isfinite(t) else name, line) for name, t, line in read]
@@ -100,18 +99,14 @@ def _stack(axes: Axes, stacked: Sequence[tuple[str, Line]]) -> None:
             fine = np.linspace(x[0], x[-1], 1200)
             curve = np.clip((peak.model(fine) - peak.baseline(fine)) / top, None, _HIGHEST)
             axes.plot(fine, level + 0.75 * curve, color=BLUE, lw=1.0)
-        axes.text(WINDOW[1] - 1.0, level + 0.12, _short(label), ha="right", va="bottom", fontsize=8)
+        if len(label) > _LONGEST:
+            label = f"{label[: _LONGEST // 2 - 1]}…{label[-_LONGEST // 2 :]}"
+        axes.text(WINDOW[1] - 1.0, level + 0.12, label, ha="right", va="bottom", fontsize=8)
     axes.set(xlabel="Raman shift (cm⁻¹)", ylabel="intensity less background, scaled", yticks=[])
     axes.set(xlim=WINDOW, ylim=(-0.15, len(stacked) + 0.25))
     axes.plot([], [], ".", color=GREY, label="counts")
     axes.plot([], [], color=BLUE, label="fit")
     axes.legend(loc="upper left")
-
-
-def _short(label: str, limit: int = 22) -> str:
-    if len(label) <= limit:
-        return label
-    return f"{label[: limit // 2 - 1]}…{label[-limit // 2 :]}"
 
 
 def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -> None:

@@ -40,7 +40,7 @@ def fit_page(
         f"{', '.join(fit.observables)}.",
         added,
     )
-    (_add_fit_in_time if fit.in_time else add_fit)(page, fit)
+    add_fit(page, fit)
     if uncertainty is not None:
         _add_uncertainty(page, uncertainty)
     return page
@@ -48,7 +48,21 @@ def fit_page(
 
 def add_fit(page: Page, fit: Fit) -> None:
     """Add tables and figures of a fit to a page."""
-    _add_words(page, fit)
+    if not fit.describes_data:
+        page.sentences(fit.doubt, NEAREST)
+    page.table(
+        ("parameter", "value", "unit", ""),
+        parameter_rows(fit),
+        "Material parameters; standard errors in units of the last digits."
+        if fit.describes_data
+        else "Material parameters of the nearest lever.",
+    )
+    page.sentences(*fit.notes)
+    page.text(f"{'; '.join(conclusions(fit))}.")
+    (_draw_in_time if fit.in_time else _draw_at_rest)(page, fit)
+
+
+def _draw_at_rest(page: Page, fit: Fit) -> None:
     measured = fit.measurement.dataset(fit.probe.circuit)
     # solved once for both
     lever = Lever(fit.probe)
@@ -86,20 +100,6 @@ def add_fit(page: Page, fit: Fit) -> None:
     )
 
 
-def _add_words(page: Page, fit: Fit) -> None:
-    if not fit.describes_data:
-        page.sentences(fit.doubt, NEAREST)
-    page.table(
-        ("parameter", "value", "unit", ""),
-        parameter_rows(fit),
-        "Material parameters; standard errors in units of the last digits."
-        if fit.describes_data
-        else "Material parameters of the nearest lever.",
-    )
-    page.sentences(*fit.notes)
-    page.text(f"{'; '.join(conclusions(fit))}.")
-
-
 def _add_correlation(page: Page, fit: Fit) -> None:
     if len(fit.names) < 2 or not fit.describes_data:
         return
@@ -110,8 +110,7 @@ def _add_correlation(page: Page, fit: Fit) -> None:
     )
 
 
-def _add_fit_in_time(page: Page, fit: Fit) -> None:
-    _add_words(page, fit)
+def _draw_in_time(page: Page, fit: Fit) -> None:
     measured = fit.measurement.dataset(fit.probe.circuit)
     page.figure(
         "fit_in_time",

@@ -190,13 +190,10 @@ def _bases(page: Page, every: Sequence[Case]) -> None:
 
 def _calibrated(changes: dict[str, Any]) -> Calibration:
     """Calibrate the one real I-V curve of the examples, with a lever that is other than assumed."""
-    folder = resources.files("hotlever") / "examples"
-    with (
-        resources.as_file(folder / f"{_CURVE}.csv") as data,
-        resources.as_file(folder / f"{_CURVE}.toml") as path,
-    ):
-        probe = Probe.from_file(path)
-        return calibrate(data, probe=probe.with_(**changes) if changes else probe)
+    with resources.as_file(resources.files("hotlever") / "examples") as folder:
+        probe = Probe.from_file(folder / f"{_CURVE}.toml")
+        other = probe.with_(**changes) if changes else probe
+        return calibrate(folder / f"{_CURVE}.csv", probe=other)
 
 
 def _real_curve(page: Page, calibrations: Sequence[Calibration]) -> None:

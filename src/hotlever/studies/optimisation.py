@@ -79,14 +79,10 @@ class Optimum:
     designs: int
     reason: str
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The numbers that were varied."""
-        return tuple(name for name in self.bounds if name not in QUANTITIES)
-
     def values(self, solved: SolvedDesign) -> dict[str, float]:
         """Return the numbers that were varied, and all quantities, of one of both designs."""
-        varied = dict(zip(self.names, solved.probe.values(self.names).tolist(), strict=True))
+        names = [name for name in self.bounds if name not in QUANTITIES]
+        varied = dict(zip(names, solved.probe.values(names).tolist(), strict=True))
         return varied | {quantity: solved.value(quantity) for quantity in QUANTITIES}
 
 
@@ -133,13 +129,12 @@ def optimise(
     probe.circuit.need_cold_start("a study of a design")
     _check(probe, quantity, bounds)
     search = _Search(probe, quantity, point, bounds, greatest, progress)
-    start = np.clip(search.share(probe.values(search.names)), 0.0, 1.0)
-    search.solved(start)  # whatever is wrong with the first design is an error
+    search.solved(search.start)  # whatever is wrong with the first design is an error
     reason = ""
     try:
         result: Any = minimize(
             search.objective,
-            start,
+            search.start,
             jac=search.objective_by,
             method="SLSQP",
             bounds=[(0.0, 1.0)] * len(search.names),
@@ -154,7 +149,8 @@ def optimise(
             f"no design was found within {_told(search.limited)}; expected wider bounds, or more "
             "numbers that may change"
         )
-    best = search.remade(search.best)
+    improved = search.probe_at(search.best)
+    best = SolvedDesign(SimilarLevers(Lever(improved)), improved, point, search.names)
     limits = search.limits(search.best, best)
     first = SolvedDesign(SimilarLevers(Lever(probe)), probe, point)
     return Optimum(quantity, point, bounds, first, best, limits, search.designs, reason)
@@ -218,7 +214,16 @@ class _Search:
         self.names = tuple(name for name in bounds if name not in QUANTITIES)
         ranges: Any = [bounds[name] for name in self.names]
         self._low, self._high = np.array(ranges, dtype=float).T
+        shares = (probe.values(self.names) - self._low) / (self._high - self._low)
+        self.start = np.clip(shares, 0.0, 1.0)
         self.limited = {name: both for name, both in bounds.items() if name in QUANTITIES}
+        # of what, where, and 1 for the least and −1 for the most
+        self._bounds = [
+            (name, bound, sign)
+            for name, both in self.limited.items()
+            for bound, sign in zip(both, (1.0, -1.0), strict=True)
+            if bound is not None
+        ]
         self._reads_distance = not {quantity, *bounds}.isdisjoint(OF_THE_READER)
         self.accuracy = _ACCURATE_OF_A_READER if self._reads_distance else _ACCURATE
         self.designs, self._scale, self._least = 0, 1.0, np.inf
@@ -226,19 +231,10 @@ class _Search:
         self._similar: SimilarLevers | None = None
         self._last: tuple[Array, SolvedDesign | None] | None = None
 
-    def share(self, values: Array) -> Array:
-        """Return where values of the numbers are in their ranges, (p,)."""
-        return np.asarray((values - self._low) / (self._high - self._low))
-
     def probe_at(self, share: Array) -> Probe:
         """Return the probe of a design."""
         values = self._low + share * (self._high - self._low)
         return self._probe.with_(**dict(zip(self.names, values.tolist(), strict=True)))
-
-    def remade(self, share: Array) -> SolvedDesign:
-        """Return a design solved on a mesh of its own, with what limits it differentiable."""
-        probe = self.probe_at(share)
-        return SolvedDesign(SimilarLevers(Lever(probe)), probe, self._point, self.names)
 
     # --- what the optimiser asks ------------------------------------------------------------------
 
@@ -263,16 +259,6 @@ class _Search:
                 "args": bound,
             }
             for bound in self._bounds
-        ]
-
-    @property
-    def _bounds(self) -> list[tuple[str, float, float]]:
-        """The bounds on quantities: of what, where, and 1 for the least and −1 for the most."""
-        return [
-            (name, bound, sign)
-            for name, both in self.limited.items()
-            for bound, sign in zip(both, (1.0, -1.0), strict=True)
-            if bound is not None
         ]
 
     def _room(self, solved: SolvedDesign | None, name: str, bound: float, sign: float) -> float:
@@ -369,9 +355,8 @@ def optimum_text(optimum: Optimum) -> str:
         "",
         f"{'':<{width}}  {'start':>10}  {'best':>10}",
     ]
-    cells = {
-        name: [f"{values[name]:.4g}" if np.isfinite(values[name]) else "-" for values in both]
-        for both in ((start, best),)
-        for name in start
-    }
-    return "\n".join(lines + [f"{n:<{width}}  {a:>10}  {b:>10}" for n, (a, b) in cells.items()])
+    for name in start:
+        pair = (values[name] for values in (start, best))
+        cells = [f"{value:.4g}" if np.isfinite(value) else "-" for value in pair]
+        lines.append(f"{name:<{width}}  {cells[0]:>10}  {cells[1]:>10}")
+    return "\n".join(lines)

@@ -152,7 +152,10 @@ class Heats:
             By heat and side.
         """
         fields, properties, by_T = self.equations.at(x)
-        S, S_T = _seebeck(properties, by_T)
+        assert properties.beta is not None
+        assert by_T.beta is not None
+        S = properties.beta / properties.sigma
+        S_T = (by_T.beta - S * by_T.sigma) / properties.sigma
         own, own_T = self._own(fields.T)
         D, D_T = S - own, S_T - own_T
         along = dot(current, fields.grad_T)
@@ -177,14 +180,6 @@ class Heats:
         (beta, _), beta_by = self.own.thermoelectric(T, doping, "electron")
         S = beta / sigma
         return S, (beta_by["T"][0] - S * sigma_by["T"]) / sigma
-
-
-def _seebeck(properties: Properties, by_T: Properties) -> tuple[Array, Array]:
-    """Return S (V/K) at the points, and its slope by T."""
-    assert properties.beta is not None
-    assert by_T.beta is not None
-    S = properties.beta / properties.sigma
-    return S, (by_T.beta - S * by_T.sigma) / properties.sigma
 
 
 # --- from no thermoelectricity to all of it -------------------------------------------------------
