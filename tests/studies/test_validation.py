@@ -14,7 +14,6 @@ from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
 from hotlever.studies.validation.case import Case, cases, sought
 from hotlever.studies.validation.prediction import (
-    COLUMNS,
     OUTSIDE,
     Prediction,
     comparison,
@@ -124,8 +123,7 @@ def test_verdicts_are_by_prediction_and_published_error():
 
 def test_table_has_the_columns_that_scripts_read(published):
     some = [published["tsu-raman-shift"], published["illinois-share-on-glass"]]
-    table = comparison(some, [stored(case) for case in some])
-    frame = table.to_dataframe()[list(COLUMNS)]
+    frame = comparison(some).to_dataframe()
     head = ",".join([frame.index.name, *frame.columns])
     assert head == (
         "case,group,quantity,unit,predicted,low_95,high_95,published,published_error,verdict,source"

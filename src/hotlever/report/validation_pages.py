@@ -67,7 +67,7 @@ def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]
     with local_processes(PROCESSORS) as (run, _):
         results = run(operator.call, tasks, progress)
     now, calibrations = results[: len(every)], results[len(every) :]
-    compared = comparison(every, now)
+    compared = comparison(every)
     page = Page("Published numbers, predicted and compared", _summary(compared))
     page.figure(
         "predicted_and_published",

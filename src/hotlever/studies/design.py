@@ -141,7 +141,7 @@ def _number(entry: Any) -> bool:
     return type(entry) in (int, float)
 
 
-def quantities(probe: Probe, power_mW: float, air: bool = True) -> dict[str, float]:
+def quantities(probe: Probe, power_mW: float, air: bool) -> dict[str, float]:
     """Return the `QUANTITIES` of a probe; k is NaN without air, the knee's where there is none.
 
     Parameters

@@ -157,25 +157,25 @@ class Line:
         return cls(float(coefficients[0]), float(coefficients[1]), float(off))
 
 
-def reach(branch: Branch, coldest_K: float, within_K: float = WITHIN_K) -> float:
-    """Return how far (K) above a temperature a line stays so near to the branch."""
+def reach(branch: Branch, coldest_K: float) -> float:
+    """Return how far (K) above a temperature a line stays within `WITHIN_K` of the branch."""
     reached, longest = 0.0, min(branch.hottest_K, HOTTEST) - coldest_K
     for length in [*np.arange(_STEP_K, longest, _STEP_K).tolist(), longest]:
-        if Line.of(branch, coldest_K, coldest_K + length).off_K > within_K:
+        if Line.of(branch, coldest_K, coldest_K + length).off_K > WITHIN_K:
             break
         reached = length
     return reached
 
 
 def linear_branch_study(
-    cases: Mapping[str, Case] | None = None, *, progress: Progress | None = None
+    cases: Mapping[str, Case], *, progress: Progress | None = None
 ) -> xr.Dataset:
     """Fit lines to levers above their knees, and find what their slopes may depend on.
 
     Parameters
     ----------
-    cases : mapping of str to Case, optional
-        By default `all_cases`.
+    cases : mapping of str to Case
+        Of `all_cases`.
     progress : callable, optional
         Called with the levers done and their number.
 
@@ -191,16 +191,16 @@ def linear_branch_study(
         ``knee_share`` and ``end_share``, the heater's of the power. As coordinates ``shape``,
         ``dopant`` and ``changed`` of each `Case`.
     """
-    cases = all_cases() if cases is None else cases
     rows = [_row(case) for case in each(cases.values(), progress)]
     names = max(rows, key=len)
     columns = {name: [row.get(name, np.nan) for row in rows] for name in names}
-    kinds = {
+    coordinates = {
+        "case": list(cases),
         "shape": ("case", [case.shape.shape for case in cases.values()]),
         "dopant": ("case", [case.dopant for case in cases.values()]),
         "changed": ("case", [case.changed for case in cases.values()]),
     }
-    return labelled(columns, "case", {"case": list(cases), **kinds})
+    return labelled(columns, "case", coordinates)
 
 
 def _row(case: Case) -> dict[str, float]:

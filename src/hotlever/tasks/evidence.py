@@ -65,15 +65,14 @@ def validate(reporter: Reporter, request: ValidateRequest) -> None:
         return
     from hotlever.datasets import frame_text
     from hotlever.report.validation_pages import validation_page
-    from hotlever.studies.validation.prediction import COLUMNS
 
     outputs = request.outputs()
     with reporter.progress("validate") as update:
         page, compared = validation_page(update)
     with outputs.together():
         written = page.write(request.output)
-        table = compared.to_dataframe()[list(COLUMNS)]
-        write_text(request.output / "validation.csv", frame_text(table, float_format="%.6g"))
+        table = frame_text(compared.to_dataframe(), float_format="%.6g")
+        write_text(request.output / "validation.csv", table)
     reporter.give(f"{written}\n")
 
 

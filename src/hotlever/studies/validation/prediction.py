@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.stats import norm, qmc
@@ -30,11 +31,6 @@ _MOST_MISSING = 0.25
 #: Verdicts, by the distance of the published number from the median in standard deviations of both.
 _WITHIN = {1.0: "inside 68 %", BAND: "inside 95 %"}
 OUTSIDE = "outside"
-#: Columns of the table, behind the name of the case.
-COLUMNS = (
-    *("group", "quantity", "unit", "predicted", "low_95", "high_95"),
-    *("published", "published_error", "verdict", "source"),
-)
 
 
 @dataclass(frozen=True)
@@ -173,30 +169,35 @@ def predict(case: Case, progress: Progress | None = None) -> Prediction:
     return Prediction.of(values, case.asked.is_share, impossible, missing - impossible)
 
 
-def comparison(cases: list[Case], now: list[Prediction]) -> xr.Dataset:
+def comparison(cases: list[Case]) -> xr.Dataset:
     """Return cases with what was predicted, what is published, and the verdict.
 
     Parameters
     ----------
     cases : list of Case
         Each with a stored prediction and a published value.
-    now : list of Prediction
-        What they predict today.
     """
-    rows: list[tuple[Any, ...]] = []
-    for case, today in zip(cases, now, strict=True):
+    rows = []
+    for case in cases:
         assert case.prediction is not None
         assert case.published is not None
         value, error = case.published.value, case.published.error
         stored = Prediction.as_stored(case.prediction, case.asked.is_share)
+        low, high = stored.band_95
         rows.append(
-            (
-                *(case.group, case.quantity, case.asked.unit, stored.median, *stored.band_95),
-                *(value, error, stored.verdict(value, error), case.source, today.median),
-            )
+            {
+                "case": case.name,
+                "group": case.group,
+                "quantity": case.quantity,
+                "unit": case.asked.unit,
+                "predicted": stored.median,
+                "low_95": low,
+                "high_95": high,
+                "published": value,
+                "published_error": error,
+                "verdict": stored.verdict(value, error),
+                "source": case.source,
+            }
         )
-    columns = zip((*COLUMNS, "predicted_now"), zip(*rows, strict=True), strict=True)
-    return xr.Dataset(
-        {name: ("case", list(column)) for name, column in columns},
-        {"case": [case.name for case in cases]},
-    )
+    compared: xr.Dataset = pd.DataFrame(rows).set_index("case").to_xarray()
+    return compared
