@@ -103,8 +103,8 @@ def _power_law(page: Findings, curve: xr.Dataset) -> None:
     """Compare Eq. 12 with the computed characteristic, as published and fitted again."""
     difference = np.abs(curve.tip_K - EQ12.tip_temperature(curve.power_mW))
     below = difference.where(curve.power_mW <= _WELL_COVERED_MW).max().item()
-    away = difference.values
-    rows = [("published", *_coefficients(EQ12), f"{below:.0f}", f"{away[-1]:.0f}")]
+    last = difference.values[-1]
+    rows = [("published", *_coefficients(EQ12), f"{below:.0f}", f"{last:.0f}")]
     for name, continuous in (("fitted", False), ("fitted, continuous", True)):
         refit = fit_power_law(curve.power_mW, curve.tip_K, continuous=continuous)
         cold = refit.largest_residual_K(to_mW=_WELL_COVERED_MW)
@@ -114,7 +114,7 @@ def _power_law(page: Findings, curve: xr.Dataset) -> None:
     columns += [f"residual to {_WELL_COVERED_MW} mW (K)", "above (K)"]
     page.tabulate("power_law", columns, rows)
     most, spread = difference.max().item(), paper.POWER_LAW_SPREAD_K
-    found: Any = {"most": most, "below": below, "away": away, "hottest": curve.isel(bias=-1)}
+    found: Any = {"most": most, "below": below, "last": last, "hottest": curve.isel(bias=-1)}
     page.claim("power_law", holds=most < spread, covered=_WELL_COVERED_MW, **found)
     page.claim("two_branches", holds=abs(EQ12.jump_K) < spread, law=EQ12)
 
