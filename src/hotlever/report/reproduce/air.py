@@ -112,10 +112,14 @@ def geometry_section(page: Findings) -> None:
     page.say("geometry", case=steadiest, growth=study.unevenness.sel(case=steadiest))
 
 
-def _columns_of_k(study: xr.Dataset) -> dict[str, tuple[xr.DataArray, str]]:
+def _columns_of_k(
+    study: xr.Dataset, growth: xr.DataArray | None = None
+) -> dict[str, tuple[xr.DataArray, str]]:
     """Return what a table shows of k, by heading, and how numbers are written."""
+    at = {f"k at {tip:.0f} K": (study.k.interp(tip_K=tip), ".3f") for tip in (COLD, HOT)}
     return {
-        **{f"k at {tip:.0f} K": (study.k.interp(tip_K=tip), ".3f") for tip in (COLD, HOT)},
+        **at,
+        **({} if growth is None else {"growth of k": (growth, ".0%")}),
         "growth of k − 1": (study.unevenness, ".2f"),
         "best single k": (study.best_k, ".3f"),
         "error it leaves (K)": (study.best_error_K, ".0f"),
@@ -130,8 +134,8 @@ def one_sided_section(page: Findings) -> None:
     curves = {name: study.k.isel(gap_um=number) for number, name in enumerate(names)}
     page.draw("one_sided", figures.scale_factor(curves, paper.K_IN_AIR))
     growth = study.k.max("tip_K") / study.k.min("tip_K") - 1.0
-    gaps = {"gap": (study.gap_um.copy(data=names), ""), "growth of k": (growth, ".0%")}
-    page.columns("one_sided", gaps | _columns_of_k(study), HOT=HOT)
+    gaps = {"gap": (study.gap_um.copy(data=names), "")}
+    page.columns("one_sided", gaps | _columns_of_k(study, growth), HOT=HOT)
     near, free = growth.where(np.isfinite(study.gap_um)), study.sel(gap_um=np.inf)
     worst, error = near.idxmax("gap_um").item(), study.best_error_K.max().item()
     near_growth = study.unevenness.sel(gap_um=worst)
