@@ -185,8 +185,8 @@ def shift_section(page: Findings) -> None:
     moved, at_bias = abs(n_type.moved_nm).max("polarity"), n_type.bias[0]
     at_points = n_type.sel(bias=points, method="nearest")
     largest = abs(at_points.moved_nm).max().item()
-    found: Any = {"largest": largest, "cold": moved[0], "bias": at_bias}
-    page.claim("thermoelectric_size", holds=largest < paper.SHIFT_NM, **found)
+    numbers: Any = {"largest": largest, "cold": moved[0], "bias": at_bias}
+    page.claim("thermoelectric_size", holds=largest < paper.SHIFT_NM, **numbers)
     thomson = at_points.share_nm.sel(heat="Thomson").sum("side")
     silicon = page.lever.probe.heater_silicon
     assert silicon is not None

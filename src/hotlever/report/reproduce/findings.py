@@ -69,38 +69,38 @@ class Findings(Page):
         """Option III on the virtual lab's first lever."""
         return fit(example("lever-a.csv"), self.lever.probe)
 
-    def say(self, name: str, /, **found: Any) -> None:
+    def say(self, name: str, /, **numbers: Any) -> None:
         """Add the paragraph of a name."""
-        self.text(_filled(_TEXTS["paragraphs"][name], found))
+        self.text(_filled(_TEXTS["paragraphs"][name], numbers))
 
-    def draw(self, name: str, figure: Figure, /, file: str = "", **found: Any) -> None:
+    def draw(self, name: str, figure: Figure, /, file: str = "", **numbers: Any) -> None:
         """Add a figure with the caption of its name, which is that of its file by default."""
-        self.figure(file or name, figure, _filled(_TEXTS["figures"][name], found))
+        self.figure(file or name, figure, _filled(_TEXTS["figures"][name], numbers))
 
     def tabulate(
-        self, name: str, columns: Sequence[str], rows: Sequence[Sequence[str]], /, **found: Any
+        self, name: str, columns: Sequence[str], rows: Sequence[Sequence[str]], /, **numbers: Any
     ) -> None:
         """Add a table with the caption of its name."""
-        self.table(columns, rows, _filled(_TEXTS["tables"][name], found))
+        self.table(columns, rows, _filled(_TEXTS["tables"][name], numbers))
 
     def columns(
-        self, name: str, columns: Mapping[str, tuple[xr.DataArray, str]], /, **found: Any
+        self, name: str, columns: Mapping[str, tuple[xr.DataArray, str]], /, **numbers: Any
     ) -> None:
         """Add a table of some values and their format by heading."""
         cells = [[f"{value:{form}}" for value in data.values] for data, form in columns.values()]
-        self.tabulate(name, list(columns), list(zip(*cells, strict=True)), **found)
+        self.tabulate(name, list(columns), list(zip(*cells, strict=True)), **numbers)
 
-    def claim(self, name: str, /, *, holds: bool, **found: Any) -> None:
+    def claim(self, name: str, /, *, holds: bool, **numbers: Any) -> None:
         """Add the claim of a name, and whether it holds in this run."""
         claim = {"holds": "holds", **_TEXTS["claims"][name]}
-        text = {key: _filled(words, found) for key, words in claim.items()}
+        text = {key: _filled(words, numbers) for key, words in claim.items()}
         verdict = text["holds"] if holds else f"does not hold here, because {text['fails']}"
         self.claims.append((self.linked(text["where"]), text["claim"], verdict, text["ours"]))
 
 
-def _filled(words: str, found: Mapping[str, Any]) -> str:
+def _filled(words: str, numbers: Mapping[str, Any]) -> str:
     """Return a text with what was found, and what the paper has, in its braces."""
-    return words.format(paper=paper, **found)
+    return words.format(paper=paper, **numbers)
 
 
 def example(name: str) -> Measurement:

@@ -114,8 +114,8 @@ def _power_law(page: Findings, curve: xr.Dataset) -> None:
     columns += [f"residual to {_WELL_COVERED_MW} mW (K)", "above (K)"]
     page.tabulate("power_law", columns, rows)
     most, spread = difference.max().item(), paper.POWER_LAW_SPREAD_K
-    found: Any = {"most": most, "below": below, "last": last, "hottest": curve.isel(bias=-1)}
-    page.claim("power_law", holds=most < spread, covered=_WELL_COVERED_MW, **found)
+    numbers: Any = {"most": most, "below": below, "last": last, "hottest": curve.isel(bias=-1)}
+    page.claim("power_law", holds=most < spread, covered=_WELL_COVERED_MW, **numbers)
     page.claim("two_branches", holds=abs(EQ12.jump_K) < spread, law=EQ12)
 
 
@@ -136,8 +136,8 @@ def heater_section(page: Findings) -> None:
     lowly = profile.doping < 2.0 * page.lever.probe.material.n_d
     length = float(lowly.mean() * np.ptp(profile.position.values))
     nominal = layout.heater_taper.length_um
-    found = {"length": length, "nominal": nominal, "share": length / nominal}
-    page.claim("heater_length", holds=0.35 < found["share"] < 0.65, **found)
+    numbers = {"length": length, "nominal": nominal, "share": length / nominal}
+    page.claim("heater_length", holds=0.35 < numbers["share"] < 0.65, **numbers)
     page.draw("heater_profiles", figures.heater_profiles(profiles))
     knee = states[names.index("knee")]
     page.draw("field_maps", figures.field_maps(knee))
@@ -153,8 +153,8 @@ def knee_section(page: Findings) -> None:
         rows.append((name, f"{step:+.1f}", f"{at:.1f}"))
     page.tabulate("knee", ("from T_i to the knee", "step (K)", "T_tip (K)"), rows)
     legs = kelvins["the legs have a resistance"]
-    found = {"legs": legs, "off": abs(legs - 15.0), "without": -legs}
-    page.claim("knee_by_legs", holds=7.5 < legs < 22.5, **found)
+    numbers = {"legs": legs, "off": abs(legs - 15.0), "without": -legs}
+    page.claim("knee_by_legs", holds=7.5 < legs < 22.5, **numbers)
     rest = reasons.knee_K.sel(lever="as it is").item() - reasons.inversion_K - legs
     doping = kelvins["the doping is not uniform"]
     others = "; ".join(f"{name} ({step:+.0f} K)" for name, step in list(kelvins.items())[:2])
