@@ -98,8 +98,8 @@ def quoted(value: object) -> str:
     return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 2]}…"
 
 
-def shown(text: str, limit: int = 40) -> str:
-    """Shorten a text, and leave out what does not print, to quote it in an error."""
+def excerpt(text: str, limit: int = 40) -> str:
+    """Return the beginning of a text, without what does not print, to quote it in an error."""
     text = "".join(mark if mark.isprintable() else " " for mark in text[: 2 * limit].strip())
     return text if len(text) <= limit else text[: limit - 1] + "…"
 

@@ -20,7 +20,7 @@ from pydantic import (
     WrapValidator,
 )
 
-from hotlever.errors import InputError, quoted, shown, unknown_name
+from hotlever.errors import InputError, excerpt, quoted, unknown_name
 
 #: Characters of a key that an error names.
 _LONGEST_KEY = 120
@@ -127,7 +127,7 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
     first = min(reports, key=lambda report: report["type"] != "extra_forbidden")
     # where a number or a word may stand, pydantic adds which of them it has tried
     path = [part for part in first["loc"] if part not in ("float", "constrained-float")]
-    key = shown(".".join(map(str, path)), _LONGEST_KEY)
+    key = excerpt(".".join(map(str, path)), _LONGEST_KEY)
     place = f"{where}: " if where else ""
     if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
         return unknown_name("key", key, record.model_fields, where)

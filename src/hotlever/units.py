@@ -9,7 +9,7 @@ import re
 import unicodedata
 from typing import NamedTuple
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, excerpt
 
 ZERO_CELSIUS_K = 273.15
 #: S/cm to mA/(V µm), and W/(cm K) to mW/(K µm).
@@ -189,7 +189,7 @@ def _product(text: str) -> tuple[dict[str, int], float] | None:
 def unknown_unit(unit: str, inside: str, where: str) -> InputError:
     """Return the error for a unit that `conversion` does not know."""
     return InputError(
-        f"{where}: unit '{shown(unit)}' is not understood here, expected one like {inside}"
+        f"{where}: unit '{excerpt(unit)}' is not understood here, expected one like {inside}"
     )
 
 
@@ -302,7 +302,7 @@ def amount(text: str, unit: str | None, inside: str, where: str) -> float | None
     odd = (behind is None and rest[:1].strip(" ,;([±")) or re.search("[=:]", rest)
     if number is None or odd or may_be_thousands(text):
         if unit is not None:
-            raise InputError(f"{where}: found '{shown(text)}', expected a number")
+            raise InputError(f"{where}: found '{excerpt(text)}', expected a number")
         return None
     return None if scale is None or behind not in (None, scale) else scale[0] * number + scale[1]
 
@@ -326,7 +326,7 @@ def setting(text: str, inside: str, where: str, *, bare: bool = False) -> float:
     theirs, ours = _unit(unit or inside * bare), _UNITS[inside]
     if value is None or theirs is None or theirs.quantity != ours.quantity:
         raise InputError(
-            f"{where}: found '{shown(text)}', expected a number with a unit like {inside}"
+            f"{where}: found '{excerpt(text)}', expected a number with a unit like {inside}"
         )
     # whole powers are exact: 250 ns are 0.25 µs to the last digit
     power = theirs.power - ours.power

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, excerpt
 from hotlever.text import as_toml
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -160,7 +160,7 @@ def with_material_renamed(text: str, old: str, new: str) -> str:
     expected = tomllib.loads(text)
     materials, new = expected.get("materials", {}), new.strip()
     if not new or new in materials:
-        raise InputError(f"found '{shown(new)}', expected a name that no material has")
+        raise InputError(f"found '{excerpt(new)}', expected a name that no material has")
     layers, of_old = expected.get("layers", {}), f"{old}."
     expected["materials"] = {new if name == old else name: own for name, own in materials.items()}
     if "prior" in expected:
@@ -191,7 +191,7 @@ def with_material_renamed(text: str, old: str, new: str) -> str:
             ]
     renamed = _text(entries)
     if tomllib.loads(renamed) != expected:
-        raise InputError(f"'{shown(old)}': expected to be renamed in the text of the probe file")
+        raise InputError(f"'{excerpt(old)}': expected to be renamed in the text of the probe file")
     return renamed
 
 

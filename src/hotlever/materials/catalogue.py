@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, shown, unknown_name
+from hotlever.errors import InputError, excerpt, unknown_name
 from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.kind import Kind
 from hotlever.materials.kinds import KINDS
@@ -190,7 +190,7 @@ def sample_conductivity(text: str, where: str) -> float:
     factor = product_conversion(unit, "W m⁻¹ K⁻¹") if unit else 1.0
     if factor is None or not LEAST <= factor * value <= MOST:
         raise InputError(
-            f"{where}: found '{shown(text)}', expected a material or its thermal conductivity, "
+            f"{where}: found '{excerpt(text)}', expected a material or its thermal conductivity, "
             f"{LEAST:g} to {MOST:g} W/(m K)"
         )
     return factor * value

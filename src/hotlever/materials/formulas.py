@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hotlever.errors import shown, unknown_name
+from hotlever.errors import excerpt, unknown_name
 from hotlever.materials.laws import Evaluated
 from hotlever.types import Array
 
@@ -156,7 +156,9 @@ def _check(node: ast.AST, names: dict[str, None], text: str, depth: int, steps: 
             raise ValueError(f"{where}: found a comma, expected decimal points")
         case _:
             part = (
-                shown(ast.get_source_segment(text, node) or text) if hasattr(node, "lineno") else ""
+                excerpt(ast.get_source_segment(text, node) or text)
+                if hasattr(node, "lineno")
+                else ""
             )
             raise ValueError(
                 f"{where}: '{part}' cannot be in a formula, expected numbers, T, parameters, "

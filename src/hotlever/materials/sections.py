@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, counted, quoted, shown, unknown_name
+from hotlever.errors import InputError, counted, excerpt, quoted, unknown_name
 from hotlever.materials.kind import Kind, class_name
 from hotlever.materials.kinds import KINDS
 from hotlever.materials.parameters import HIGH_DOPED, LOW_DOPED, STATED
@@ -261,8 +261,9 @@ def classes_at_hand(laws: Any, where: str) -> dict[str, type[Record]]:
     for name, law in laws.items():
         if str(law) not in made:
             raise InputError(
-                f"{where}: '{shown(str(name))}' follows laws of its own, those of the Python class "
-                f"{shown(str(law), 80)}, which no file holds: expected Python that has imported it"
+                f"{where}: '{excerpt(str(name))}' follows laws of its own, those of the Python "
+                f"class {excerpt(str(law), 80)}, which no file holds: expected Python that has "
+                "imported it"
             )
     return {name: made[law] for name, law in laws.items()}
 

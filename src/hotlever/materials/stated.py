@@ -24,7 +24,7 @@ from pydantic import (
     model_validator,
 )
 
-from hotlever.errors import InputError, counted, shown
+from hotlever.errors import InputError, counted, excerpt
 from hotlever.materials.formulas import Expression, names_in, parsed
 from hotlever.materials.heat import STANDARD_TEMPERATURE
 from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO, LEVELLING, Evaluated
@@ -198,7 +198,7 @@ class Formula(StatedLaw):
     @property
     def source(self) -> str:
         """The formula."""
-        return f"formula {shown(self.formula, 60)}"
+        return f"formula {excerpt(self.formula, 60)}"
 
     @property
     def stated(self) -> Any:

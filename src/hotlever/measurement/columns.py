@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hotlever.errors import InputError, shown, unknown_name
+from hotlever.errors import InputError, excerpt, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurands import FITTED, MEASURANDS, PLAIN
 from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
@@ -49,7 +49,7 @@ class Column:
     @property
     def origin(self) -> str:
         """Its heading or number, with the unit where that stands elsewhere."""
-        heading = f"'{shown(self.heading)}'" if self.heading else f"column {self.index + 1}"
+        heading = f"'{excerpt(self.heading)}'" if self.heading else f"column {self.index + 1}"
         written = name_and_unit(self.heading)[1] == self.unit
         return heading if written else f"{heading} in {self.unit}"
 
@@ -113,7 +113,7 @@ def assignments(
         quantity, _, heading = (part.strip(' \t"') for part in line.partition("="))
         if not heading:
             raise InputError(
-                f"{where}: found '{shown(line)}', expected one like 'I_h (uA)=Current'"
+                f"{where}: found '{excerpt(line)}', expected one like 'I_h (uA)=Current'"
             )
         if quantity.partition(" ")[0] == UNUSED:
             assigned.append(Assignment(None, None, f"{UNUSED} {len(assigned) + 1}", heading))
@@ -202,7 +202,7 @@ def find_columns(
         other = next((name for name, column in columns.items() if column.index == index), None)
         if other is not None:
             raise InputError(
-                f"{where}: --column says that {shown(heading)} is {other} and {symbol}, "
+                f"{where}: --column says that {excerpt(heading)} is {other} and {symbol}, "
                 "expected one of them"
             )
         columns[symbol] = _column(table, symbol, index, unit)
@@ -251,7 +251,7 @@ def _take_the_only_ones(
 def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> Column:
     """Return a column with its unit, which the file or the user gives."""
     heading, inside = table.names[index], MEASURANDS[symbol].unit
-    where = f"{table.where(-1)}: column '{shown(heading or str(index + 1))}'"
+    where = f"{table.where(-1)}: column '{excerpt(heading or str(index + 1))}'"
     written = name_and_unit(heading)[1]
     if table.names[:1] == [_IN_SI]:
         written = written or inside[-1]
@@ -264,7 +264,7 @@ def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> 
     difference = symbol.startswith("d")
     scale = conversion(unit, inside, difference)
     if scale is None:
-        raise unknown_unit(unit, inside, f"{table.where(-1)}: {shown(heading)}")
+        raise unknown_unit(unit, inside, f"{table.where(-1)}: {excerpt(heading)}")
     if assigned and written:
         own = conversion(written, inside, difference)
         # the unit of the heading may be that of any quantity
@@ -277,7 +277,7 @@ def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> 
 
 
 def _assignment(symbol: str, heading: str = "HEADING") -> str:
-    return f"--column '{MEASURANDS[symbol].heading}={shown(heading)}'"
+    return f"--column '{MEASURANDS[symbol].heading}={excerpt(heading)}'"
 
 
 def _are_brief(table: TextTable, column: Column) -> bool:
@@ -293,7 +293,7 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
     if driven and TIME not in columns:
         raise InputError(
             f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside a "
-            f"wave form; another name with --column 't (s)={shown(table.names[0]) or 1}'"
+            f"wave form; another name with --column 't (s)={excerpt(table.names[0]) or 1}'"
         )
     observed = {
         *(column.symbol for column in FITTED.values()),
@@ -303,7 +303,7 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
     has_bias = has_bias or (DISTANCE in columns and constant_bias(table) is not None)
     if has_bias and observed & columns.keys():
         return
-    names = ", ".join(repr(shown(name)) for name in table.names[:9])
+    names = ", ".join(repr(excerpt(name)) for name in table.names[:9])
     given = f"the header names {names}" if table.is_named else "numbers without a header row"
     voltages = (name for name in table.names if conversion(name_and_unit(name)[1] or "", "V"))
     example = next(voltages, "HEADING" if table.is_named else "1")
@@ -320,7 +320,7 @@ def constant_bias(table: TextTable) -> float | None:
     for key, value in table.settings.items():
         symbol, unit = _quantity(key)
         if symbol == "V_b":
-            return amount(value, unit, MEASURANDS[symbol].unit, f"{table.path}: {shown(key)}")
+            return amount(value, unit, MEASURANDS[symbol].unit, f"{table.path}: {excerpt(key)}")
     return None
 
 
@@ -357,11 +357,11 @@ def note_on_unused(table: TextTable, columns: Mapping[str, Column]) -> list[str]
         likely = next((column for column in missing if conversion(unit, column.unit)), None)
         if likely is not None:
             hints.append(
-                f"if one is {likely.symbol}, say --column '{likely.symbol}={shown(heading)}'"
+                f"if one is {likely.symbol}, say --column '{likely.symbol}={excerpt(heading)}'"
             )
     if not unused:
         return []
-    names = [f"'{shown(heading)}'" for heading, _ in unused]
+    names = [f"'{excerpt(heading)}'" for heading, _ in unused]
     more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
     what = f"columns {', '.join(names[:_MOST_NAMES])}{more} are"
     what = what if len(names) > 1 else f"column {names[0]} is"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, excerpt
 from hotlever.materials.air import ATMOSPHERE
 from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.columns import Column
@@ -112,8 +112,9 @@ class Settings:
                 given = _setting(part, where)
                 if given is None:
                     settings.notes.append(
-                        f"{where}: '{shown(part)}' is not understood and not used, expected a line "
-                        "like '# R_s (kOhm): 5.6', '# base temperature (K): 293' or '# medium: air'"
+                        f"{where}: '{excerpt(part)}' is not understood and not used, expected a "
+                        "line like '# R_s (kOhm): 5.6', '# base temperature (K): 293' or "
+                        "'# medium: air'"
                     )
                 elif not given and _words(part) & _GASES:
                     mentioned.append((where, part))
@@ -127,7 +128,7 @@ class Settings:
             # a gas beside the medium matters, what else is said of it does not
             if "medium" not in settings.values or _words(part) & _OTHER_GASES:
                 settings.notes.append(
-                    f"{where}: '{shown(part)}' does not set the medium, expected a line like "
+                    f"{where}: '{excerpt(part)}' does not set the medium, expected a line like "
                     "'# medium: air' or '# medium: vacuum'"
                 )
                 break
@@ -226,7 +227,7 @@ def _gas(text: str, where: str) -> dict[str, Any]:
         denied = words & _NOT and (first is None or first[1] not in _MEDIA)
         if len(media) > 1 or denied or words & _OTHER_GASES or not (media or given):
             raise InputError(
-                f"{where}: medium is '{shown(text)}', expected vacuum, air or nitrogen, with its "
+                f"{where}: medium is '{excerpt(text)}', expected vacuum, air or nitrogen, with its "
                 "pressure; for other gases say air, and gas_conductivity in the probe file"
             )
     return {**given, "medium": media.pop()} if media else given
@@ -288,7 +289,7 @@ class Contents:
 
     def cell(self, symbol: str, row: int) -> str:
         """Return a cell as it stands in the file, to quote it."""
-        return shown(self.table.rows[row][self.columns[symbol].index])
+        return excerpt(self.table.rows[row][self.columns[symbol].index])
 
     def refuse(self, rows: Mask, expected: str, *symbols: str) -> None:
         """Refuse the first of some rows, (n,) of bool, for what its cells of `symbols` hold.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, counted, shown
+from hotlever.errors import InputError, counted, excerpt
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
@@ -82,7 +82,7 @@ def read_measurement(
     settings = Settings.of(table)
     quantities = find_columns(table, assigned, driven=waveform is not None)
     remarks = (
-        f"{table.path}: line {line}: '{shown(text)}' is taken for a comment"
+        f"{table.path}: line {line}: '{excerpt(text)}' is taken for a comment"
         for line, text in table.remarks
     )
     contents = Contents(table, quantities, settings, [*settings.notes, *remarks])
@@ -263,7 +263,7 @@ def file_columns(
     shown_columns = []
     for index, heading in enumerate(table.names[:_MOST]):
         is_alone = bool(heading) and headings.count(heading.casefold()) == 1 and "=" not in heading
-        cells = tuple(shown(row[index]) for row in table.rows[:_CELLS])
+        cells = tuple(excerpt(row[index]) for row in table.rows[:_CELLS])
         name = heading if is_alone and not heading.isdecimal() else str(index + 1)
         unit = name_and_unit(heading)[1] or ""
         shown_columns.append(FileColumn(heading, unit, name, cells, symbols.get(index, "")))

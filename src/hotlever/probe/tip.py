@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, field_validator
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, excerpt
 from hotlever.materials.catalogue import sample_conductivity
 from hotlever.records import Record
 from hotlever.types import Array
@@ -156,7 +156,7 @@ def parsed_layers(text: str, where: str) -> tuple[Layer, ...]:
     for part in materials:
         if not part or length_um(part) is not None:
             raise InputError(
-                f"{where}: found '{shown(part)}', expected the material of a layer, as in "
+                f"{where}: found '{excerpt(part)}', expected the material of a layer, as in "
                 "polymer, 100nm, silicon"
             )
     kappas = [sample_conductivity(part, where) for part in materials]
@@ -165,13 +165,13 @@ def parsed_layers(text: str, where: str) -> tuple[Layer, ...]:
         length = length_um(part)
         if length is None or not _THINNEST <= length <= _THICKEST:
             raise InputError(
-                f"{where}: found '{shown(part)}', expected the thickness of {shown(material)}, "
+                f"{where}: found '{excerpt(part)}', expected the thickness of {excerpt(material)}, "
                 f"{1e3 * _THINNEST:g} nm to {1e-3 * _THICKEST:g} mm, such as 100nm"
             )
         lengths.append(length)
     if len(lengths) == len(materials):
         raise InputError(
-            f"{where}: nothing under {shown(parts[-1])} of {shown(materials[-1])}, expected a "
+            f"{where}: nothing under {excerpt(parts[-1])} of {excerpt(materials[-1])}, expected a "
             "material without a thickness"
         )
     return tuple(map(Layer, materials, kappas, [*lengths, None]))
@@ -214,9 +214,9 @@ def interface_of(text: str, radius_um: float, where: str) -> float:
         resistance = _PER_AREA * of_area * value / (math.pi * radius_um**2)
     else:
         raise InputError(
-            f"{where}: found '{shown(text)}', expected a resistance such as 1e7 K/W, or for an "
+            f"{where}: found '{excerpt(text)}', expected a resistance such as 1e7 K/W, or for an "
             "area as 1e-8 m2 K/W"
         )
     if resistance > OUT_OF_CONTACT:
-        raise InputError(f"{where} {shown(text)}: expected at most {1e3 * OUT_OF_CONTACT:g} K/W")
+        raise InputError(f"{where} {excerpt(text)}: expected at most {1e3 * OUT_OF_CONTACT:g} K/W")
     return resistance

@@ -10,7 +10,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, excerpt
 from hotlever.raman.lineshape import MIN_SAMPLES, WINDOW, in_window
 from hotlever.raman.spectrum import (
     Spectrum,
@@ -224,7 +224,7 @@ def axis_of(table: TextTable) -> tuple[int, Array]:
         )
     if not headed and _OTHER_QUANTITY.search(names[axis]):
         raise InputError(
-            f"{table.path}: the axis is '{shown(names[axis])}', expected a Raman shift in cm⁻¹"
+            f"{table.path}: the axis is '{excerpt(names[axis])}', expected a Raman shift in cm⁻¹"
         )
     return axis, x
 
@@ -241,8 +241,8 @@ def raman_shift(table: TextTable, column: int) -> Array:
     laser = _laser(table.settings)
     if laser is None:
         raise InputError(
-            f"{table.path}: the axis is a wavelength ('{shown(name)}') and the file does not name "
-            "the laser; expected Raman shift in cm⁻¹, or a line like '#Laser (nm)= 532' above"
+            f"{table.path}: the axis is a wavelength ('{excerpt(name)}') and the file does not "
+            "name the laser; expected Raman shift in cm⁻¹, or a line like '#Laser (nm)= 532' above"
         )
     with np.errstate(divide="ignore"):
         return np.asarray(1e7 / laser - 1e7 / x)
@@ -330,7 +330,7 @@ def _kind(name: str) -> int:
 
 
 def _listed(names: list[str], which: list[int]) -> str:
-    quoted = [f"'{shown(names[j], 20)}'" for j in which]
+    quoted = [f"'{excerpt(names[j], 20)}'" for j in which]
     return ", ".join(quoted[:6]) + (", …" if len(quoted) > 6 else "")
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, excerpt
 from hotlever.raman.spectrum import Spectrum, positions, sample_temperature
 from hotlever.types import Array
 from hotlever.units import LARGEST_NUMBER, ZERO_CELSIUS_K
@@ -76,7 +76,7 @@ def read_makers(kind: str, file: Path, raw: bytes) -> list[Spectrum]:
             raise ValueError("all its intensities are alike")
         return spectra
     except Exception as error:
-        reason = shown(" ".join(str(error).split()), 160) or type(error).__name__
+        reason = excerpt(" ".join(str(error).split()), 160) or type(error).__name__
         raise InputError(f"{file}: not a readable {maker.name} file ({reason})") from error
 
 

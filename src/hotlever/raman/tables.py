@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hotlever.errors import InputError, shown, unknown_name
+from hotlever.errors import InputError, excerpt, unknown_name
 from hotlever.raman.lineshape import PeakOptions
 from hotlever.raman.spectrum import Spectrum, aliases, file_and_label, sample_temperature
 from hotlever.tables import TextTable, read_table
@@ -53,7 +53,8 @@ def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
     table = read_table(path, "rows of file name and temperature", header=False)
     if len(table.names) < 2:
         raise InputError(
-            f"{table.where(0)}: '{shown(table.rows[0][0])}', expected a file name and a temperature"
+            f"{table.where(0)}: '{excerpt(table.rows[0][0])}', expected a file name and a "
+            "temperature"
         )
     # a heading such as T_C has its unit without brackets
     celsius = re.search(r"[\W_](C|celsius)\W*$", table.names[1], re.I)
@@ -62,10 +63,10 @@ def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
     for row, (cells, value) in enumerate(zip(table.rows, kelvin, strict=True)):
         temperature = sample_temperature(float(value))
         if temperature is None:
-            raise InputError(f"{table.where(row)}: '{shown(cells[1])}' is no sample temperature")
+            raise InputError(f"{table.where(row)}: '{excerpt(cells[1])}' is no sample temperature")
         name = Path(cells[0]).name
         if temperatures.setdefault(name, temperature) != temperature:
-            raise InputError(f"{table.where(row)}: '{shown(name)}' has another temperature above")
+            raise InputError(f"{table.where(row)}: '{excerpt(name)}' has another temperature above")
     return temperatures
 
 
@@ -149,7 +150,7 @@ def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
             raise unknown_name("column", name, COLUMNS, table.where(-1))
     if "file" not in heads or len(set(heads)) < len(heads):
         raise InputError(
-            f"{table.where(-1)}: found {shown(', '.join(table.names))}, expected the column file "
+            f"{table.where(-1)}: found {excerpt(', '.join(table.names))}, expected the column file "
             f"and any of {', '.join(COLUMNS[1:])}, each once"
         )
     corrections: dict[str, Correction] = {}
@@ -161,12 +162,12 @@ def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
     for row, cells in enumerate(table.rows):
         name = Path(cells[heads.index("file")]).as_posix()
         if name in corrections:
-            raise InputError(f"{table.where(row)}: '{shown(name)}' has a row above")
+            raise InputError(f"{table.where(row)}: '{excerpt(name)}' has a row above")
         at_row = (float(column[row]) for column in numbers)
         start, low, high = (None if np.isnan(value) else value for value in at_row)
         use = cells[heads.index("use")].strip().lower() if "use" in heads else ""
         if use not in _USE:
-            raise InputError(f"{table.where(row)}: use: found '{shown(use)}', expected yes or no")
+            raise InputError(f"{table.where(row)}: use: found '{excerpt(use)}', expected yes or no")
         corrections[name] = Correction(start, low, high, _USE[use])
         try:
             corrections[name].of(PeakOptions())
@@ -237,8 +238,8 @@ def read_bias_log(path: str | os.PathLike[str]) -> TextTable:
     log = read_table(path, "a header row like 'V_b (V),I_h (mA),V_r (mV)'")
     if _bias(log) is None and _column(log, _FILE) is None:
         raise InputError(
-            f"{log.where(-1)}: no bias column in '{shown(','.join(log.names))}', expected a header "
-            "like 'V_b (V),I_h (mA),V_r (mV)'"
+            f"{log.where(-1)}: no bias column in '{excerpt(','.join(log.names))}', expected a "
+            "header like 'V_b (V),I_h (mA),V_r (mV)'"
         )
     return log
 
@@ -331,7 +332,7 @@ def _by_name(log: TextTable, column: int, names: list[str]) -> list[int | None]:
         spectra = called.get(name, [])
         if name and len(spectra) != 1:
             problem = f"names {len(spectra)} of them" if spectra else "is not among those given"
-            raise InputError(f"{log.where(row)}: spectrum '{shown(cells[column])}' {problem}")
+            raise InputError(f"{log.where(row)}: spectrum '{excerpt(cells[column])}' {problem}")
         matched.append(spectra[0] if spectra else None)
     return matched
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, quoted, shown
+from hotlever.errors import InputError, excerpt, quoted
 from hotlever.tables.headings import with_units
 from hotlever.tables.table import MOST_LINES, Line, decode
 from hotlever.types import Array
@@ -65,7 +65,7 @@ def lines_of_binary(raw: bytes, where: str) -> list[Line] | None:
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes the library raise
-        reason = shown(" ".join(str(error).split()), 160) or type(error).__name__
+        reason = excerpt(" ".join(str(error).split()), 160) or type(error).__name__
         raise InputError(f"{where}: not a readable {what} ({reason})") from error
 
 

@@ -11,7 +11,7 @@ from itertools import groupby
 
 import numpy as np
 
-from hotlever.errors import InputError, counted, shown
+from hotlever.errors import InputError, counted, excerpt
 from hotlever.files import read_bytes
 from hotlever.tables.binary import lines_of_binary
 from hotlever.tables.headings import (
@@ -151,7 +151,7 @@ class _Reader:
         cells = Dialect(separator).cells(line)
         if cells is None:
             raise InputError(
-                f"{self._path}: line {number}: found '{shown(line)}', expected quotes in pairs "
+                f"{self._path}: line {number}: found '{excerpt(line)}', expected quotes in pairs "
                 "around a cell"
             )
         return cells
@@ -203,8 +203,8 @@ class _Reader:
         except ValueError as error:
             row, unit, above = error.args
             raise InputError(
-                f"{self._path}: line {self.rows[row][0]}: the unit is '{shown(unit)}', expected "
-                f"'{shown(above)}' as above"
+                f"{self._path}: line {self.rows[row][0]}: the unit is '{excerpt(unit)}', expected "
+                f"'{excerpt(above)}' as above"
             ) from None
 
     def dialect(self, rows: list[Line]) -> Dialect:
@@ -257,13 +257,13 @@ def find_tables(raw: bytes, path: str) -> list[TextTable]:
     split = [line for _, line in lines if "." not in line and _SPLIT.search(line)]
     if dialect.separator == "," and len(split) > 1:
         raise InputError(
-            f"{path}: decimal commas between commas (line '{shown(split[0])}'), expected decimal "
+            f"{path}: decimal commas between commas (line '{excerpt(split[0])}'), expected decimal "
             "points or another separator"
         )
     widths = Counter(row.size for row in rows if row is not None)
     if widths.total() < 2:
         raise InputError(
-            f"{path}: no table of numbers found (first line: '{shown(lines[0][1])}'), expected "
+            f"{path}: no table of numbers found (first line: '{excerpt(lines[0][1])}'), expected "
             "columns of numbers"
         )
     width, count = widths.most_common(1)[0]
@@ -322,7 +322,7 @@ def _to_one_width(
     if count > max(_FEWEST_ROWS, _MOST_GAPS * len(inside)):
         raise InputError(
             f"{path}: {count} rows of {len(inside) + count} have a cell that is no number, the "
-            f"first '{shown(odd)}'; expected numbers"
+            f"first '{excerpt(odd)}'; expected numbers"
         )
     return width
 

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hotlever.errors import InputError, quoted, shown, unknown_name
+from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.types import Array
 from hotlever.units import (
     LARGEST_NUMBER,
@@ -273,7 +273,7 @@ class TextTable:
             if indices:
                 return indices[0]
         if not heading.isdecimal() and self.is_named:
-            names = [shown(name) for name in self.names[:9]]
+            names = [excerpt(name) for name in self.names[:9]]
             raise unknown_name("column", heading, names, self.where(-1))
         if heading.isdecimal() and len(heading) < 5 and 1 <= int(heading) <= len(self.names):
             return int(heading) - 1
@@ -294,7 +294,7 @@ class TextTable:
             if self.dialect.number(cell) is None:
                 hint = " with a decimal comma, as elsewhere in the file"
                 raise InputError(
-                    f"{self.where(row)}: {name}: found '{shown(cell)}', expected a number"
+                    f"{self.where(row)}: {name}: found '{excerpt(cell)}', expected a number"
                     f"{hint * self.dialect.decimal_comma}"
                 )
         if self.dialect.decimal_comma:
@@ -332,5 +332,5 @@ class TextTable:
         unit = name_and_unit(heading)[1] or unit
         converted = conversion(unit, inside)
         if converted is None:
-            raise unknown_unit(unit, inside, f"{self.where(-1)}: {shown(heading)}")
+            raise unknown_unit(unit, inside, f"{self.where(-1)}: {excerpt(heading)}")
         return converted[0] * self.numbers(column, name) + converted[1]

@@ -9,7 +9,7 @@ from dataclasses import MISSING, Field, dataclass
 from pathlib import Path
 from typing import Any
 
-from hotlever.errors import InputError, quoted, shown, unknown_name
+from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.measured_requests import MeasuredRequest
 from hotlever.tasks.requests import (
@@ -254,8 +254,8 @@ def parse_kinds(text: str | None) -> dict[str, int | None] | None:
     for name, number in parse_pairs("--allow", text.split(","), expected, bare=True).items():
         if number and not (number.isdecimal() and 1 <= int(number[:9]) <= MOST_PROPOSALS):
             raise InputError(
-                f"--allow {shown(name)}: found {quoted(number)}, expected a whole number from 1 to "
-                f"{MOST_PROPOSALS}"
+                f"--allow {excerpt(name)}: found {quoted(number)}, expected a whole number from 1 "
+                f"to {MOST_PROPOSALS}"
             )
         kinds[name] = int(number) if number else None
     return kinds
@@ -271,7 +271,7 @@ def parse_costs(texts: Iterable[str] | None, kinds: Sequence[str]) -> dict[str, 
     """
     costs, expected = dict[str, float](), "KIND=TIME, such as spectra=10min"
     for name, text in parse_pairs("--cost", texts, expected).items():
-        where = f"--cost {shown(name)}"
+        where = f"--cost {excerpt(name)}"
         if name not in kinds:
             raise unknown_name("kind of measurement", name, kinds, "--cost")
         number, minutes = text.rstrip("hminsec "), 0.0

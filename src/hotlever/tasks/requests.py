@@ -12,7 +12,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from hotlever.errors import InputError, shown
+from hotlever.errors import InputError, excerpt
 from hotlever.files import FIGURE_TYPES, FILM_TYPES, Outputs
 from hotlever.tasks.shared import read_probe
 from hotlever.units import setting
@@ -205,7 +205,7 @@ class SweepRequest(TableRequest, LeverRequest):
             return None
         option = f"--hold-{what}"
         if self.model != "flat":
-            raise InputError(f"{option}: goes with --model flat, found {shown(self.model)}")
+            raise InputError(f"{option}: goes with --model flat, found {excerpt(self.model)}")
         return what, option, parse_set_points(text, unit, option)
 
 
@@ -386,4 +386,4 @@ def check_medium(medium: str | None, *more: str) -> None:
 
     media = *get_args(Medium), *more
     if medium is not None and medium not in media:
-        raise InputError(f"--medium {shown(medium)}: expected {' or '.join(media)}")
+        raise InputError(f"--medium {excerpt(medium)}: expected {' or '.join(media)}")

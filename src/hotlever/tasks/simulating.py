@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from hotlever.datasets import in_a_file
-from hotlever.errors import HistoryEndError, InputError, shown
+from hotlever.errors import HistoryEndError, InputError, excerpt
 from hotlever.files import output_folder
 from hotlever.lever import Lever, State
 from hotlever.lever.fields import write_fields_in_time
@@ -289,8 +289,8 @@ def control(reporter: Reporter, lever: Lever, request: PulseRequest) -> Control:
     text = request.controller or ""
     if text.count(",") != 1:
         raise InputError(
-            f"--controller: found '{shown(text)}', expected P,I in V/kohm and V/(kohm ms), such as "
-            "1,30"
+            f"--controller: found '{excerpt(text)}', expected P,I in V/kohm and V/(kohm ms), such "
+            "as 1,30"
         )
     proportional, integral = (parse_number(part, "--controller") for part in text.split(","))
     resistances = [

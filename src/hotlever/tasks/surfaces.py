@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hotlever.errors import ComputationError, InputError, as_far_as_possible, shown
+from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
 from hotlever.probe.surroundings import Surroundings
 from hotlever.probe.tip import EXAMPLE, interface_of, parsed_layers
 from hotlever.tasks.reporter import Reporter
@@ -98,7 +98,7 @@ def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
         radius = setting(request.radius, "um", "--radius")
         if not _SMALLEST <= radius <= _LARGEST:
             raise InputError(
-                f"--radius: found '{shown(request.radius)}', expected a length from "
+                f"--radius: found '{excerpt(request.radius)}', expected a length from "
                 f"{1e3 * _SMALLEST:g} nm to {_LARGEST:g} µm, such as 5nm"
             )
         changes["tip.apex_radius_um"] = radius

@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, get_args
 
-from hotlever.errors import InputError, quoted, shown
+from hotlever.errors import InputError, excerpt, quoted
 from hotlever.units import NUMBER, bias_setting, setting
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def parse_pairs(
     for text in texts or []:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (equals or bare) or (equals and bare and not value):
-            raise InputError(f"{option} {shown(text)}: expected {expected}")
+            raise InputError(f"{option} {excerpt(text)}: expected {expected}")
         if name in pairs:
             raise InputError(f"{option} {name}: given twice, expected once")
         pairs[name] = value
@@ -209,7 +209,7 @@ def parse_bias(text: str | None, lowest_V: float = 0.0) -> Array:
     ([1.0, 6.0, 11.0], [8.0])
     """
     text = _BIAS if text is None else text
-    where = f"--bias {shown(text)}"
+    where = f"--bias {excerpt(text)}"
     biases = _values(text, where, "1:11:25 (V)", MOST_BIASES, bias_setting)
     # between two ends of either sign there are smaller ones
     bias_setting(str(min((abs(bias) for bias in biases.tolist() if bias), default=0.0)), where)
@@ -247,7 +247,7 @@ def parse_frequencies(text: str) -> Array:
     [1.0, 10.0, 100.0, 1000.0]
     """
     hertz = partial(_positive, "Hz")
-    where = f"--frequency {shown(text)}"
+    where = f"--frequency {excerpt(text)}"
     return _values(text, where, "1Hz:10MHz:71", MOST_FREQUENCIES, hertz, even=False)
 
 
@@ -259,7 +259,7 @@ def parse_distances(text: str) -> Array:
     >>> parse_distances("300nm:3um:4").round(6).tolist()
     [0.3, 1.2, 2.1, 3.0]
     """
-    return _values(text, f"--distance {shown(text)}", "0.3um:3um:10", MOST_DISTANCES, _distance)
+    return _values(text, f"--distance {excerpt(text)}", "0.3um:3um:10", MOST_DISTANCES, _distance)
 
 
 def parse_pressures(text: str) -> Array:
@@ -270,7 +270,7 @@ def parse_pressures(text: str) -> Array:
     >>> parse_pressures("10:1000:3").round(6).tolist()
     [10.0, 100.0, 1000.0]
     """
-    where, example = f"--pressure {shown(text)}", "10:1000:3 (mbar)"
+    where, example = f"--pressure {excerpt(text)}", "10:1000:3 (mbar)"
     return _values(text, where, example, MOST_DISTANCES, _pressure, even=False)
 
 
@@ -285,7 +285,7 @@ def parse_varied(texts: Iterable[str]) -> dict[str, Array]:
     """
     varied: dict[str, Array] = {}
     for text in texts:
-        where, example = f"--vary {shown(text)}", "heater_length_um=3:6:7"
+        where, example = f"--vary {excerpt(text)}", "heater_length_um=3:6:7"
         name, equals, numbers = text.partition("=")
         if not equals:
             raise InputError(f"{where}: expected NAME=START:STOP:COUNT, such as {example}")
@@ -293,7 +293,7 @@ def parse_varied(texts: Iterable[str]) -> dict[str, Array]:
         if values.size < 2:
             raise InputError(f"{where}: expected two values or more, such as {example}")
         if name.strip() in varied:
-            raise InputError(f"--vary {shown(name.strip())}: given twice, expected once")
+            raise InputError(f"--vary {excerpt(name.strip())}: given twice, expected once")
         varied[name.strip()] = values
     count = math.prod(values.size for values in varied.values())
     if count > MOST_DESIGNS:

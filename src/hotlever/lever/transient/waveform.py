@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, counted, shown
+from hotlever.errors import InputError, counted, excerpt
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.probe import Circuit
@@ -267,7 +267,7 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
     for pattern, inside, what in ((_TIME, "us", "time"), (_BIAS, "V", "bias")):
         column = next((k for k, name in enumerate(names) if pattern.fullmatch(name)), None)
         if column is None:
-            header = shown(",".join(table.names))
+            header = excerpt(",".join(table.names))
             raise InputError(
                 f"{table.where(-1)}: no {what} column in '{header}', expected {expected}"
             )
