@@ -48,13 +48,13 @@ def ask(
 
     gate = gate or Access(app, TOKEN, {"127.0.0.1"}, password, LARGEST)
     gate._app = app
-    given = {"host": "127.0.0.1:80", **headers}
+    all_headers = {"host": "127.0.0.1:80", **headers}
     scope = {
         "type": kind,
         "method": method,
         "path": path,
         "query_string": query.encode(),
-        "headers": [(n.replace("_", "-").encode(), v.encode()) for n, v in given.items()],
+        "headers": [(n.replace("_", "-").encode(), v.encode()) for n, v in all_headers.items()],
     }
     asyncio.run(gate(scope, receive, send))
     if kind == "websocket":

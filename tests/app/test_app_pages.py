@@ -64,7 +64,7 @@ class Here(Report):
 def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> None:
     """Let a user visit the app in a folder, in which its workers work."""
 
-    async def told() -> None:
+    async def run_story() -> None:
         async with user_simulation() as user:
             session = Session(Project(folder))
             session.workers = dict.fromkeys(("quick", "full", "making"), Here())  # type: ignore[arg-type]
@@ -74,7 +74,7 @@ def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> No
     modules = dict(sys.modules)
     try:
         with contextlib.chdir(folder):
-            asyncio.run(told())
+            asyncio.run(run_story())
     finally:
         # the simulation takes out those of its pages, this package among them
         sys.modules.update(modules)
@@ -87,7 +87,7 @@ async def drop(user: User, name: str, content: bytes, zone: int = 0) -> None:
     await upload.handle_uploads([ui.upload.SmallFileUpload(name, "", content)])
 
 
-def shown(user: User, mark: str) -> str:
+def text_of(user: User, mark: str) -> str:
     """Return the text of the element that has an attribute."""
     key, _, value = mark.partition("=")
     found = [one for one in user.client.elements.values() if one.props.get(key) == value]
@@ -115,7 +115,7 @@ def test_every_page_opens_in_an_empty_folder(tmp_path: Path) -> None:
             await user.open(address)
             if address != "/lever":
                 await user.should_see(words)
-            assert shown(user, "role=alert").strip() == ""
+            assert text_of(user, "role=alert").strip() == ""
 
     visit(tmp_path, story)
 
@@ -133,9 +133,9 @@ def test_simulate_shows_the_numbers_of_the_sweep(tmp_path: Path, run: Run) -> No
         }
         session.reduced[None, ()] = False  # it is not what is tested, and takes long
         await user.open("/simulate")
-        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
+        await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
         for key, form in (("tip_K", "{:.1f} K"), ("current_mA", "{:.4f} mA")):
-            assert shown(user, f"data-number={key}") == form.format(float(row[key]))
+            assert text_of(user, f"data-number={key}") == form.format(float(row[key]))
         answer = await session.ask(
             "full",
             "live:answer",
@@ -185,17 +185,17 @@ def test_numbers_of_another_bias_are_not_shown(tmp_path: Path) -> None:
         session.chosen["simulate"] = {"probe": None, "changes": {}, "bias": 8.0, "most": 12.0}
         session.reduced[None, ()] = False
         await user.open("/simulate")
-        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
-        assert "K" in shown(user, "data-number=tip_K")
+        await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
+        assert "K" in text_of(user, "data-number=tip_K")
         number = named(user, "Bias V_b", ui.number)
         number.set_value(14.0)
-        await until(lambda: "silicon melts" in shown(user, "role=alert"))
+        await until(lambda: "silicon melts" in text_of(user, "role=alert"))
         for key in ("tip_K", "current_mA", "lever_V", "power_mW", "reader_V", "knee"):
-            assert shown(user, f"data-number={key}") == "–"
-        assert "full lever" not in shown(user, "aria-live=polite")
+            assert text_of(user, f"data-number={key}") == "–"
+        assert "full lever" not in text_of(user, "aria-live=polite")
         number.set_value(13.0)
-        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
-        assert "silicon melts" not in shown(user, "role=alert")
+        await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
+        assert "silicon melts" not in text_of(user, "role=alert")
 
     visit(tmp_path, story)
 
@@ -260,12 +260,12 @@ def test_a_shape_is_drawn_while_its_fields_change(tmp_path: Path) -> None:
         await until(lambda: "length_um = 60" in page_text.value)
         before = drawn(user)
         field.set_value("1")
-        await until(lambda: "length_um" in shown(user, "role=alert"))
+        await until(lambda: "length_um" in text_of(user, "role=alert"))
         # what is wrong is drawn, and the field marked
         await until(lambda: drawn(user) != before)
         assert field.props.get("error")
         field.set_value("50")
-        await until(lambda: not shown(user, "role=alert").strip())
+        await until(lambda: not text_of(user, "role=alert").strip())
         assert not field.props.get("error")
         plain = len(drawn(user))
         user.find(kind=ui.switch, content="mesh").click()

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from nicegui import ui
 from nicegui.testing import User
-from test_app_pages import Here, Run, drop, shown, until, visit
+from test_app_pages import Here, Run, drop, text_of, until, visit
 
 from bad_files import bad_files
 from hotlever.app.jobs import Task
@@ -34,11 +34,11 @@ def _imported(name: str) -> Task:
 @pytest.mark.parametrize("address", ["/fit", "/", "/lever", "/raman", "/levers"])
 def test_bad_files_are_a_line_each_and_the_page_goes_on(tmp_path: Path, address: str) -> None:
     # what a command will refuse, and is no mistake of the page
-    taken = {"/": (*POOR, *DRAWINGS), "/fit": POOR, "/levers": POOR, "/lever": DRAWINGS}
+    accepted_suffixes = {"/": (*POOR, *DRAWINGS), "/fit": POOR, "/levers": POOR, "/lever": DRAWINGS}
 
     async def story(user: User, session: Session) -> None:
-        asked: list[Task] = []
-        session.jobs.start = lambda page, task: asked.append(task)  # type: ignore
+        tasks: list[Task] = []
+        session.jobs.start = lambda page, task: tasks.append(task)  # type: ignore
         await user.open(address)
         for name, content in bad_files():
             client = user.client
@@ -46,16 +46,16 @@ def test_bad_files_are_a_line_each_and_the_page_goes_on(tmp_path: Path, address:
                 if one.props.get("role") == "alert":
                     one.set_text("")  # what was said of the file before
             await drop(user, name, content)
-            if name.endswith(taken.get(address, ())):
+            if name.endswith(accepted_suffixes.get(address, ())):
                 if address == "/":
                     await until(lambda c=client: user.client is not c)  # it went on
                     await user.open(address)
                 elif address == "/lever":
-                    await until(lambda n=name: asked[-1:] == [_imported(n)])
-                assert not shown(user, "role=alert").strip(), name
+                    await until(lambda n=name: tasks[-1:] == [_imported(n)])
+                assert not text_of(user, "role=alert").strip(), name
                 continue
-            await until(lambda: bool(shown(user, "role=alert").strip()))
-            line = shown(user, "role=alert")
+            await until(lambda: bool(text_of(user, "role=alert").strip()))
+            line = text_of(user, "role=alert")
             assert Path(safe_name(name)).stem in line, name
             assert "internal error" not in line, name
             assert "Traceback" not in line
@@ -66,7 +66,7 @@ def test_bad_files_are_a_line_each_and_the_page_goes_on(tmp_path: Path, address:
         name, content = good.get(address, ("good.csv", (EXAMPLES / "lever-a.csv").read_bytes()))
         await drop(user, name, content)
         if address != "/":
-            await until(lambda: not shown(user, "role=alert").strip())
+            await until(lambda: not text_of(user, "role=alert").strip())
 
     visit(tmp_path, story)
 
@@ -77,35 +77,35 @@ def test_a_line_is_corrected_by_hand_as_by_the_command(
     for name in ("tip", "hot-plate"):
         shutil.copytree(EXAMPLES / "raman" / name, tmp_path / name)
     monkeypatch.chdir(tmp_path)
-    told: list[str] = []
+    texts: list[str] = []
 
     async def story(user: User, session: Session) -> None:
-        def said() -> str:
-            return shown(user, "data-spectrum=1")
+        def spectrum_text() -> str:
+            return text_of(user, "data-spectrum=1")
 
-        asked: list[Task] = []
-        session.jobs.start = lambda page, task: asked.append(task)  # type: ignore
+        tasks: list[Task] = []
+        session.jobs.start = lambda page, task: tasks.append(task)  # type: ignore
         session.chosen["raman"] = {"spectrum": "tip/tip_04.txt"}
         await user.open("/raman")
-        await until(lambda: "551.11 ± 2.52 K" in said())
+        await until(lambda: "551.11 ± 2.52 K" in spectrum_text())
         user.find(kind=ui.plotly).trigger("plotly_click", {"points": [{"x": 516.94, "y": 400.0}]})
-        await until(lambda: "by-hand" in said())
+        await until(lambda: "by-hand" in spectrum_text())
         user.find(kind=ui.plotly).trigger("plotly_selected", {"range": {"x": [545.0, 490.0]}})
-        await until(lambda: said().endswith("(by-hand)"))
-        _, out, _ = run(*shlex.split(asked[-1].line.partition(" -o ")[0])[1:])
-        told.extend((said(), out))
+        await until(lambda: spectrum_text().endswith("(by-hand)"))
+        _, out, _ = run(*shlex.split(tasks[-1].line.partition(" -o ")[0])[1:])
+        texts.extend((spectrum_text(), out))
         user.find("Leave out").click()
-        await until(lambda: said() == "left-out")
+        await until(lambda: spectrum_text() == "left-out")
         user.find("As found").click()
-        await until(lambda: "551.11 ± 2.52 K" in said())
-        assert "--corrections" in asked[0].line
-        assert "--corrections" not in asked[-1].line
+        await until(lambda: "551.11 ± 2.52 K" in spectrum_text())
+        assert "--corrections" in tasks[0].line
+        assert "--corrections" not in tasks[-1].line
 
     visit(tmp_path, story)
-    row = next(one for one in csv.DictReader(told[1].splitlines()) if one["file"] == "tip_04.txt")
+    row = next(one for one in csv.DictReader(texts[1].splitlines()) if one["file"] == "tip_04.txt")
     line = "{center_cm-1} ± {center_stderr_cm-1} cm⁻¹, width {fwhm_cm-1} cm⁻¹"
     line += ", {temperature_K} ± {temperature_error_K} K ({flags})"
-    assert told[0] == line.format(**row)
+    assert texts[0] == line.format(**row)
 
 
 def test_questions_of_the_gallery_open_pages_or_scripts(tmp_path: Path) -> None:
@@ -169,7 +169,7 @@ def test_without_a_measurement_an_example_is_shown(tmp_path: Path, address: str)
         await until(lambda: "An example, lever-a.csv" in titles(user))
         plots = [one for one in user.client.elements.values() if isinstance(one, ui.plotly)]
         assert len(plots[0].figure["data"][0]["x"]) == 25  # type: ignore[index,call-overload]
-        assert not shown(user, "role=alert").strip()
+        assert not text_of(user, "role=alert").strip()
         assert session.chosen[address[1:]]["data"] is None
         user.find("Try the example").click()
         await user.should_see(f"hotlever {address[1:]} lever-a.csv", retries=50)

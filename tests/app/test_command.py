@@ -11,7 +11,7 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "password", "said"),
+    ("arguments", "password", "message"),
     [
         (["--host", "0.0.0.0"], "", "add --yes-share"),
         (["--host", "0.0.0.0", "--yes-share"], "", "HOTLEVER_APP_PASSWORD"),
@@ -23,21 +23,21 @@ Run = Callable[..., tuple[int, str, str]]
     ],
 )
 def test_it_says_why_it_does_not_start(
-    run: Run, monkeypatch: pytest.MonkeyPatch, arguments: list[str], password: str, said: str
+    run: Run, monkeypatch: pytest.MonkeyPatch, arguments: list[str], password: str, message: str
 ) -> None:
     monkeypatch.setenv("HOTLEVER_APP_PASSWORD", password)
     with open("file", "w"):
         pass
     status, out, err = run("app", *arguments)
     assert (status, out) == (2, "")
-    assert said in err
+    assert message in err
     assert len(err.splitlines()) == 1
 
 
 def test_a_port_that_is_taken_is_a_line(run: Run) -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        status, _, err = run("app", "--port", str(taken.getsockname()[1]))
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        status, _, err = run("app", "--port", str(listener.getsockname()[1]))
     assert status == 2
     assert "cannot be served at" in err

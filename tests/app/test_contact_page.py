@@ -10,7 +10,7 @@ import pytest
 from elements import named
 from nicegui import ui
 from nicegui.testing import User
-from test_app_pages import shown, until, visit
+from test_app_pages import text_of, until, visit
 
 from hotlever.app.pages.live_page import slider
 from hotlever.app.session import Session
@@ -28,7 +28,7 @@ def test_contact_shows_the_numbers_of_the_command(
     async def story(user: User, session: Session) -> None:
         session.chosen["contact"] = {"radius_nm": 10.0, "most": 9.0}
         await user.open("/contact")
-        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
+        await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
         named(user, "resistance of the interface", ui.number).set_value(1e7)
         (layer,) = (
             one
@@ -36,13 +36,13 @@ def test_contact_shows_the_numbers_of_the_command(
             if isinstance(one, ui.select) and one.props.get("label") == "layer 1"
         )
         layer.set_value("SiO2")
-        await until(lambda: "moving" in shown(user, "aria-live=polite"))
-        moving = shown(user, "data-number=apex_K")
-        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
-        assert shown(user, "data-number=apex_K") == f"{float(row['apex_K']):.1f} K"
-        assert shown(user, "data-number=sample_mW") == f"{1e3 * float(row['sample_mW']):.3g} µW"
+        await until(lambda: "moving" in text_of(user, "aria-live=polite"))
+        moving = text_of(user, "data-number=apex_K")
+        await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
+        assert text_of(user, "data-number=apex_K") == f"{float(row['apex_K']):.1f} K"
+        assert text_of(user, "data-number=sample_mW") == f"{1e3 * float(row['sample_mW']):.3g} µW"
         change = f"{1e3 * float(row['current_change_mA']):.3g} µA"
-        assert shown(user, "data-number=current_change_mA") == change
+        assert text_of(user, "data-number=current_change_mA") == change
         assert float(moving.split()[0]) == pytest.approx(float(row["apex_K"]), abs=2.0)
         await user.should_see("interface 1e+07 K/W")
         await user.should_see(
@@ -50,8 +50,8 @@ def test_contact_shows_the_numbers_of_the_command(
             "--interface 10000000K/W -o reference.contact.csv"
         )
         layer.set_value("SiO3")
-        await until(lambda: "did you mean 'SiO2'" in shown(user, "role=alert"))
-        assert shown(user, "data-number=apex_K") == "–"
+        await until(lambda: "did you mean 'SiO2'" in text_of(user, "role=alert"))
+        assert text_of(user, "data-number=apex_K") == "–"
 
     visit(tmp_path, story)
 

@@ -14,7 +14,7 @@ from elements import all_of, images, of, press
 from nicegui import ui
 from nicegui.testing import User
 from nicegui.testing.user_interaction import UserInteraction
-from test_app_pages import LENGTH, drop, shown, until, visit
+from test_app_pages import LENGTH, drop, text_of, until, visit
 from test_pages_at_work import at_once
 
 from hotlever.app import probe_files
@@ -151,7 +151,7 @@ def test_a_second_drawing_leaves_nothing_of_the_first(
         await drop(user, "second.gds", second)
         await until(lambda: of(user, ui.input, "Save as").value == "second.toml")
         await until(lambda: "All outlines of the drawing, by layer" in images(user))
-        await until(lambda: "second.toml" in shown(user, "role=alert"))
+        await until(lambda: "second.toml" in text_of(user, "role=alert"))
         heads = [one for one in user.client.elements.values() if isinstance(one, ui.expansion)]
         assert [one.text for one in heads].count("What the drawing holds") == 1
         assert "The lever from above: regions, terminals and tip" not in images(user)
@@ -212,6 +212,6 @@ def test_what_is_typed_of_a_material_that_is_being_replaced_goes_with_it(
         await until(lambda: "Pt" in of(user, ui.textarea).value)
         assert list(tomllib.loads(of(user, ui.textarea).value)["materials"]) == ["nitride", "Pt"]
         await until(lambda: "Pt: metal film" in str([one.text for one in all_of(user, ui.label)]))
-        assert shown(user, "role=alert").strip() == ""
+        assert text_of(user, "role=alert").strip() == ""
 
     visit(tmp_path, story)

@@ -115,8 +115,8 @@ def test_from_the_shipped_measurement_to_a_table_in_five_clicks(
     assert len(rows) > 50
     # what is said beside the box is what the calibration file says
     near = min(rows, key=lambda row: abs(float(row["tip_K"]) - 600.0))
-    said = float(answer.inner_text().split("set a bias of ")[1].split(" V")[0])
-    assert abs(said - float(near["bias_V"])) < 0.1
+    bias_V = float(answer.inner_text().split("set a bias of ")[1].split(" V")[0])
+    assert abs(bias_V - float(near["bias_V"])) < 0.1
     with page.expect_download() as download:
         button(page, "calibration as PDF").click()
     assert Path(download.value.path()).read_bytes().startswith(b"%PDF")
@@ -255,13 +255,13 @@ def test_raman_spectra_become_temperatures(app: App, page: Page) -> None:
     button(page, "Measure").click()
     expect(page.locator("img[alt^='Spectra']")).to_be_visible(timeout=_WORK)
     page.get_by_role("cell", name="tip_04.txt").click()
-    said = page.locator("[data-spectrum]")
-    expect(said).to_contain_text("551.11 ± 2.52 K")
+    spectrum_text = page.locator("[data-spectrum]")
+    expect(spectrum_text).to_contain_text("551.11 ± 2.52 K")
     page.evaluate("window.scrollTo(0, 0)")
     stand_still(page)
     box = page.locator(".js-plotly-plot .nsewdrag").first.bounding_box()
     page.mouse.click(box["x"] + box["width"] * 77.0 / 160.0, box["y"] + 100)  # at 517 cm⁻¹
-    expect(said).to_contain_text("by-hand")
+    expect(spectrum_text).to_contain_text("by-hand")
     expect(page.get_by_role("cell", name="by-hand")).to_be_visible(timeout=_WORK)
     picture(page, "raman")
 

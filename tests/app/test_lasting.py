@@ -11,7 +11,7 @@ import pytest
 from elements import named, of, tell_columns
 from nicegui import ui
 from nicegui.testing import User
-from test_app_pages import drop, shown, until, visit
+from test_app_pages import drop, text_of, until, visit
 
 from hotlever.app import live
 from hotlever.app.pages.page import MEDIA
@@ -88,7 +88,7 @@ def test_pages_after_a_restart_show_what_was_chosen(
         session.project.write("own.toml", Probe.reference().to_toml(), "saved")
         await user.open("/simulate")
         of(user, ui.select, "Probe").set_value("own.toml")
-        await until(lambda: "full lever" in shown(user, "aria-live=polite"))
+        await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
         of(user, ui.slider).set_value(300.0)
         await until(lambda: "base_temperature_K" in session.chosen["simulate"]["changes"])
         await user.open("/fit")
@@ -115,7 +115,7 @@ def test_pages_after_a_restart_show_what_was_chosen(
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reason"),
     [
         ("{", "not valid JSON"),
         ("[]", "expected an object"),
@@ -132,7 +132,7 @@ def test_pages_after_a_restart_show_what_was_chosen(
     ],
 )
 def test_a_damaged_or_foreign_file_of_choices_is_a_line(
-    tmp_path: Path, text: str, said: str
+    tmp_path: Path, text: str, reason: str
 ) -> None:
     hidden = tmp_path / ".hotlever"
     hidden.mkdir()
@@ -140,7 +140,7 @@ def test_a_damaged_or_foreign_file_of_choices_is_a_line(
     session = Session(Project(tmp_path))
     assert session.chosen == {}
     assert session.remark.startswith(f"{hidden / CHOICES}: ")
-    assert said in session.remark
+    assert reason in session.remark
     assert "\n" not in session.remark
     assert (hidden / "choices.unread.json").read_text() == text
 
@@ -152,12 +152,12 @@ def test_the_line_on_an_unread_file_of_choices_is_shown_once(tmp_path: Path) -> 
 
     async def story(user: User, session: Session) -> None:
         await user.open("/fit")
-        line = shown(user, "role=status")
+        line = text_of(user, "role=status")
         assert line.startswith(f".hotlever/{CHOICES}: ")
         assert "not valid JSON" in line
         assert "\n" not in line
         await user.open("/raman")
-        assert shown(user, "role=status") == ""
+        assert text_of(user, "role=status") == ""
 
     visit(tmp_path, story)
 
@@ -178,7 +178,7 @@ def test_a_chosen_file_that_is_gone_gives_no_other_numbers(tmp_path: Path) -> No
     async def story(user: User, session: Session) -> None:
         session.chosen |= {"fit": {"probe": "gone.toml"}, "calibrate": {"rests": "fit:gone.json"}}
         await user.open("/fit")
-        await until(lambda: "gone.toml: no such file" in shown(user, "role=alert"))
+        await until(lambda: "gone.toml: no such file" in text_of(user, "role=alert"))
         assert of(user, ui.select, "Probe").value == "gone.toml"
         await user.open("/calibrate")
         await user.should_see("hotlever calibrate lever-a.csv --fit gone.json", retries=50)
@@ -195,14 +195,14 @@ def test_columns_belong_to_the_file_that_they_were_typed_for(tmp_path: Path) -> 
     async def story(user: User, session: Session) -> None:
         await user.open("/fit")
         await drop(user, "odd.csv", f"a,b\n{rows}".encode())
-        await until(lambda: bool(shown(user, "role=alert").strip()))
+        await until(lambda: bool(text_of(user, "role=alert").strip()))
         await tell_columns(user)
         words = "odd.csv --column 'V_b (V)=a' --column 'I_h (mA)=b'"
         await user.should_see(f"hotlever fit {words} -o odd.fit.json", retries=50)
         # the next file is another, and of another pulse
         await drop(user, "plain.csv", f"V_b (V),I_h (mA)\n{rows}".encode())
         await user.should_see("hotlever fit plain.csv -o plain.fit.json", retries=50)
-        assert not shown(user, "role=alert").strip()
+        assert not text_of(user, "role=alert").strip()
         assert named(user, "Column a is") is None
         of(user, ui.select, "Measurement").set_value("odd.csv")
         await user.should_see(f"hotlever fit {words} -o odd.fit.json", retries=50)
@@ -228,6 +228,6 @@ def test_a_pulse_belongs_to_the_file_that_it_was_told_for(tmp_path: Path) -> Non
         await user.should_see("hotlever fit timed.csv --pulse 9V,5us", retries=50)
         of(user, ui.select, "Measurement").set_value("rest.csv")
         await user.should_see("hotlever fit rest.csv -o rest.fit.json", retries=50)
-        assert not shown(user, "role=alert").strip()
+        assert not text_of(user, "role=alert").strip()
 
     visit(tmp_path, story)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from nicegui import ui
 from nicegui.testing import User
-from test_app_pages import Here, shown, until, visit
+from test_app_pages import Here, text_of, until, visit
 
 from hotlever.app import showing
 from hotlever.app.jobs import Job, Task, run
@@ -128,11 +128,11 @@ def test_pulses_in_the_page_are_those_of_the_command_and_of_python(tmp_path: Pat
         history = found["history"]
         tip, time_us = history.tip_K.values, history.time.values
         highest, at = tip.max(), time_us[tip.argmax()]
-        assert shown(user, "data-number=tip, highest") == f"{highest:.1f} K at {at:.4g} µs"
+        assert text_of(user, "data-number=tip, highest") == f"{highest:.1f} K at {at:.4g} µs"
         assert at == 3.5
         mean = np.trapezoid(tip, time_us) / 4.0
-        said = float(shown(user, "data-number=tip, mean").split()[0])
-        assert said == pytest.approx(mean, abs=0.5)
+        stated_mean_K = float(text_of(user, "data-number=tip, mean").split()[0])
+        assert stated_mean_K == pytest.approx(mean, abs=0.5)
         rows = list(csv.DictReader((tmp_path / "reference.pulse.csv").read_text().splitlines()))
         assert [float(row["tip_K"]) for row in rows] == pytest.approx(tip)
         assert job.standing == "done"
@@ -193,9 +193,9 @@ def test_a_refused_calibration_says_nothing_of_what_to_set(tmp_path: Path) -> No
             at_once(session)
             await user.open("/calibrate")
             mark = "data-answer=none" if reason else "data-answer=tip_K"
-            await until(lambda: len(shown(user, mark)) > 10)
+            await until(lambda: len(text_of(user, mark)) > 10)
             answered[reason] = " ".join(
-                shown(user, f"data-answer={along}")
+                text_of(user, f"data-answer={along}")
                 for along in ("none", "tip_K", "bias_V", "power_mW")
             )
             if not reason:
@@ -206,7 +206,7 @@ def test_a_refused_calibration_says_nothing_of_what_to_set(tmp_path: Path) -> No
         visit(tmp_path, story)
     assert answered[""].count("set a bias of") == 3
     assert "This calibration does not tell. No lever like this one shows these data: current " in (
-        said := answered["current differs by 7%"]
+        refusal := answered["current differs by 7%"]
     )
-    assert "set a bias" not in said
-    assert "±" not in said
+    assert "set a bias" not in refusal
+    assert "±" not in refusal

@@ -14,12 +14,12 @@ from hotlever.errors import InputError
 
 @given(st.text(max_size=300))
 def test_names_of_dropped_files_stay_in_the_folder_and_are_no_options(name: str) -> None:
-    kept = safe_name(name)
-    assert Path(kept).name == kept
-    assert kept[0] not in "-. "
-    assert kept.isprintable()
-    assert not set(kept) & set("<>&\"'`$\\/|;*?")
-    assert len(kept) <= 100
+    file_name = safe_name(name)
+    assert Path(file_name).name == file_name
+    assert file_name[0] not in "-. "
+    assert file_name.isprintable()
+    assert not set(file_name) & set("<>&\"'`$\\/|;*?")
+    assert len(file_name) <= 100
 
 
 def test_a_dropped_file_replaces_none_of_the_same_name(tmp_path: Path) -> None:

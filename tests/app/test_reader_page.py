@@ -10,7 +10,7 @@ import xarray as xr
 from elements import named
 from nicegui import ui
 from nicegui.testing import User
-from test_app_pages import shown, until, visit
+from test_app_pages import text_of, until, visit
 
 from hotlever.app import approaching
 from hotlever.app.session import Session
@@ -43,10 +43,10 @@ def test_reader_shows_what_the_lever_reads_between_the_distances_that_are_solved
     async def story(user: User, session: Session) -> None:
         session.chosen["reader"] = {"probe": None, "distance_um": 0.5, "bias": 9.0}
         await user.open("/reader")
-        await until(lambda: "coarse lever: voltage" in shown(user, "aria-live=polite"))
+        await until(lambda: "coarse lever: voltage" in text_of(user, "aria-live=polite"))
 
         def number(key: str) -> float:
-            return float(shown(user, f"data-number={key}").split()[0].partition("·")[0])
+            return float(text_of(user, f"data-number={key}").split()[0].partition("·")[0])
 
         # cubic between values and slopes, and what has no slope of its own
         assert number("reader_V") == pytest.approx(data.reader_V.item(), rel=1e-4)
@@ -62,8 +62,8 @@ def test_reader_shows_what_the_lever_reads_between_the_distances_that_are_solved
         )
         # another tip temperature, at which the air jumps by less
         named(user, "Bias V_b", ui.number).set_value(5.0)
-        await until(lambda: "moving" in shown(user, "aria-live=polite"))
-        await until(lambda: "coarse lever: voltage" in shown(user, "aria-live=polite"))
+        await until(lambda: "moving" in text_of(user, "aria-live=polite"))
+        await until(lambda: "coarse lever: voltage" in text_of(user, "aria-live=polite"))
         assert number("reader_V") == pytest.approx(read_at(5.0).reader_V.item(), rel=2e-4)
 
     visit(tmp_path, story)

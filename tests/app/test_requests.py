@@ -34,8 +34,8 @@ TASKS = [
 
 def by_line(line: str, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Return the request of a command line, or the line that refuses it."""
-    asked: list[Any] = []
-    monkeypatch.setattr(Command, "do", lambda self, _, request: asked.append(request))
+    requests: list[Any] = []
+    monkeypatch.setattr(Command, "do", lambda self, _, request: requests.append(request))
     words = shlex.split(line)[1:]
     try:
         command = command_line(words[0])
@@ -45,14 +45,14 @@ def by_line(line: str, monkeypatch: pytest.MonkeyPatch) -> Any:
         pass
     except typer.TyperException as error:
         return error.format_message()
-    return asked[0]
+    return requests[0]
 
 
 @pytest.mark.parametrize("task", TASKS, ids=lambda task: task.line)
 def test_a_task_asks_what_its_line_asks(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: Any
+    request: Any
     try:
-        asked = request_of(task)
+        request = request_of(task)
     except HotleverError as error:
-        asked = str(error)
-    assert asked == by_line(task.line, monkeypatch)
+        request = str(error)
+    assert request == by_line(task.line, monkeypatch)

@@ -31,7 +31,7 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
 #: Distances at which levers are solved, levers kept, and pieces of the drawn lever.
-_DISTANCES, _KEPT, _PIECES = 9, 3, 80
+_DISTANCES, _CACHE_SIZE, _PIECES = 9, 3, 80
 #: The nearest and the farthest distance (µm), and the least below any part of the lever.
 _NEAREST_UM, _FARTHEST_UM, _CLEAR_UM = 0.2, 5.0, 0.1
 #: Temperatures (K) as at which the air jumps alike: the voltage is the same within 0.1 %.
@@ -139,13 +139,13 @@ def _jumping(report: Report, probe: Probe, bias: float, quick: bool) -> Probe:
 _jumps: dict[Probe, Probe] = {}
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _nearest(probe: Probe) -> Lever:
     """Return a coarse lever at the nearest distance."""
     return Lever(probe, COARSE)
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _levers(report: Report, probe: Probe, distances: tuple[float, ...]) -> list[Lever]:
     """Return coarse levers at some distances (µm)."""
     lever = Lever(probe, COARSE)
@@ -188,7 +188,7 @@ def _hottest(lever: Lever, branch: Branch, u: float) -> Array:
     return np.interp(np.arange(_PIECES), met, hottest[met])
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _cells(shape: Shape, elements: FiniteElements) -> tuple[Index, Any]:
     """Return cells of a grid inside a lever: the piece that each is of, and what reads it off."""
     layout, line = shape.layout(), _Line(shape.layout())

@@ -86,11 +86,11 @@ class Change:
         if not self.before:
             output_folder(self.folder)
             self._append({"schema": _SCHEMA, "what": self.what})
-        kept = str(len(self.before)) if path.exists() else None
-        if kept is not None:
-            shutil.copyfile(path, self.folder / kept)
-        self._append({"file": name, "before": kept})
-        self.before[name] = kept
+        version = str(len(self.before)) if path.exists() else None
+        if version is not None:
+            shutil.copyfile(path, self.folder / version)
+        self._append({"file": name, "before": version})
+        self.before[name] = version
 
     def _append(self, line: dict[str, object]) -> None:
         with (self.folder / _LIST).open("a", encoding="utf-8") as file:
@@ -161,20 +161,20 @@ class Changes:
         what = f"{_AGAIN if again else _UNDONE}{what.removeprefix(_UNDONE).removeprefix(_AGAIN)}"
         paths = {name: (self._project / name).resolve() for name in change.before}
         for name, path in paths.items():
-            kept = change.before[name]
+            version = change.before[name]
             if not path.is_relative_to(self._project):
                 raise InputError(f"{name}: is not in the folder of the project")
-            if kept is not None and not (change.folder / kept).is_file():
+            if version is not None and not (change.folder / version).is_file():
                 raise InputError(f"{name}: what was there before is not kept any more")
         with self.recorded(what):
             with Outputs().together():
-                for name, kept in change.before.items():
-                    if kept is not None:
+                for name, version in change.before.items():
+                    if version is not None:
                         output_folder(paths[name].parent)
                         with whole_file(paths[name]) as temporary:
-                            shutil.copyfile(change.folder / kept, temporary)
-            for name, kept in change.before.items():
-                if kept is None:
+                            shutil.copyfile(change.folder / version, temporary)
+            for name, version in change.before.items():
+                if version is None:
                     self.remove(paths[name])
 
     def _folders(self) -> list[Path]:

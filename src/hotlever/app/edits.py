@@ -285,9 +285,9 @@ def _names(text: str) -> set[str]:
     return set(tomllib.loads(text).get("materials", {}))
 
 
-def _free(name: str, taken: set[str]) -> str:
+def _free(name: str, existing_names: set[str]) -> str:
     number, free = 1, name
-    while free in taken:
+    while free in existing_names:
         number += 1
         free = f"{name}-{number}"
     return free

@@ -54,7 +54,7 @@ class Task:
     options: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def given(self) -> dict[str, Any]:
+    def effective_options(self) -> dict[str, Any]:
         """The options that say something: a 0 does, an empty text or list says nothing."""
         return {
             name: value
@@ -67,7 +67,7 @@ class Task:
         """The command line that does the same."""
         files = (f"./{name}" if name.startswith("-") else name for name in self.files)
         words = [*self.command.split(), *files]
-        for name, value in self.given.items():
+        for name, value in self.effective_options.items():
             option = "-o" if name == "output" else f"--{name.replace('_', '-')}"
             if value is True:
                 words.append(option)
@@ -100,7 +100,7 @@ class Job:
     notes : list of str
     label, done, total
         Of the last progress told.
-    shown : dict
+    contents : dict
         What it told last, by what it is: the ``result``, the ``curve`` of a fit, a ``table``.
     began : float
         When, as files are stamped.
@@ -115,7 +115,7 @@ class Job:
     label: str = ""
     done: int = 0
     total: int = 0
-    shown: dict[str, Any] = field(default_factory=dict)
+    contents: dict[str, Any] = field(default_factory=dict)
     version: int = 0
     began: float = field(default_factory=time.time)
 
@@ -141,7 +141,7 @@ class Job:
         elif kind == "failure":
             self.message = content
         else:
-            self.shown[kind] = content
+            self.contents[kind] = content
         self.version += 1
 
     def end(self, standing: Standing, message: str = "") -> None:
@@ -236,7 +236,7 @@ def request_of(task: Task) -> Any:
     InputError
         As the command line says, if a value is not of its option's type.
     """
-    command, options = COMMANDS[task.command], task.given
+    command, options = COMMANDS[task.command], task.effective_options
     switched_off = [name for name in options if name.startswith("no_")]
     options |= {name.removeprefix("no_"): not options.pop(name) for name in switched_off}
     if task.files:

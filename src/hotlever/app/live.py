@@ -48,7 +48,7 @@ _COLD = 0.02
 #: How much making reduced levers steps back behind other work.
 _NICE = 10
 #: Levers kept for sliders that go back and forth.
-_KEPT = 3
+_CACHE_SIZE = 3
 #: What a model is called on the page.
 FULL, REDUCED, COARSE_MODEL = "full lever", "reduced lever", "coarse lever"
 
@@ -117,12 +117,12 @@ class LiveLever:
     def curves(self) -> dict[str, Any]:
         """I-V curve, temperature by power and the knee, by the tip temperature of the branch."""
         u = np.linspace(0.0, self.branch.end_u, _POINTS)
-        shown = self.branch.shown(u)
+        observables = self.branch.shown(u)
         knee = self.branch.knee
         return {
-            "lever_V": shown["lever_V"],
-            "current_mA": shown["current_mA"],
-            "power_mW": shown["lever_V"] * shown["current_mA"],
+            "lever_V": observables["lever_V"],
+            "current_mA": observables["current_mA"],
+            "power_mW": observables["lever_V"] * observables["current_mA"],
             "tip_K": self.branch.tip_K(u),
             "knee": None if knee is None else vars(knee),
         }
@@ -132,7 +132,7 @@ class LiveLever:
         """How its states are drawn, and those of all levers of this mesh."""
         number = id(self.space.mesh)
         if number not in _maps:
-            if len(_maps) >= _KEPT:
+            if len(_maps) >= _CACHE_SIZE:
                 _maps.clear()
             # where it is nearly cold the path of the current is that of the shape
             x = self.branch.states(np.array([_COLD * self.branch.end_u]))
@@ -158,17 +158,19 @@ class LiveLever:
         if not np.isfinite(reading.u).all():
             raise branch_end(self.branch, reading)
         report.note(*reading.notes(np.array([bias])))
-        shown = {name: float(value[0]) for name, value in self.branch.shown(reading.u).items()}
+        observables = {
+            name: float(value[0]) for name, value in self.branch.shown(reading.u).items()
+        }
         x = self.branch.equations.space.expanded(self.branch.states(reading.u))
         low, knee = self.branch.base_temperature_K, self.branch.knee
         drawn, T = self.map, self.space.nodal(x[:, 0], low, self.circuit.end_rises())[0]
         # in steps, so that colours stay the same while the lever gets a little hotter
         high = _SCALE_K * np.ceil(max(float(T.max()), low + 1.0) / _SCALE_K)
         return {
-            **shown,
+            **observables,
             "bias_V": bias,
             "tip_K": float(self.branch.tip_K(reading.u)[0]),
-            "power_mW": shown["lever_V"] * shown["current_mA"],
+            "power_mW": observables["lever_V"] * observables["current_mA"],
             "hottest_K": float(T.max()),
             "knee": np.nan if knee is None else knee.tip_K,
             "knee_V": np.nan if knee is None else knee.lever_V,
@@ -268,13 +270,13 @@ def described(report: Report, name: str | None) -> dict[str, Any]:
     }
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _full(report: Report, probe: Probe, most: float) -> LiveLever:
     lever = make_lever(report, probe)
     return LiveLever(FULL, lever.space, lever.circuit, _branch(lever, most))
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _quick(probe: Probe, most: float, is_reduced: bool) -> LiveLever:
     """Return the reduced lever of a probe, or else a coarse one."""
     reduced = _reduced(_geometry(probe)) if is_reduced else None
@@ -302,7 +304,7 @@ def _geometry(probe: Probe) -> Probe:
     return probe.model_copy(update=same)
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _reduced(probe: Probe) -> tuple[Lever, ReducedLever] | None:
     """Return the full and the reduced lever of a geometry."""
     lever = Lever(probe)

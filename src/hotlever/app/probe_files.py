@@ -42,16 +42,16 @@ _MOST_LAYERS = 40
 _DRAWABLE_UM = 1e5
 
 
-def svg(made: Figure) -> str:
+def svg(figure: Figure) -> str:
     """Return a figure as SVG."""
-    return figure_file(made, ".svg").decode("utf-8")
+    return figure_file(figure, ".svg").decode("utf-8")
 
 
-def figure_file(made: Figure, suffix: str) -> bytes:
+def figure_file(figure: Figure, suffix: str) -> bytes:
     """Return a figure as the content of a file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, f"figure{suffix}")
-        figures.save_figure(made, path)
+        figures.save_figure(figure, path)
         return path.read_bytes()
 
 
@@ -145,10 +145,10 @@ def _impossible(values: Mapping[str, Any], fault: str) -> Figure:
 def _rows(sections: Mapping[str, Any]) -> list[LayerRow]:
     rows = []
     for part in ("layers", "terminals"):
-        for name, given in sections[part].items():
-            drawn = drawn_in(given)
+        for name, entry in sections[part].items():
+            drawn = drawn_in(entry)
             label = drawn if isinstance(drawn, str) else f"{name} (points)"
-            inner = given if isinstance(given, dict) else {}
+            inner = entry if isinstance(entry, dict) else {}
             material = str(inner.get("material", ""))
             rows.append(LayerRow(label, drawn, part, name, material, inner.get("thickness_um")))
     probe = sections["probe"]
@@ -157,8 +157,8 @@ def _rows(sections: Mapping[str, Any]) -> list[LayerRow]:
         path = Path(file)
         unit = probe.get("unit_um")
         try:
-            asked = (path, file_stamp(path), probe.get("cell"), unit)
-            rows += [LayerRow(name, name) for name in _layers(*asked) if name not in used]
+            arguments = (path, file_stamp(path), probe.get("cell"), unit)
+            rows += [LayerRow(name, name) for name in _layers(*arguments) if name not in used]
         except InputError:
             pass  # the drawing of the probe says what is wrong
     return sorted(rows, key=lambda row: row.part or "z")[:_MOST_LAYERS]
@@ -192,12 +192,12 @@ def _others(shape: str) -> Iterator[tuple[str, dict[str, str]]]:
 
 def _other(name: str, section: Mapping[str, Any], meanings: Mapping[str, str]) -> dict[str, Any]:
     """Return the numbers of a section that is no material."""
-    shown = []
+    fields = []
     for key, words in meanings.items():
         unit, default = parameter_named(key).unit, _number(getattr(Circuit(), key, ""))
         own = _field((name,), key, section, default, f"{label(key)}: {words} ({unit})")
-        shown.append({**own, "label": f"{label(key)} ({unit})"})
-    return {"section": (name,), "title": _TITLES[name], "fields": shown}
+        fields.append({**own, "label": f"{label(key)} ({unit})"})
+    return {"section": (name,), "title": _TITLES[name], "fields": fields}
 
 
 def _card(path: Section, section: Mapping[str, Any]) -> dict[str, Any]:
@@ -211,11 +211,11 @@ def _card(path: Section, section: Mapping[str, Any]) -> dict[str, Any]:
     preset = PRESETS.get(str(section.get("preset")))
     usual = usual_values(kind.model_fields["kind"].default) | dict(preset.values if preset else {})
     try:
-        given = with_tables(section, Path())
+        values = with_tables(section, Path())
     except InputError:
-        given = {}
-    useless = kind.without_use({**usual, **given})
-    shown = []
+        values = {}
+    useless = kind.without_use({**usual, **values})
+    fields = []
     # what every material has counts least
     for key in sorted(kind.model_fields, key=lambda own: own in _LAST):
         if key in ("kind", "preset"):
@@ -224,11 +224,11 @@ def _card(path: Section, section: Mapping[str, Any]) -> dict[str, Any]:
         default = usual.get(key, field.default if isinstance(field.default, float) else "")
         meaning = field.description or ""
         field_shown = _field(path, key, section, _number(default), meaning)
-        shown.append({**field_shown, "used": key not in useless or key in section or not given})
-    named = names_stated({key: value for key, value in given.items() if key in STATED})
+        fields.append({**field_shown, "used": key not in useless or key in section or not values})
+    named = names_stated({key: value for key, value in values.items() if key in STATED})
     for key in sorted({*named, *section} - kind.model_fields.keys()):
-        shown.append(_field(path, key, section, "", f"{key}, a number in a formula"))
-    return {**card, "fields": shown}
+        fields.append(_field(path, key, section, "", f"{key}, a number in a formula"))
+    return {**card, "fields": fields}
 
 
 def _field(
@@ -238,8 +238,8 @@ def _field(
     if isinstance(value, list):
         value = ", ".join(map(_number, value))
     field = {"section": path, "key": key, "label": meaning, "meaning": meaning, "used": True}
-    shown = None if isinstance(value, dict) else "" if value is None else _number(value)
-    return {**field, "default": default, "value": shown}
+    text = None if isinstance(value, dict) else "" if value is None else _number(value)
+    return {**field, "default": default, "value": text}
 
 
 def _number(value: Any) -> str:

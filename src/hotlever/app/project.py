@@ -45,12 +45,12 @@ def safe_name(name: str) -> str:
     ('passwd', 'o _b_.csv', 'file')
     """
     last = re.split(r"[/\\]", unicodedata.normalize("NFC", name))[-1]
-    kept = "".join(mark if mark.isalnum() or mark in " ._-+()=,µΩ°" else "_" for mark in last)
-    kept = kept.lstrip(" .-").rstrip(" .")
-    stem, dot, suffix = kept.rpartition(".")
-    if len(kept) > _LONGEST:
-        kept = f"{stem[: _LONGEST - len(suffix) - 1]}{dot}{suffix}"[:_LONGEST]
-    return kept or "file"
+    file_name = "".join(mark if mark.isalnum() or mark in " ._-+()=,µΩ°" else "_" for mark in last)
+    file_name = file_name.lstrip(" .-").rstrip(" .")
+    stem, dot, suffix = file_name.rpartition(".")
+    if len(file_name) > _LONGEST:
+        file_name = f"{stem[: _LONGEST - len(suffix) - 1]}{dot}{suffix}"[:_LONGEST]
+    return file_name or "file"
 
 
 def file_stamp(path: Path) -> float:
@@ -154,8 +154,8 @@ class Project:
     @property
     def laws(self) -> list[str]:
         """Files that hold a power law."""
-        wanted = {"power_law", "linear_K_per_mW"}
-        return [name for name in self.names(".json") if wanted & self._keys(name)]
+        law_keys = {"power_law", "linear_K_per_mW"}
+        return [name for name in self.names(".json") if law_keys & self._keys(name)]
 
     @property
     def raman_calibrations(self) -> list[str]:
@@ -232,22 +232,22 @@ class Project:
         InputError
             If it is larger than `LARGEST_FILE`, or cannot be written.
         """
-        kept = safe_name(name)
+        file_name = safe_name(name)
         if len(content) > LARGEST_FILE:
-            raise InputError(f"{kept}: larger than the {LARGEST_FILE // 2**20} MB of a file")
+            raise InputError(f"{file_name}: larger than the {LARGEST_FILE // 2**20} MB of a file")
         target = output_folder(self.path(folder))
-        stem, suffix = Path(kept).stem, Path(kept).suffix
+        stem, suffix = Path(file_name).stem, Path(file_name).suffix
         number = 1
-        while (path := target / kept).exists():
+        while (path := target / file_name).exists():
             if path.is_file() and path.read_bytes() == content:
                 break
             number += 1
-            kept = f"{stem}-{number}{suffix}"
+            file_name = f"{stem}-{number}{suffix}"
         else:
-            with self.changes.recorded(f"took in {kept}"), whole_file(path) as temporary:
+            with self.changes.recorded(f"took in {file_name}"), whole_file(path) as temporary:
                 temporary.write_bytes(content)
         path.touch()
-        return f"{folder}/{kept}" if folder else kept
+        return f"{folder}/{file_name}" if folder else file_name
 
     def take_example(self, name: str) -> str:
         """Copy a file that comes with hotlever into the project; return its name."""

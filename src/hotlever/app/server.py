@@ -108,14 +108,14 @@ def serve(
     """
     port = _free(host, port)
     token = secrets.token_urlsafe(24)
-    shown = f"[{host}]" if ":" in host else host
+    url_host = f"[{host}]" if ":" in host else host
     ticket = "" if password else f"?token={token}"
     hosts = {host, *(LOCAL if host in LOCAL else ())}
     if host in ("0.0.0.0", "::"):
         name = socket.gethostname()
         hosts |= {*LOCAL, name.lower(), socket.getfqdn().lower(), *_addresses(name)}
-        shown = name
-    address = f"http://{shown}:{port}/{ticket}"
+        url_host = name
+    address = f"http://{url_host}:{port}/{ticket}"
     session = Session(project)
     app.on_startup(session.start)
     app.on_startup(lambda: say(address))
@@ -298,8 +298,8 @@ class Access:
         return counted
 
 
-def _same(given: str, expected: str) -> bool:
-    return hmac.compare_digest(given.encode(), expected.encode())
+def _same(secret: str, expected: str) -> bool:
+    return hmac.compare_digest(secret.encode(), expected.encode())
 
 
 def _with_headers(send: Any) -> Any:

@@ -19,7 +19,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from hotlever.app.jobs import Jobs
 from hotlever.app.project import Project
-from hotlever.app.state import Choices, Result, Told
+from hotlever.app.state import Choices, FileMetadata, Result
 from hotlever.app.workers import Heard, Worker
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import output_folder, read_json, without_nan, write_text
@@ -78,9 +78,9 @@ class History:
         self.results: dict[str, Result] = {}
         self.dark, self.remark = False, ""
         self._history: list[Record] = [{}]
-        self._shown = 0
+        self._position = 0
         #: What moved last, and when.
-        self._moved: tuple[set[str], float] = set(), 0.0
+        self._last_move: tuple[set[str], float] = set(), 0.0
         self._read()
         self._written = self._beside()
 
@@ -91,9 +91,9 @@ class History:
         chosen.update({name: value for name, value in first.items() if name not in chosen})
         return chosen
 
-    def told_of(self, file: str | None) -> dict[str, Any]:
+    def metadata_of(self, file: str | None) -> dict[str, Any]:
         """Return what was told of a measurement file: its columns, the pulse that was measured."""
-        first = Told().model_dump()
+        first = FileMetadata().model_dump()
         return self.chosen.setdefault("files", {}).setdefault(file, first) if file else first
 
     # --- history ----------------------------------------------------------------------------------
@@ -101,27 +101,31 @@ class History:
     def keep(self) -> None:
         """Take what has changed as a step of the history; what goes on changing is one step."""
         record, now = _record(self.chosen), time.monotonic()
-        before = self._history[self._shown]
+        before = self._history[self._position]
         what = _differing(before, record)
         if what:
-            del self._history[self._shown + 1 :]
-            if self._moved[0] == what and now - self._moved[1] < _MOVING_S and self._shown:
+            del self._history[self._position + 1 :]
+            if (
+                self._last_move[0] == what
+                and now - self._last_move[1] < _MOVING_S
+                and self._position
+            ):
                 del self._history[-1]
             if record != self._history[-1]:  # it may have moved back
                 self._history.append(record)
-            self._moved = what, now
+            self._last_move = what, now
             self._forget_oldest()
-            self._shown = len(self._history) - 1
+            self._position = len(self._history) - 1
         else:
-            self._history[self._shown] = record
+            self._history[self._position] = record
         if record != before or self._written != self._beside():
             self._write()
 
     def settle(self) -> None:
         """Count what a page chose by itself, while it was opened, to the last step."""
         record = _record(self.chosen)
-        if record != self._history[self._shown]:
-            self._history[self._shown] = record
+        if record != self._history[self._position]:
+            self._history[self._position] = record
             self._write()
 
     def step(self, by: int) -> set[str]:
@@ -133,12 +137,12 @@ class History:
             The names in `Choices` of what has changed; none at the end of the history.
         """
         self.keep()
-        to = self._shown + by
+        to = self._position + by
         if not 0 <= to < len(self._history):
             self.remark = f"There is nothing to {'undo' if by < 0 else 'do again'}."
             return set()
-        what = _differing(self._history[self._shown], self._history[to])
-        self._shown, self._moved = to, (set(), 0.0)
+        what = _differing(self._history[self._position], self._history[to])
+        self._position, self._last_move = to, (set(), 0.0)
         for page in {*self.chosen, *self._history[to]}:
             values = self.chosen.setdefault(page, {})
             of_files = {key: values[key] for key in _OF_FILES if key in values}
@@ -158,7 +162,7 @@ class History:
     def _write(self) -> None:
         """Write the history; a folder that cannot be written is no end."""
         self._written = self._beside()
-        content = {**self._written, "shown": self._shown, "history": self._history}
+        content = {**self._written, "shown": self._position, "history": self._history}
         text = json.dumps(without_nan({"schema": SCHEMA, **content}), ensure_ascii=False)
         with suppress(HotleverError):
             write_text(output_folder(self._path.parent) / CHOICES, text)
@@ -183,8 +187,8 @@ class History:
                 raise InputError(f"{self._path}: found schema {schema}, expected {SCHEMA}")
             read = _File.model_validate(content)
             self._history = [_record(record.model_dump()) for record in read.history]
-            self._shown = min(read.shown, len(self._history) - 1)
-            self.chosen = deepcopy(self._history[self._shown])
+            self._position = min(read.shown, len(self._history) - 1)
+            self.chosen = deepcopy(self._history[self._position])
             self.dark, self.results = read.dark, read.results
             return
         except ValidationError as error:
@@ -203,7 +207,7 @@ def _record(chosen: Mapping[str, Any]) -> Record:
     for page, values in chosen.items():
         first = _AT_FIRST.get(page, {})
         if page == "files":
-            first = dict.fromkeys(values, Told().model_dump())
+            first = dict.fromkeys(values, FileMetadata().model_dump())
         others = {key: value for key, value in values.items() if key in first}
         others = {key: deepcopy(value) for key, value in others.items() if value != first[key]}
         if others:

@@ -50,22 +50,24 @@ from hotlever.tasks.spectra import set_up
 from hotlever.types import Array
 
 #: Results kept, whose figures may be asked for as files.
-_KEPT = 4
+_CACHE_SIZE = 4
 #: Points of a measurement that are shown, and of the curve that is fitted to a spectrum.
 _POINTS, _FINE = 1000, 800
 #: Names of columns that all tables have which hotlever writes of levers.
 _OF_RESULTS = {"bias_V", "current_mA", "lever_V", "tip_K", "power_mW"}
 
 
-def understood(report: Report, name: str, told: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def understood(
+    report: Report, name: str, metadata: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
     """Return what a measurement file was understood as.
 
     Beside it may be told its columns, the file of the probe, and the pulse that was measured.
     """
-    told = told or {}
-    probe = probe_of(told.get("probe"))
-    assigned = parse_columns(told.get("columns") or [])
-    pulse = told.get("waveform")
+    metadata = metadata or {}
+    probe = probe_of(metadata.get("probe"))
+    assigned = parse_columns(metadata.get("columns") or [])
+    pulse = metadata.get("waveform")
     waveform = waveform_from_text("pulse", pulse) if pulse else None
     measurement = read_measurement_of(probe, Path(name), assigned, waveform)
     data = measurement.dataset(probe.circuit)
@@ -104,13 +106,13 @@ def _is_measurement(path: Path, stamp: float) -> bool:
         return not set(file.readline().strip().split(",")) >= _OF_RESULTS
 
 
-def columns(report: Report, name: str, told: Mapping[str, Any]) -> list[FileColumn]:
+def columns(report: Report, name: str, metadata: Mapping[str, Any]) -> list[FileColumn]:
     """Return the columns of a measurement file, and what they are used as; see `understood`."""
     try:
-        assigned = parse_columns(told.get("columns") or [])
+        assigned = parse_columns(metadata.get("columns") or [])
     except InputError:
         assigned = {}
-    return file_columns(Path(name), assigned, driven=bool(told.get("waveform")))
+    return file_columns(Path(name), assigned, driven=bool(metadata.get("waveform")))
 
 
 def page(report: Report, kind: str, name: str) -> None:
@@ -123,11 +125,11 @@ def page(report: Report, kind: str, name: str) -> None:
     _page(kind, Path(name), send)
 
 
-def drawn(report: Report, kind: str, name: str, figure: str, suffix: str) -> bytes:
+def drawn(report: Report, kind: str, name: str, figure_name: str, suffix: str) -> bytes:
     """Return a figure of a result as the content of a file."""
     blocks = _page(kind, Path(name)).blocks
-    made = next(block["figure"] for block in blocks if block.get("name") == figure)
-    return figure_file(made, suffix)
+    figure = next(block["figure"] for block in blocks if block.get("name") == figure_name)
+    return figure_file(figure, suffix)
 
 
 def budget(report: Report, name: str) -> bytes:
@@ -313,12 +315,12 @@ def _page(kind: str, path: Path, added: Callable[[Block], None] | None = None) -
         _pages[key] = fit_page(_fit(path, key[2]), added=added)
     else:
         _pages[key] = calibration_page(_calibration(path, key[2]), added)
-    if len(_pages) > _KEPT:
+    if len(_pages) > _CACHE_SIZE:
         del _pages[next(iter(_pages))]
     return _pages[key]
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _calibration(path: Path, stamp: float) -> Calibration:
     return read_calibration(path)
 

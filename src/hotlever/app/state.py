@@ -49,14 +49,14 @@ class Lever(BaseModel):
     mesh: bool = False
 
 
-class Kept(BaseModel):
+class ChangedProbe(BaseModel):
     """A lever of the page Simulate: a probe and its sliders."""
 
     probe: str | None = None
     changes: Annotated[Changes, AfterValidator(_fit_together)] = {}
 
 
-class Simulate(Kept):
+class Simulate(ChangedProbe):
     """The page Simulate: a lever, the bias, and the slider's highest (V); and one beside it.
 
     That is in another medium, of another probe, or one that is ``kept``. A table is by the bias, or
@@ -64,7 +64,7 @@ class Simulate(Kept):
     """
 
     beside: Annotated[str, Field(pattern="^(|vacuum|air|now|probe:.*)$")] = ""
-    kept: Kept = Kept()
+    kept: ChangedProbe = ChangedProbe()
     bias: float = 8.0
     most: float = 12.0
     view: Literal["rest", "time", "signals"] = "rest"
@@ -196,7 +196,7 @@ class Levers(BaseModel):
     command: Literal["fit", "calibrate"] = "fit"
 
 
-class Told(BaseModel):
+class FileMetadata(BaseModel):
     """What was told of a measurement file that the file does not say."""
 
     columns: list[str] = []
@@ -219,7 +219,7 @@ class Choices(BaseModel):
     calibrate: Calibrate = Calibrate()
     next: Next = Next()
     levers: Levers = Levers()
-    files: dict[str, Told] = {}
+    files: dict[str, FileMetadata] = {}
     asked: dict[str, float] = {"tip_K": 600.0, "bias_V": 8.0, "power_mW": 2.0}
 
 

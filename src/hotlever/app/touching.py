@@ -28,7 +28,7 @@ from hotlever.tasks.surfaces import contact_notes, probe_in_contact
 from hotlever.threads import one_blas_thread
 
 #: Biases of the curves, and levers kept.
-_POINTS, _KEPT = 41, 3
+_POINTS, _CACHE_SIZE = 41, 3
 #: What is touched where a probe file says nothing; any sample does for a tip out of contact.
 _SAMPLE, _ANY = "polymer, 100nm, silicon", "silicon"
 _CURVES = ("bias_V", "tip_K", "apex_K", "sample_mW", "beside_mW", "current_change_mA")
@@ -98,21 +98,21 @@ def _out_of_contact(report: Report, probe: Probe, quick: bool, most: float) -> L
     return _solved(report, free, quick, most)
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _solved(report: Report, probe: Probe, quick: bool, most: float) -> Lever:
     lever = Lever(probe, COARSE) if quick else make_lever(report, probe)
     lever.read(np.array([most]))
     return lever
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _touching(report: Report, probe: Probe, most: float) -> tuple[Lever, Lever]:
     """Return the full lever out of contact and in contact."""
     free = _out_of_contact(report, probe, False, most)
     return free, free.with_probe(probe)
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _curves(report: Report, probe: Probe, most: float) -> dict[str, Any]:
     """Return the columns of a sweep up to a bias, or as far as both levers go."""
     levers = _touching(report, probe, most)

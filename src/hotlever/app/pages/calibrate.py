@@ -20,9 +20,13 @@ from hotlever.text import value_with_error
 
 #: What a calibration rests on, and the option that says so.
 _RESTS = {"probe": "probe", "fit": "fit", "law": "power_law"}
-_ASKED = {"tip_K": ("tip temperature", "K"), "bias_V": ("bias", "V"), "power_mW": ("power", "mW")}
+_QUANTITIES = {
+    "tip_K": ("tip temperature", "K"),
+    "bias_V": ("bias", "V"),
+    "power_mW": ("power", "mW"),
+}
 #: What can be told: where the error counts, what the tip is to stay below, and what counts without.
-_TOLD = {"at": ("Sure at", "hottest measured"), "stay_below": ("Stay below", "what melts")}
+_TEMPERATURES = {"at": ("Sure at", "hottest measured"), "stay_below": ("Stay below", "what melts")}
 
 
 class CalibratePage(MeasuredPage):
@@ -59,7 +63,7 @@ class CalibratePage(MeasuredPage):
         kind, _, name = chosen["rests"].partition(":")
         options = {
             _RESTS[kind]: name,
-            "column": self.told["columns"],
+            "column": self.metadata["columns"],
             "medium": chosen["medium"],
             "prior": several(chosen["priors"]),
             "pulse": chosen["pulse"].replace(" ", ""),
@@ -87,7 +91,7 @@ class CalibratePage(MeasuredPage):
                 refusal = f"This calibration does not tell. {sentence(doubt)}"
                 ui.label(refusal).classes("remark").props("data-answer=none")
                 return
-            questions = [_Question(self.session, name, along) for along in _ASKED]
+            questions = [_Question(self.session, name, along) for along in _QUANTITIES]
         Proposals(self.session, self.banner, name, self.stem)
         for question in questions:
             await question.answer()
@@ -104,10 +108,10 @@ class _Question:
 
     def __init__(self, session: Session, name: str, along: str) -> None:
         self._session, self._name, self._along = session, name, along
-        self._asked = session.choices("asked")
-        title, unit = _ASKED[along]
+        self._targets = session.choices("asked")
+        title, unit = _QUANTITIES[along]
         with ui.row().classes("w-full items-center"):
-            value = self._asked[along]
+            value = self._targets[along]
             self._number = ui.number(f"For a {title} of", value=value, on_change=self.answer)
             self._number.props(f"suffix={unit} debounce=150").classes("w-60")
             self._answer = ui.label().classes("remark col min-w-60").props("aria-live=polite")
@@ -117,10 +121,10 @@ class _Question:
         """Answer for the number that stands there."""
         value, text = self._number.value, ""
         if value is not None:
-            self._asked[self._along] = value
+            self._targets[self._along] = value
             try:
-                asked = self._name, self._along, value
-                row = await self._session.ask("full", "showing:settings", *asked)
+                arguments = self._name, self._along, value
+                row = await self._session.ask("full", "showing:settings", *arguments)
                 text = (
                     "outside of what was calibrated, or in a jump" if row is None else _answer(row)
                 )
@@ -158,7 +162,7 @@ class Proposals(DrawnPage):
         with ui.card().classes("w-full").props("flat bordered data-proposals"):
             ui.label("What do I measure next?").classes("text-bold")
             with ui.row().classes("w-full items-center"):
-                for key, (title, empty) in _TOLD.items():
+                for key, (title, empty) in _TEMPERATURES.items():
                     self.number(key, title, "K", empty).classes("w-44", remove="w-36")
                 ui.space()
                 ui.button("Propose", icon="add_location_alt", on_click=self.start)
@@ -167,7 +171,7 @@ class Proposals(DrawnPage):
 
     def task(self) -> Task:
         """Return the task that writes the proposals as a table and a figure."""
-        told = {key: self.chosen[key] for key in _TOLD}
-        kelvins = {key: "" if T is None else f"{T:.12g}K" for key, T in told.items()}
+        temperatures = {key: self.chosen[key] for key in _TEMPERATURES}
+        kelvins = {key: "" if T is None else f"{T:.12g}K" for key, T in temperatures.items()}
         files = outputs(f"{self._stem}.next", "SVG")
         return Task("next", (self._calibration,), {**kelvins, **files})

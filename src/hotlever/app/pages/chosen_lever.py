@@ -93,9 +93,9 @@ def lever_beside(chosen: Mapping[str, Any]) -> dict[str, Any] | None:
 def beside_in_words(chosen: Mapping[str, Any]) -> str:
     """Return what the lever beside is called."""
     if chosen["beside"] == NOW:
-        kept = chosen["kept"]
-        changes = ", ".join(f"{name} = {value}" for name, value in kept["changes"].items())
-        name = Path(kept["probe"] or "reference probe").stem
+        stored_lever = chosen["kept"]
+        changes = ", ".join(f"{name} = {value}" for name, value in stored_lever["changes"].items())
+        name = Path(stored_lever["probe"] or "reference probe").stem
         return f"{name} with {changes}" if changes else name
     name = chosen["beside"].removeprefix(_PROBE)
     return _BESIDE.get(chosen["beside"]) or Path(name or "reference probe").stem

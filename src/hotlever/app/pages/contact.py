@@ -112,11 +112,11 @@ class ContactPlots:
         curves, now = answer["curves"] or {}, answer["now"]
         for plot, (_, lines) in zip(self._by_bias, _CURVES, strict=True):
             for number, (key, factor, _, _) in enumerate(lines):
-                shown = {"visible": key != "beside_mW" or now[key] > _NONE_MW}
+                visibility = {"visible": key != "beside_mW" or now[key] > _NONE_MW}
                 for place, columns in enumerate((curves, now)):
                     values = factor * np.asarray(columns.get(key, ()))
                     drawn = plots.points(columns.get("bias_V", ()), values)
-                    plot.figure["data"][2 * number + place] |= drawn | shown
+                    plot.figure["data"][2 * number + place] |= drawn | visibility
             plot.update()
 
     def _draw(
@@ -266,11 +266,11 @@ class ContactPage(LivePage):
         most = self.chosen["most"]
         return {"bias": f"{most / _BIASES:.12g}:{most:.12g}:{_BIASES}"}
 
-    def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
+    def model_and_remark(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return whose numbers these are, and the resistances."""
         now = answer["now"]
-        shown = (f"{words} {_per_watt(now[key])}" for key, words in _RESISTANCES.items())
-        return _MOVING if quick else _AT_REST, f"Thermal resistances: {', '.join(shown)}"
+        resistances = (f"{words} {_per_watt(now[key])}" for key, words in _RESISTANCES.items())
+        return _MOVING if quick else _AT_REST, f"Thermal resistances: {', '.join(resistances)}"
 
 
 def _per_watt(resistance_K_per_mW: float) -> str:

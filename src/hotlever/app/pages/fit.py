@@ -44,7 +44,7 @@ class FitPage(MeasuredPage):
             self.text("fixed", "Hold (n_d=3.3e17, p)")
             self._waveform = ui.input(
                 _PULSE,
-                value=self.told["waveform"],
+                value=self.metadata["waveform"],
                 on_change=lambda event: self.tell("waveform", (event.value or "").replace(" ", "")),
             )
             self._waveform.classes("w-full").props("debounce=600")
@@ -55,10 +55,10 @@ class FitPage(MeasuredPage):
         self.chosen["without"] = [name for name, box in self._boxes.items() if not box.value]
         self.show_command()
 
-    def show_told(self) -> None:
+    def show_metadata(self) -> None:
         """Show what was told of the measurement that is chosen."""
-        super().show_told()
-        self._waveform.set_value(self.told["waveform"])
+        super().show_metadata()
+        self._waveform.set_value(self.metadata["waveform"])
 
     def understood(self) -> None:
         """Offer what was measured."""
@@ -74,9 +74,9 @@ class FitPage(MeasuredPage):
         options: dict[str, Any] = {
             "probe": chosen["probe"],
             "observables": "" if fitted == self.observables else ",".join(fitted),
-            "column": self.told["columns"],
+            "column": self.metadata["columns"],
             "fix": several(chosen["fixed"]),
-            "pulse": self.told["waveform"],
+            "pulse": self.metadata["waveform"],
             "free": chosen["free"].replace(" ", ""),
             "prior": several(chosen["priors"]),
             "medium": chosen["medium"],

@@ -166,7 +166,7 @@ def drop_zone(
     takers = [take]
     ui.context.client.on_delete(takers.clear)
 
-    async def taken(event: events.MultiUploadEventArguments) -> None:
+    async def handle_upload(event: events.MultiUploadEventArguments) -> None:
         for taker in takers:
             await taker(event)
 
@@ -175,7 +175,7 @@ def drop_zone(
         auto_upload=True,
         label=label,
         max_file_size=LARGEST_FILE,
-        on_multi_upload=taken,
+        on_multi_upload=handle_upload,
         on_rejected=lambda: banner.say(
             f"a file may have {LARGEST_FILE // 2**20} MB at most: this one was not taken"
         ),
@@ -194,10 +194,10 @@ async def say_refused(
     banner.say("\n".join(lines[:_REFUSED]) + more)
 
 
-async def hand_over(made: Awaitable[bytes], name: str) -> None:
+async def hand_over(pending_content: Awaitable[bytes], name: str) -> None:
     """Give a file when it is made, be the button that asked for it gone by then."""
     client = ui.context.client
-    content = await made
+    content = await pending_content
     with client:
         ui.download.content(content, name)
 
@@ -248,8 +248,8 @@ def text_shown(text: str) -> None:
     """Show a text as one would on a terminal: its tables scroll, other lines are broken."""
     lines = filter(str.strip, text.split("\n"))
     for is_table, part in groupby(lines, lambda line: "  " in line.strip()):
-        for shown in ["\n".join(part)] if is_table else part:
-            ui.label(shown).classes(f"w-full {'lines tabular' if is_table else 'remark'}")
+        for paragraph in ["\n".join(part)] if is_table else part:
+            ui.label(paragraph).classes(f"w-full {'lines tabular' if is_table else 'remark'}")
 
 
 def number_shown(key: str, title: str, value: str = "…") -> ui.label:
@@ -284,17 +284,17 @@ def table(
         for name, label in zip(names, columns, strict=True)
     ]
     body = [{"id": number, **dict(zip(names, row, strict=True))} for number, row in enumerate(rows)]
-    shown = ui.table(columns=head, rows=body, row_key="id", **options)
+    element = ui.table(columns=head, rows=body, row_key="id", **options)
     if chosen is not None:
-        shown.add_slot("body-cell-0", _CHOICE)
-        shown.on("chosen", lambda event: chosen(event.args))
-    return shown.classes("w-full").props("dense flat bordered")
+        element.add_slot("body-cell-0", _CHOICE)
+        element.on("chosen", lambda event: chosen(event.args))
+    return element.classes("w-full").props("dense flat bordered")
 
 
 # --- dialogs --------------------------------------------------------------------------------------
 
 
-async def asked(question: str, yes: str, no: str) -> bool:
+async def confirm(question: str, yes: str, no: str) -> bool:
     """Ask something, and wait for the answer; whoever closes the question says no."""
     with ui.dialog().props('aria-label="Question"') as dialog, ui.card():
         ui.label(question).classes("remark")
@@ -350,7 +350,7 @@ def _list_changes(session: Session) -> None:
 def _time_and_files(change: Change) -> str:
     """Say when a change was made, and of which files."""
     when = datetime.fromtimestamp(change.time_s).strftime("%Y-%m-%d %H:%M")
-    names = [name if kept else f"{name} (new)" for name, kept in change.before.items()]
+    names = [name if version else f"{name} (new)" for name, version in change.before.items()]
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return f"{when}: {', '.join(names[:_NAMED])}{more}"
 

@@ -109,7 +109,7 @@ class LeverPage(Page):
                 self._fields = ProbeFields(self, self._set)
             with right:
                 self._work = Work(session, self.name, self._ended)
-                self._kept = ui.row().classes("items-center w-full")
+                self._existing_notice = ui.row().classes("items-center w-full")
                 self._picture = Picture(self)
                 with ui.row().classes("items-center w-full"):
                     name = self.chosen["save_as"] or self.chosen["name"]
@@ -182,7 +182,7 @@ class LeverPage(Page):
             return
         if not await self._file.may_go():
             self._awaited = self.chosen["drawing"] = None
-            self._kept.clear()
+            self._existing_notice.clear()
             self._pick.set_value(None)
             return
         self.banner.clear()
@@ -199,7 +199,7 @@ class LeverPage(Page):
             self._propose(name, probe)
             return
         await self._show(probe)
-        with self._kept:
+        with self._existing_notice:
             ui.label(f"{probe} is there already, and was kept as it is.").classes("remark")
             again = small_button("Propose anew", partial(self._propose, name, probe))
             again.tooltip(f"Writes what the drawing proposes over {probe}")
@@ -217,7 +217,7 @@ class LeverPage(Page):
         self._awaited = self.chosen["drawing"] = drawing
         self._name.set_value(name)
         self._picture.clear()
-        self._kept.clear()
+        self._existing_notice.clear()
         self._text.put("")
         self.show_command()
 
@@ -238,7 +238,7 @@ class LeverPage(Page):
             return
         if job.standing == "done":
             files = job.task.options
-            await self._show(files["output"], job.shown["result"], files["plot"])
+            await self._show(files["output"], job.contents["result"], files["plot"])
         else:
             self._begin()
 

@@ -34,7 +34,7 @@ _GOES_ON = (
 
 
 @dataclass(frozen=True)
-class _Made:
+class _BatchOutputs:
     """What is made of all measurements: a folder of results, a table in it, and a report."""
 
     folder: str
@@ -49,9 +49,9 @@ class _Made:
 
 
 #: By command, which is also the name of one lever's page.
-_MADE = {
-    "fit": _Made(FITS, "levers.csv", "levers"),
-    "calibrate": _Made(CALIBRATIONS, "calibrations.csv", "levers-calibrated"),
+_OUTPUTS = {
+    "fit": _BatchOutputs(FITS, "levers.csv", "levers"),
+    "calibrate": _BatchOutputs(CALIBRATIONS, "calibrations.csv", "levers-calibrated"),
 }
 _LOOK_S = 1.0
 
@@ -82,7 +82,7 @@ class LeversPage(Page):
                     flat_button("None", partial(self._files.set_value, []))
                 self.probe_choice()
                 with ui.row().classes("w-full"):
-                    for command in _MADE:
+                    for command in _OUTPUTS:
                         start = ui.button(f"{command.capitalize()} all", icon="table_rows")
                         start.classes("col").on_click(partial(self._make, command))
                 caption(_GOES_ON)
@@ -107,8 +107,8 @@ class LeversPage(Page):
         # others may have been dropped meanwhile
         data = self.session.project.data
         self._files.set_options(data)
-        taken = [name for name in names if name in data]
-        self._files.set_value(list(dict.fromkeys([*self._files.value, *taken])))
+        measurements = [name for name in names if name in data]
+        self._files.set_value(list(dict.fromkeys([*self._files.value, *measurements])))
 
     @property
     def _page(self) -> str:
@@ -117,8 +117,8 @@ class LeversPage(Page):
         return title
 
     @property
-    def _made(self) -> _Made:
-        return _MADE[self.chosen["command"]]
+    def _outputs(self) -> _BatchOutputs:
+        return _OUTPUTS[self.chosen["command"]]
 
     def task(self) -> Task:
         """Return the task that fits or calibrates all.
@@ -128,10 +128,14 @@ class LeversPage(Page):
         InputError
             If these are not several.
         """
-        made, data = self._made, tuple(self._files.value)
+        outputs, data = self._outputs, tuple(self._files.value)
         if len(data) < 2:
             raise InputError(f"choose two measurements or more; the page {self._page} takes one")
-        options = {"probe": self.chosen["probe"], "output": made.folder, "report": made.report}
+        options = {
+            "probe": self.chosen["probe"],
+            "output": outputs.folder,
+            "report": outputs.report,
+        }
         return Task(self.chosen["command"], data, options)
 
     def _make(self, command: str) -> None:
@@ -147,12 +151,12 @@ class LeversPage(Page):
         if self.chosen["data"] is None:
             self.chosen["data"] = []
             await self._take_all()
-        project, made = self.session.project, self._made
+        project, outputs = self.session.project, self._outputs
         names = [
-            f"{made.folder}/{path.name}"
-            for path in sorted(project.path(made.folder).glob("*.json"))
+            f"{outputs.folder}/{path.name}"
+            for path in sorted(project.path(outputs.folder).glob("*.json"))
         ]
-        seen = [(name, project.stamp(name)) for name in (*names, *made.files)]
+        seen = [(name, project.stamp(name)) for name in (*names, *outputs.files)]
         if seen == self._seen:
             return
         self._seen = seen
@@ -165,7 +169,7 @@ class LeversPage(Page):
 
     def _show(self, levers: dict[str, Any]) -> None:
         with ui.row().classes("items-center"):
-            for name, label in self._made.files.items():
+            for name, label in self._outputs.files.items():
                 download_button(self.session, name, label)
         table(levers["head"], levers["rows"], self._open)
         caption(f"A click on a lever opens it on the page {self._page}.")

@@ -141,10 +141,10 @@ class LivePage(Page):
         return {}
 
     @abstractmethod
-    def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
+    def model_and_remark(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return what the numbers are of, and what else is said of an answer."""
 
-    async def shown(self, at: list[Any], quick: bool) -> None:
+    async def follow_answer(self, at: list[Any], quick: bool) -> None:
         """Follow an answer that is shown."""
 
     async def rested(self) -> None:
@@ -159,7 +159,7 @@ class LivePage(Page):
             self._sliders.clear()
             with self._sliders:
                 self.show_sliders()
-            self.moved()
+            self.refresh()
             return
         self.blank()
 
@@ -184,7 +184,7 @@ class LivePage(Page):
             if bias is not None:
                 most = max(self.chosen["most"], float(math.ceil(bias)))
                 self.chosen |= {"bias": float(bias), "most": most}
-                self.moved()
+                self.refresh()
 
         number = slider("Bias V_b", self.chosen["bias"], least, self.chosen["most"], "V")
         number.on_value_change(lambda event: set_bias(event.value))
@@ -193,9 +193,9 @@ class LivePage(Page):
         """Choose a value, and have what is shown follow."""
         if value is not None:
             self.chosen[key] = value
-            self.moved()
+            self.refresh()
 
-    def moved(self) -> None:
+    def refresh(self) -> None:
         """Have what is shown follow; only what is wanted last counts."""
         self.show_command()
         self._follower.follow(self.of_lever(), [self.chosen[key] for key in self.state])
@@ -249,10 +249,10 @@ class LivePage(Page):
                 label, done, total = content
                 self._model.set_text(f"{label}: {done} of {total}")
 
-        asked = lever, *at, quick, *self.also_asked()
+        arguments = lever, *at, quick, *self.also_asked()
         try:
             worker, function = self.workers[quick], f"{self.live}:answer"
-            answer = await self.session.ask(worker, function, *asked, heard=heard)
+            answer = await self.session.ask(worker, function, *arguments, heard=heard)
         except HotleverError as error:
             if not self.is_gone:
                 self.blank()
@@ -263,14 +263,14 @@ class LivePage(Page):
         self.banner.clear()
         for key, text in texts_of(answer["now"], self.numbers).items():
             self._numbers[key].set_text(text)
-        model, remark = self.said(answer, quick)
+        model, remark = self.model_and_remark(answer, quick)
         self._model.set_text(model)
         self._remarks.set_text("; ".join(filter(None, [remark, *notes])))
         self.plots.show(answer)
         if not self._drawn.visible:
             self._drawn.set_visibility(True)
             redraw(self._drawn)
-        await self.shown(at, quick)
+        await self.follow_answer(at, quick)
         return True
 
     def blank(self) -> None:
@@ -301,7 +301,7 @@ class _Follower:
 
     def __init__(self, page: LivePage) -> None:
         self._page = page
-        self._wanted: tuple[Task, list[Any]] | None = None
+        self._request: tuple[Task, list[Any]] | None = None
         self._last: tuple[Task, list[Any]] | None = None
         self._settled: Task | None = None
         self._rests = 0
@@ -309,7 +309,7 @@ class _Follower:
 
     def follow(self, lever: Task, at: list[Any]) -> None:
         """Have a state of a lever shown; only what is wanted last counts."""
-        self._wanted = self._last = lever, at
+        self._request = self._last = lever, at
         if not self._busy:
             self._busy = True
             background_tasks.create(self._follow(), name="live lever")
@@ -320,11 +320,11 @@ class _Follower:
 
     async def _follow(self) -> None:
         try:
-            while self._wanted is not None and not self._page.is_gone:
-                (lever, at), self._wanted = self._wanted, None
+            while self._request is not None and not self._page.is_gone:
+                (lever, at), self._request = self._request, None
                 settled = lever == self._settled
                 await self._page.show(lever, at, not settled)
-                if not settled and self._wanted is None:
+                if not settled and self._request is None:
                     self._rests += 1
                     background_tasks.create(self._settle(lever, at, self._rests), name="full lever")
         finally:
@@ -333,7 +333,7 @@ class _Follower:
     async def _settle(self, lever: Task, at: list[Any], turn: int) -> None:
         """Ask for all once sliders have rested; they may move on meanwhile."""
         await asyncio.sleep(_REST_S)
-        if turn != self._rests or self._wanted is not None or self._page.is_gone:
+        if turn != self._rests or self._request is not None or self._page.is_gone:
             return
         if await self._page.show(lever, at, False):
             self._settled = lever

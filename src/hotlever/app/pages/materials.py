@@ -40,17 +40,17 @@ class MaterialsPage(Page):
     async def open(self) -> None:
         """Show the curves of the laws, and all parameters."""
         self.show_command()
-        probe, shown = self.chosen["probe"], None
+        probe, catalogue = self.chosen["probe"], None
         with self.banner.caught():
-            shown = await self.session.ask("full", "showing:materials", probe)
+            catalogue = await self.session.ask("full", "showing:materials", probe)
         if probe != self.chosen["probe"]:  # another one was chosen meanwhile
             return
         self._shown_of.clear()
-        if shown is None:
+        if catalogue is None:
             return
         with self._shown_of:
             alt = "Thermal conductivity and resistivity against the temperature"
-            figure(shown["figure"], alt, wide=True)
-            for head, *lines in shown["kinds"].values():
+            figure(catalogue["figure"], alt, wide=True)
+            for head, *lines in catalogue["kinds"].values():
                 with ui.expansion(head.removesuffix(":")).props("header-class=text-bold"):
                     text_shown("\n".join(lines))

@@ -58,7 +58,7 @@ class MeasuredPage(Page):
     kind: ClassVar[str]
     ending: ClassVar[str]
     folder: ClassVar[str]
-    #: What its task takes of what can be told of a file, see `Session.told_of`.
+    #: What its task takes of what can be told of a file, see `Session.metadata_of`.
     tellable: tuple[str, ...] = ("columns",)
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
@@ -139,18 +139,18 @@ class MeasuredPage(Page):
             await self._dropped([self.session.project.take_example(_EXAMPLE)])
 
     @property
-    def told(self) -> dict[str, Any]:
-        """What was told of this measurement, on whatever page; see `Session.told_of`."""
-        return self.session.told_of(self.chosen["data"])
+    def metadata(self) -> dict[str, Any]:
+        """What was told of this measurement, on whatever page; see `Session.metadata_of`."""
+        return self.session.metadata_of(self.chosen["data"])
 
     def tell(self, key: str, value: Any) -> Awaitable[None] | None:
         """Keep what was typed of a measurement, unless it is what is shown for another one."""
-        if value == self.told[key]:
+        if value == self.metadata[key]:
             return None
-        self.told[key] = value
+        self.metadata[key] = value
         return self.read()
 
-    def show_told(self) -> None:
+    def show_metadata(self) -> None:
         """Show what was told of the measurement that is chosen."""
 
     def changed(self) -> Awaitable[None] | None:
@@ -158,7 +158,7 @@ class MeasuredPage(Page):
         if (self.chosen["data"], self.chosen.get("probe")) == self._read_of:
             self.show_command()
             return None
-        self.show_told()
+        self.show_metadata()
         return self.read()
 
     async def read(self) -> None:
@@ -168,20 +168,20 @@ class MeasuredPage(Page):
         columns: list[FileColumn] = []
         self._read_of = name, self.chosen.get("probe")
         self.banner.clear()
-        told = {key: self.told[key] for key in self.tellable}
-        told["probe"] = self.chosen.get("probe")
+        metadata = {key: self.metadata[key] for key in self.tellable}
+        metadata["probe"] = self.chosen.get("probe")
         if name is not None:
             with suppress(HotleverError):
-                columns = await self.session.ask("full", "showing:columns", name, told)
+                columns = await self.session.ask("full", "showing:columns", name, metadata)
         try:
             file = name or str(EXAMPLES / _EXAMPLE)
-            understood = await self.session.ask("full", "showing:understood", file, told)
+            understood = await self.session.ask("full", "showing:understood", file, metadata)
         except HotleverError as error:
             if turn == self._reads:
                 self.banner.say(str(error))
         if turn != self._reads:  # something else has been chosen meanwhile
             return
-        self._columns.show(columns, self.told["columns"], understood is not None)
+        self._columns.show(columns, self.metadata["columns"], understood is not None)
         self._show_understood(understood)
         if job := self.session.jobs.by_page.get(self.name):
             self._follow(job)
@@ -216,7 +216,7 @@ class MeasuredPage(Page):
 
     def _follow(self, job: Job) -> None:
         """Draw how near to the data the lever is that is being fitted, or was."""
-        curve = job.shown.get("curve")
+        curve = job.contents.get("curve")
         if curve and self.observables and job.task.files == (self.chosen["data"],):
             self._plots.approach(curve)
 
@@ -248,17 +248,17 @@ class _ResultBlocks:
 
     async def show(self) -> None:
         """Show it as it is drawn."""
-        shown = ui.row().classes("w-full gap-3 items-start")
+        container = ui.row().classes("w-full gap-3 items-start")
         waiting = ui.spinner(size="lg").props('aria-label="Being drawn"')
 
         def hear(kind: str, block: dict[str, Any]) -> None:
-            if kind == "block" and not shown.is_deleted:
-                with shown:
+            if kind == "block" and not container.is_deleted:
+                with container:
                     self._show_block(block)
 
         with self._page.banner.caught():
-            asked = "showing:page", self._page.kind, self._name
-            await self._page.session.ask("full", *asked, heard=hear)
+            request = "showing:page", self._page.kind, self._name
+            await self._page.session.ask("full", *request, heard=hear)
         if not waiting.is_deleted:
             waiting.delete()
 
@@ -280,11 +280,11 @@ class _ResultBlocks:
                         label = f"{block['name']} as {suffix[1:].upper()}"
                         flat_button(suffix[1:].upper(), give, label=label).props("size=sm")
 
-    async def _give_figure(self, shown: str, suffix: str) -> None:
+    async def _give_figure(self, figure_name: str, suffix: str) -> None:
         with self._page.banner.caught():
-            asked = self._page.kind, self._name, shown, suffix
-            drawn = self._page.session.ask("full", "showing:drawn", *asked)
-            await hand_over(drawn, f"{Path(self._name).name.split('.')[0]}-{shown}{suffix}")
+            arguments = self._page.kind, self._name, figure_name, suffix
+            drawn = self._page.session.ask("full", "showing:drawn", *arguments)
+            await hand_over(drawn, f"{Path(self._name).name.split('.')[0]}-{figure_name}{suffix}")
 
 
 class ColumnPicker:
@@ -296,7 +296,7 @@ class ColumnPicker:
     def __init__(self, tell: Callable[[list[str]], Any]) -> None:
         self._tell = tell
         #: What was told, a quantity and perhaps its unit, by the column.
-        self._told: dict[str, str] = {}
+        self._assignments: dict[str, str] = {}
         self._columns: dict[str, FileColumn] = {}
         self._fields: dict[str, tuple[ui.select, ui.select]] = {}
         opened = ui.expansion("Columns of the file").props("header-class=text-bold")
@@ -304,10 +304,10 @@ class ColumnPicker:
             caption("The first values of each, and what it is used as.")
             self._rows = ui.column().classes("w-full gap-1")
 
-    def show(self, columns: list[FileColumn], told: list[str], is_understood: bool) -> None:
+    def show(self, columns: list[FileColumn], assignments: list[str], is_understood: bool) -> None:
         """Show the columns of a file; they are open where the file is not understood."""
-        parts = (text.partition("=") for text in told)
-        self._told = {name.strip(): quantity for quantity, _, name in parts}
+        parts = (text.partition("=") for text in assignments)
+        self._assignments = {name.strip(): quantity for quantity, _, name in parts}
         self._opened.set_visibility(bool(columns))
         if not is_understood:
             self._opened.set_value(True)
@@ -323,9 +323,9 @@ class ColumnPicker:
             has_unit = bool(column.symbol and not column.unit)
             unit.set_visibility(has_unit)
             if has_unit:
-                told_unit = self._unit_of(column.name)
-                units = [*_UNITS[MEASURANDS[column.symbol].unit], *filter(None, [told_unit])]
-                unit.set_options(list(dict.fromkeys(units)), value=told_unit)
+                assigned_unit = self._unit_of(column.name)
+                units = [*_UNITS[MEASURANDS[column.symbol].unit], *filter(None, [assigned_unit])]
+                unit.set_options(list(dict.fromkeys(units)), value=assigned_unit)
 
     def _row(self, column: FileColumn) -> tuple[ui.select, ui.select]:
         """Show a column; return the fields of what it is, and of its unit."""
@@ -349,7 +349,7 @@ class ColumnPicker:
 
     def _unit_of(self, name: str) -> str | None:
         """Return the unit that was told of a column."""
-        return name_and_unit(self._told.get(name, ""))[1]
+        return name_and_unit(self._assignments.get(name, ""))[1]
 
     def _pick(self, name: str, symbol: str, unit: str | None = None) -> Any:
         """Tell what a column is, and nothing else of it, nor of that quantity."""
@@ -358,16 +358,20 @@ class ColumnPicker:
             return None  # nobody picked it
         # a unit is not guessed: the reader asks for one
         own = f"{symbol} ({unit})" if unit else symbol
-        if not symbol and (quantity_of(column.heading) is not None or name not in self._told):
+        if not symbol and (
+            quantity_of(column.heading) is not None or name not in self._assignments
+        ):
             # what was only told to be used is taken back; what the file itself says is not
             own = UNUSED
         # at once: the next may be picked before the file is read with this
-        self._told = {
+        self._assignments = {
             heading: quantity
-            for heading, quantity in self._told.items()
+            for heading, quantity in self._assignments.items()
             if heading != name and quantity_of(quantity, assigned=True) != symbol
         } | ({name: own} if own else {})
-        return self._tell([f"{quantity}={heading}" for heading, quantity in self._told.items()])
+        return self._tell(
+            [f"{quantity}={heading}" for heading, quantity in self._assignments.items()]
+        )
 
     def _pick_unit(self, name: str, unit: str | None) -> Any:
         is_new = unit is not None and unit != self._unit_of(name)

@@ -74,7 +74,7 @@ class Page:
         self.session, self.banner = session, banner
         self.chosen: dict[str, Any] = session.choices(self.name) if self.name else {}
         self._command: ui.column | None = None
-        self._shown = ""
+        self._command_line = ""
 
     async def open(self) -> None:
         """Show what takes a moment, once the page is there."""
@@ -114,8 +114,8 @@ class Page:
 
     def text(self, key: str, label: str) -> ui.input:
         """Ask for a line of text."""
-        shown = ui.input(label, value=self.chosen[key], on_change=self._keep(key, ""))
-        return shown.classes("w-full")
+        field = ui.input(label, value=self.chosen[key], on_change=self._keep(key, ""))
+        return field.classes("w-full")
 
     def number(self, key: str, label: str, unit: str = "", empty: str = "") -> ui.number:
         """Ask for a number; `empty` is what counts where there is none."""
@@ -148,7 +148,7 @@ class Page:
 
     def command(self) -> None:
         """Show the command line here, whenever `show_command` is called."""
-        self._command, self._shown = ui.column().classes("w-full gap-0"), ""
+        self._command, self._command_line = ui.column().classes("w-full gap-0"), ""
 
     def show_command(self) -> None:
         """Show the command line of what is chosen now; none while something is missing."""
@@ -156,9 +156,9 @@ class Page:
         with suppress(InputError):
             task = self.task()
         line = "" if task is None else task.line
-        if self._command is not None and line != self._shown:
+        if self._command is not None and line != self._command_line:
             self._command.clear()
-            self._shown = line
+            self._command_line = line
             if line:
                 with self._command:
                     where = f"The same on the command line, in {self.session.project.folder}"
@@ -182,11 +182,11 @@ class Page:
 
     # --- what was written is given ----------------------------------------------------------------
 
-    def kind_buttons(self, asked: Callable[[str], Any]) -> None:
+    def kind_buttons(self, on_click: Callable[[str], Any]) -> None:
         """Show a button for each kind of file."""
         with ui.row().classes("items-center"):
             for kind, meaning in self.kinds.items():
-                small_button(kind, lambda _, to=kind: asked(to)).tooltip(meaning)
+                small_button(kind, lambda _, to=kind: on_click(to)).tooltip(meaning)
 
     def written(self, job: Job) -> bool:
         """Return whether a job has written what was asked for, be it in part."""
@@ -264,7 +264,7 @@ class Work:
             self._message = ui.label().classes("banner w-full").props("role=alert")
             self._notes = ui.column().classes("w-full gap-0 text-sm remark")
             self._notes.set_visibility(notes)
-        self._told = self._job if self._has_ended else None
+        self._reported_job = self._job if self._has_ended else None
         self._look()
         ui.timer(_LOOK_S, self._tell)
 
@@ -289,8 +289,8 @@ class Work:
     async def _tell(self) -> None:
         self._look()
         job = self._job
-        if job is not None and self._has_ended and self._told is not job:
-            self._told = job
+        if job is not None and self._has_ended and self._reported_job is not job:
+            self._reported_job = job
             await self._then(job)
 
     def _look(self) -> None:
@@ -347,8 +347,11 @@ class DrawnPage(Page):
             return False
         if self.written(job):
             stamp = self.session.project.stamp(job.task.written)
-            told = {"numbers": job.shown.get("table", []), "text": job.shown.get("result", "")}
-            self.session.results[self.name] = Result(**vars(job.task), **told, stamp=stamp)
+            summary = {
+                "numbers": job.contents.get("table", []),
+                "text": job.contents.get("result", ""),
+            }
+            self.session.results[self.name] = Result(**vars(job.task), **summary, stamp=stamp)
         return True
 
     def _show(self) -> None:

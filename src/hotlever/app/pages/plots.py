@@ -55,8 +55,8 @@ def dots(colour: Any, size: int, **how: Any) -> dict[str, Any]:
 
 def plotted(data: list[dict[str, Any]], layout: dict[str, Any], alt: str) -> ui.plotly:
     """Show a plot of some traces; `alt` says what it shows."""
-    made = ui.plotly({"data": deepcopy(data), "layout": layout, "config": _CONFIG})
-    return made.classes("w-full").props(f'role=img aria-label="{alt}"')
+    plot = ui.plotly({"data": deepcopy(data), "layout": layout, "config": _CONFIG})
+    return plot.classes("w-full").props(f'role=img aria-label="{alt}"')
 
 
 def points(x: Any, y: Any) -> dict[str, list[float]]:
@@ -132,9 +132,9 @@ class MeasuredPlots:
             for name, ((_, along), (_, title)) in _MEASURED.items():
                 with ui.element("div") as around:
                     layout = axes(along, title, 240, normal="xy")
-                    made = plotted([data, model], layout, f"Measured {name}, and the lever fitted")
-                self._plots[name] = around, made
-        self._said = caption("")
+                    plot = plotted([data, model], layout, f"Measured {name}, and the lever fitted")
+                self._plots[name] = around, plot
+        self._legend = caption("")
 
     def measured(self, data: dict[str, list[float]], observables: Sequence[str]) -> None:
         """Draw a measurement."""
@@ -152,7 +152,7 @@ class MeasuredPlots:
                 layout["xaxis"]["range"] = _range(data[x])
                 layout["yaxis"]["range"] = _range(data[y])
                 plot.update()
-        self._said.set_text("")
+        self._legend.set_text("")
 
     def approach(self, curve: dict[str, list[float]]) -> None:
         """Draw the lever that was found so far."""
@@ -162,7 +162,7 @@ class MeasuredPlots:
                 along = curve["time_us"] if "time_us" in curve else curve[x]
                 plot.figure["data"][1] |= points(along, curve[y])
                 plot.update()
-        self._said.set_text("Dots: measured. Line: the lever as the fit has it.")
+        self._legend.set_text("Dots: measured. Line: the lever as the fit has it.")
 
 
 def _range(values: list[float]) -> list[float]:
@@ -192,7 +192,7 @@ class LivePlots:
     """
 
     def __init__(self) -> None:
-        self._said = ui.label().classes("text-sm remark").props("data-number=beside")
+        self._beside_label = ui.label().classes("text-sm remark").props("data-number=beside")
         now = dots(VERMILION, 11) | {"name": "now"}
         knee = dots(BLUE, 11, symbol="diamond-open", line={"width": 2}) | {"name": "knee"}
         beside = line(INK, dash="dash") | {"name": "beside"}
@@ -243,7 +243,7 @@ class LivePlots:
 
     def beside(self, answer: dict[str, Any] | None, text: str) -> None:
         """Draw an answer of the lever beside, and say what it is; nothing if there is none."""
-        self._said.set_text(text)
+        self._beside_label.set_text(text)
         if answer is None and self._beside is None:
             return
         curves, now = (answer["curves"], answer["now"]) if answer else ({}, {})

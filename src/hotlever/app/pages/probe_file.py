@@ -22,7 +22,7 @@ from hotlever.app.edits import (
     with_material_renamed,
     with_value,
 )
-from hotlever.app.pages.frame import asked, caption, flat_button
+from hotlever.app.pages.frame import caption, confirm, flat_button
 from hotlever.app.pages.page import Page
 from hotlever.app.project import LARGEST_PROBE, safe_name
 from hotlever.errors import InputError
@@ -82,7 +82,7 @@ class ProbeFile:
         if not text or self._is_saved or text in map(new_probe, NEW_PROBES):
             return True
         question = "The probe file that is open here has edits that are not saved."
-        return await asked(question, "Drop them", "Go on with it")
+        return await confirm(question, "Drop them", "Go on with it")
 
     async def save(self, name: str, text: str) -> str | None:
         """Write a text; ask before another file of its name is replaced.
@@ -107,7 +107,7 @@ class ProbeFile:
         if there not in (None, text):
             is_own = name == self._chosen["name"] and _digest(there) == self._chosen["saved"]
             question = f"{name} is there already, and holds something else than was opened here."
-            if not is_own and not await asked(question, "Replace it", "Keep it"):
+            if not is_own and not await confirm(question, "Replace it", "Keep it"):
                 return None
         if there != text:
             project.write(name, text, f"saved {name}")
@@ -163,7 +163,7 @@ class ProbeFields:
         self._text, self._turn = "", 0
         self._built: Any = None
         self._inputs: dict[tuple[Section, str], ui.input] = {}
-        self._shown: dict[tuple[Section, str], str] = {}
+        self._field_values: dict[tuple[Section, str], str] = {}
         self._cards: dict[Section, ui.element] = {}
         self._column = ui.column().classes("w-full gap-1")
 
@@ -185,8 +185,8 @@ class ProbeFields:
                 self._show_field(field, card["section"])
         for row in rows:
             if row.role == FILM and row.material:
-                shown = "" if row.thickness_um is None else f"{row.thickness_um:.12g}"
-                self._set(("layers", row.name), "thickness_um", shown)
+                thickness = "" if row.thickness_um is None else f"{row.thickness_um:.12g}"
+                self._set(("layers", row.name), "thickness_um", thickness)
         self._mark(fault)
 
     def _build(self, settable: dict[str, Any], rows: list[LayerRow]) -> None:
@@ -218,16 +218,16 @@ class ProbeFields:
             role.on_value_change(lambda event: self._set_layer(row, event.value, row.material))
             if row.role in (*TERMINALS, *({row.name} if row.part == "terminals" else ())):
                 return
-            shown = materials if row.role else {**materials, "": "–"}
-            made_of = ui.select(shown, label="made of", value=row.material, with_input=True)
+            options = materials if row.role else {**materials, "": "–"}
+            made_of = ui.select(options, label="made of", value=row.material, with_input=True)
             made_of.classes("col min-w-36").props(f'aria-label="layer {row.label} is made of"')
             role_then = row.role or FILM
             made_of.on_value_change(lambda event: self._set_layer(row, role_then, event.value))
             if row.role == FILM and row.material:
                 section = ("layers", row.name)
                 label = "thickness (µm)"
-                made = self._input(section, "thickness_um", label, f"{row.label}: {label}")
-                made.props('placeholder="a part of the body" stack-label').classes("w-full")
+                field_input = self._input(section, "thickness_um", label, f"{row.label}: {label}")
+                field_input.props('placeholder="a part of the body" stack-label').classes("w-full")
 
     def _set_layer(
         self, row: LayerRow, role: str | None, material: str | None
@@ -258,35 +258,35 @@ class ProbeFields:
         section, key, value = field["section"], field["key"], field["value"]
         if (section, key) not in self._inputs:
             with self._cards[card]:
-                made = self._input(section, key, field["label"], field["meaning"])
+                field_input = self._input(section, key, field["label"], field["meaning"])
                 if field["default"]:
-                    made.props(f'placeholder="{field["default"]}" stack-label')
+                    field_input.props(f'placeholder="{field["default"]}" stack-label')
                 if value is None:
-                    made.props('readonly placeholder="as the probe file says" stack-label')
+                    field_input.props('readonly placeholder="as the probe file says" stack-label')
         self._inputs[section, key].set_visibility(field["used"])
         self._set(section, key, value or "")
 
     def _input(self, section: Section, key: str, label: str, meaning: str) -> ui.input:
         files = self._session.project.data if section[0] == "materials" else None
-        made = ui.input(label, autocomplete=files)
-        made.props(f'debounce=300 hide-bottom-space aria-label="{meaning}"')
-        made.tooltip(f"{'.'.join((*section, key))}: {meaning}")
-        made.on_value_change(partial(self._typed, section, key))
-        self._inputs[section, key] = made
-        return made
+        field_input = ui.input(label, autocomplete=files)
+        field_input.props(f'debounce=300 hide-bottom-space aria-label="{meaning}"')
+        field_input.tooltip(f"{'.'.join((*section, key))}: {meaning}")
+        field_input.on_value_change(partial(self._typed, section, key))
+        self._inputs[section, key] = field_input
+        return field_input
 
     def _set(self, section: Section, key: str, value: str) -> None:
-        made = self._inputs[section, key]
-        self._shown[section, key] = value
-        if typed(key, made.value or "") != typed(key, value):
-            made.set_value(value)
+        field_input = self._inputs[section, key]
+        self._field_values[section, key] = value
+        if typed(key, field_input.value or "") != typed(key, value):
+            field_input.set_value(value)
 
     def _typed(self, section: Section, key: str, event: Any) -> Awaitable[None] | None:
-        if (event.value or "") == self._shown.get((section, key)):
+        if (event.value or "") == self._field_values.get((section, key)):
             return None  # nobody typed it
         if len(section) > 1 and not has_section(self._text, section):
             return None  # it went meanwhile with the layer or the material that it was of
-        self._shown[section, key] = event.value or ""
+        self._field_values[section, key] = event.value or ""
         value = typed(key, event.value or "")
         text = with_value(self._text, section, key, value)
         return None if same(text, self._text) else self._edit(text)
@@ -302,10 +302,10 @@ class ProbeFields:
         about, _, reason = fault.replace(folder, "").partition("]: ")
         words = re.findall(r"\w+", reason)
         at_fault = [
-            (words.index(key), made)
-            for (section, key), made in self._inputs.items()
+            (words.index(key), field_input)
+            for (section, key), field_input in self._inputs.items()
             if about.endswith(f"[{'.'.join(section)}") and key in words
         ]
         wrong = min(at_fault, key=lambda pair: pair[0], default=(0, None))[1]
-        for made in self._inputs.values():
-            made.error = reason if made is wrong else None
+        for field_input in self._inputs.values():
+            field_input.error = reason if field_input is wrong else None

@@ -298,8 +298,8 @@ class OneSpectrum:
             return
         try:
             correction = self._corrections().get(name, Correction())
-            asked = name, self._page.task()
-            spectrum = await self._page.session.ask("full", "showing:spectrum", *asked)
+            arguments = name, self._page.task()
+            spectrum = await self._page.session.ask("full", "showing:spectrum", *arguments)
         except HotleverError as error:
             if not self._all.is_deleted:
                 self._text.set_text(str(error).replace(f"{self._page.session.project.folder}/", ""))

@@ -137,8 +137,8 @@ class ReaderPage(LivePage):
 
     async def described(self) -> dict[str, Any]:
         """Return which distances there are, and what the file says of the surroundings."""
-        asked = "approaching:described", self.chosen["probe"], self.chosen["tilt_deg"]
-        answer: dict[str, Any] = await self.session.ask("quick", *asked)
+        request = "approaching:described", self.chosen["probe"], self.chosen["tilt_deg"]
+        answer: dict[str, Any] = await self.session.ask("quick", *request)
         nearest, farthest = answer["nearest_um"], answer["farthest_um"]
         self.chosen["distance_um"] = min(max(self.chosen["distance_um"], nearest), farthest)
         return answer
@@ -171,6 +171,6 @@ class ReaderPage(LivePage):
         }
         return Task("reader", probe_files(self.chosen), options)
 
-    def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
+    def model_and_remark(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return whose numbers these are, and where they are read."""
         return _MOVING if quick else _AT_REST, f"Read at the terminal {answer['read_at']}"

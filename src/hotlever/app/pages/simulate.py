@@ -77,8 +77,8 @@ class SimulatePage(LivePage):
             self._pulses = Pulses(self.session, self.banner, self.chosen)
         with ui.column().classes("w-full gap-3") as signals:
             self._signals = SmallSignals(self.session, self.banner, self.chosen)
-        for name, shown in (("rest", rest), ("time", time), ("signals", signals)):
-            shown.bind_visibility_from(self._view, "value", value=name)
+        for name, column in (("rest", rest), ("time", time), ("signals", signals)):
+            column.bind_visibility_from(self._view, "value", value=name)
 
     def _viewed(self, event: Any) -> None:
         self.chosen["view"] = event.value
@@ -91,7 +91,7 @@ class SimulatePage(LivePage):
         if self.chosen["beside"] == NOW != beside:
             self.chosen["kept"] = {key: self.chosen[key] for key in ("probe", "changes")}
         if self.chosen["probe"] == probe:
-            self.moved()
+            self.refresh()
         else:
             await self._reset()
 
@@ -99,9 +99,9 @@ class SimulatePage(LivePage):
         self.chosen["changes"] = {}
         await self.open()
 
-    def moved(self) -> None:
+    def refresh(self) -> None:
         """Follow what was moved, in all views."""
-        super().moved()
+        super().refresh()
         self._pulses.show_command()
         self._signals.show_command()
 
@@ -159,7 +159,7 @@ class SimulatePage(LivePage):
             changes[key] = value
         if changes != self.chosen["changes"]:
             self.chosen["changes"] = changes
-            self.moved()
+            self.refresh()
 
     # --- a lever at a bias ------------------------------------------------------------------------
 
@@ -171,18 +171,18 @@ class SimulatePage(LivePage):
         """Return whether the reduced lever of the geometry has been made."""
         return (self.session.reduced.get(self._geometry(), False),)
 
-    def said(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
+    def model_and_remark(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return of which lever the numbers are."""
         return _MODELS[answer["model"]], ""
 
-    async def shown(self, at: list[float], quick: bool) -> None:
+    async def follow_answer(self, at: list[float], quick: bool) -> None:
         """Show the lever beside, once the other rests."""
         lever, answer, text = lever_beside(self.chosen), None, ""
         if lever is not None and not quick:
             text = f"Dashed: {beside_in_words(self.chosen)}"
             try:
-                asked = sweep_of(lever), *at, False
-                answer = await self.session.ask("beside", "live:answer", *asked)
+                arguments = sweep_of(lever), *at, False
+                answer = await self.session.ask("beside", "live:answer", *arguments)
                 texts = texts_of(answer["now"], _NUMBERS)
                 text += ": " + ", ".join(f"{_NUMBERS[key][0]} {texts[key]}" for key in texts)
             except HotleverError as error:

@@ -40,7 +40,7 @@ _KINDS = {
     "data": ("Measurements", "fit", "data"),
     "drawings": ("Drawings", "lever", "drawing"),
 }
-_SHOWN = 12
+_MOST_FILES = 12
 _SCRIPTS, _ADDRESS = EXAMPLES / "gallery", "/gallery"
 #: The page Simulate as at first, whatever was chosen there.
 _SIMULATE = Simulate().model_dump()
@@ -159,11 +159,11 @@ class StartPage(Page):
                     continue
                 with ui.column().classes("gap-0"):
                     ui.label(title).classes("text-bold")
-                    for name in names[:_SHOWN]:
+                    for name in names[:_MOST_FILES]:
                         go = flat_button(name, partial(self._open, page, key, name))
                         go.props("align=left")
-                    if len(names) > _SHOWN:
-                        caption(f"and {len(names) - _SHOWN} more")
+                    if len(names) > _MOST_FILES:
+                        caption(f"and {len(names) - _MOST_FILES} more")
 
     def _open(self, page: str, key: str, name: str) -> None:
         # sliders that were moved are of another probe
