@@ -40,13 +40,13 @@ def check(first: np.ndarray, second: np.ndarray, motion: np.ndarray) -> None:
     fixed, pair, moving = Panels(first[None]), np.array([0]), Approach(motion)
 
     def near(share: float) -> float:
-        moved = Panels((second + share * motion)[None])
-        return Laplace().near_pairs(fixed, moved, pair, pair)[0]
+        displaced_panels = Panels((second + share * motion)[None])
+        return Laplace().near_pairs(fixed, displaced_panels, pair, pair)[0]
 
     def far(share: float) -> float:
-        moved = Panels((second + share * motion)[None])
-        offsets = (fixed.centres - moved.centres)[:, None]
-        return Laplace().far_pairs(fixed, moved, offsets)[0, 0]
+        displaced_panels = Panels((second + share * motion)[None])
+        offsets = (fixed.centres - displaced_panels.centres)[:, None]
+        return Laplace().far_pairs(fixed, displaced_panels, offsets)[0, 0]
 
     there = Panels(second[None])
     offsets = (fixed.centres - there.centres)[:, None]

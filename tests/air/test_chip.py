@@ -45,7 +45,7 @@ def with_ground(start, end):
 
 
 @pytest.mark.parametrize(
-    ("layout", "told"),
+    ("layout", "message"),
     [
         (with_ground((5.0, 9.88), (10.0, 9.88)), r"leg ends of supply and ground on one line; \("),
         (with_ground((0.0, 6.42), (1.0, 9.88)), r"leg ends .* \(0, 6.42\) µm is 0.734 µm off"),
@@ -61,9 +61,9 @@ def with_ground(start, end):
         ),
     ],
 )
-def test_without_a_base_line_chip_and_tilt_are_refused_and_nothing_else(layout, told):
+def test_without_a_base_line_chip_and_tilt_are_refused_and_nothing_else(layout, message):
     for what in ({"chip": True}, {"surface_gap_um": 9.0, "surface_tilt_deg": 5.0}):
-        with pytest.raises(InputError, match=rf"^surroundings: .*{told}") as refused:
+        with pytest.raises(InputError, match=rf"^surroundings: .*{message}") as refused:
             air_operator(layout, Surroundings(**what), refinement=COARSE)
         assert "\n" not in str(refused.value)
     np.testing.assert_array_equal(lever_axes(layout), np.eye(2))

@@ -32,7 +32,7 @@ SECTIONS = {
     "metal-film, given κ": {"kind": "metal-film", "preset": "NiCr", "kappa": 0.11},
     "dielectric": {"kind": "dielectric", "preset": "SiN"},
 }
-MADE = {name: material_of(values, name) for name, values in SECTIONS.items()}
+MATERIALS = {name: material_of(values, name) for name, values in SECTIONS.items()}
 DOPING, THICKNESS = 5.75e17, 0.3
 
 
@@ -43,9 +43,9 @@ def of_row(row, evaluated):
 
 
 @pytest.mark.parametrize("T", [*TEMPERATURES, *BEYOND])
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", MATERIALS)
 def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, T):
-    kind, T = MADE[name], np.array([T])
+    kind, T = MATERIALS[name], np.array([T])
     laws = {
         "heat": lambda kind, T, n, t: kind.thermal_conductivity(T, t),
         "charge": lambda kind, T, n, t: kind.electrical_conductivity(T, n),
@@ -63,10 +63,10 @@ def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, 
         for parameter in kind.parameters:
             number = getattr(kind, parameter)
 
-            def moved(x, law=law, parameter=parameter):
+            def varied_law(x, law=law, parameter=parameter):
                 return law(kind.model_copy(update={parameter: x}), T, *at)[0]
 
-            slope = numerical_derivative(moved, number, 1e-3 * (number or 1.0))
+            slope = numerical_derivative(varied_law, number, 1e-3 * (number or 1.0))
             expected = partials.get(parameter, 0.0)
             assert expected == pytest.approx(slope, rel=1e-6, abs=1e-12 * abs(value[0]))
         for place, other in enumerate(("n", "thickness_um")):
@@ -81,17 +81,17 @@ def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, 
     assert set(kind.parameters) - found <= {"n_d", "delta", "n_hd"}
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", MATERIALS)
 def test_every_law_states_range_and_source(name):
-    for law in MADE[name].laws:
+    for law in MATERIALS[name].laws:
         low, high = law.temperature_range
         assert 100 < low < 300 < 700 < high
         assert len(law.source) > 4
 
 
-@given(st.floats(-1e9, 1e9), st.sampled_from(sorted(MADE)))
+@given(st.floats(-1e9, 1e9), st.sampled_from(sorted(MATERIALS)))
 def test_laws_are_finite_and_not_negative_at_any_temperature(T, name):
-    kind, T = MADE[name], np.array([T])
+    kind, T = MATERIALS[name], np.array([T])
     for value, partials in (
         kind.thermal_conductivity(T, THICKNESS),
         kind.electrical_conductivity(T, DOPING),
@@ -148,7 +148,7 @@ def test_boron_doped_silicon_has_an_inversion_temperature():
     T = np.linspace(500.0, 1200.0, 70001)
     found = inversion_temperature(5e17, 2.5, conductivity=conductivity_p)
     assert found == pytest.approx(T[conductivity_p(T, 5e17, 2.5)[0].argmin()], abs=0.02)
-    assert MADE["p-silicon"].inversion_temperature() == pytest.approx(
+    assert MATERIALS["p-silicon"].inversion_temperature() == pytest.approx(
         inversion_temperature(OPTION_III.n_d, 2.23, 0.4, 0.8, conductivity_p)
     )
 
@@ -189,9 +189,9 @@ def test_presets_give_back_the_table(name, at_400, kappa):
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_makes_a_material_and_names_its_source(name):
-    made = material_of({"kind": PRESETS[name].kind, "preset": name}, "here")
-    for parameter, known in made.parameters.items():
-        assert known.lower <= getattr(made, parameter) <= known.upper
+    material = material_of({"kind": PRESETS[name].kind, "preset": name}, "here")
+    for parameter, known in material.parameters.items():
+        assert known.lower <= getattr(material, parameter) <= known.upper
     assert len(PRESETS[name].source) > 20
 
 
@@ -199,10 +199,10 @@ def test_every_preset_makes_a_material_and_names_its_source(name):
 
 
 def test_what_a_silicon_leaves_out_is_that_of_the_reference_probe():
-    assert MADE["n-silicon"].p == OPTION_III.p
-    assert MADE["high-doped-silicon"].a1 == OPTION_III.a1
-    for kind, made in OPTION_III.kinds.items():
-        assert material_of({"kind": made.kind}, kind) == made
+    assert MATERIALS["n-silicon"].p == OPTION_III.p
+    assert MATERIALS["high-doped-silicon"].a1 == OPTION_III.a1
+    for kind, material in OPTION_III.kinds.items():
+        assert material_of({"kind": material.kind}, kind) == material
 
 
 def test_what_a_film_or_a_dielectric_leaves_out_of_its_emissivity_is_its_own():
@@ -227,11 +227,11 @@ def test_the_papers_material_has_each_parameter_of_its_two_kinds():
 
 def test_the_paper_varies_six_parameters_and_every_kind_its_own():
     assert list(PARAMETERS) == ["c_kappa", "delta", "n_d", "p", "a0", "a1"]
-    for made in MADE.values():
-        assert set(made.usual) <= set(made.declared)
-        assert isinstance(made, KINDS[made.kind])
-    assert isinstance(MADE["p-silicon"], PSilicon)
-    assert isinstance(MADE["n-silicon"], LowDopedSilicon)
+    for material in MATERIALS.values():
+        assert set(material.usual) <= set(material.declared)
+        assert isinstance(material, KINDS[material.kind])
+    assert isinstance(MATERIALS["p-silicon"], PSilicon)
+    assert isinstance(MATERIALS["n-silicon"], LowDopedSilicon)
 
 
 @pytest.mark.parametrize(

@@ -125,9 +125,9 @@ def air_operator(
         "refinement": refinement,
     }
     path = cache_file("air", facts)
-    kept = stored(path, AirOperator.from_arrays)
-    if kept is not None:
-        return kept
+    cached_operator = stored(path, AirOperator.from_arrays)
+    if cached_operator is not None:
+        return cached_operator
     operator = PanelledAir(
         layout, surroundings, base_temperature_K, refinement, progress
     ).operator()

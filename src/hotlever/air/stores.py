@@ -201,7 +201,7 @@ class HeatInAir:
     def lagging(self, in_air: Array, rate: float) -> Array:
         """Return the heat by mode, (m, n), in stores that settle at a rate (1/µs) to what is given.
 
-        That is ``(rate + rates) × temperatures = given``.
+        That is ``(rate + rates) × temperatures = in_air``.
         """
         many = self._by_store(in_air / (rate + self.rates))
         return np.asarray(self.capacity * np.einsum("kij,kjn->in", self._volumes, many))

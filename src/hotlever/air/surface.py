@@ -194,9 +194,9 @@ class _Outline:
         points = shapely.points(places)
         outside = shapely.distance(points, self._exact) > 0
         nearest = shapely.shortest_line(self._exact, points[outside])
-        moved = places.copy()
-        moved[outside] = shapely.get_coordinates(shapely.get_point(nearest, 0))
-        return moved
+        places_inside = places.copy()
+        places_inside[outside] = shapely.get_coordinates(shapely.get_point(nearest, 0))
+        return places_inside
 
     def upright(self, half: float, mirrored: bool) -> Array:
         """Divide a side face from bottom (or the mid-plane) to top."""

@@ -71,31 +71,31 @@ def contact_picture(probe: Probe, tip_K: float) -> ContactPicture:
     assert law is not None
     end = tip.apex_radius_um
 
-    def shown(length_um: Array | float) -> Array:
+    def coordinate(length_um: Array | float) -> Array:
         return np.asarray(np.arcsinh(np.asarray(length_um) / end))
 
     films = sum(layer.thickness_um or 0.0 for layer in contact.layers)
     deepest = max(_RADII * end, _FILMS * films)
-    down = end * np.sinh(np.linspace(0.0, float(shown(deepest)), _SLICES + 1))
+    down = end * np.sinh(np.linspace(0.0, float(coordinate(deepest)), _SLICES + 1))
     down[0] = _NEAREST * end
     height, cone_K, under_K = law.along_axis(tip_K, down)
-    up = np.linspace(float(shown(tip.height_um)), 0.0, _SLICES + 1)
-    along_K = np.interp(up, shown(height), cone_K)
-    half = shown(end + tip.slope * end * np.sinh(up))
-    below = -shown(down)
+    up = np.linspace(float(coordinate(tip.height_um)), 0.0, _SLICES + 1)
+    along_K = np.interp(up, coordinate(height), cone_K)
+    half = coordinate(end + tip.slope * end * np.sinh(up))
+    below = -coordinate(down)
     below[0] = 0.0
     width = max(_NARROWEST, 1.2 * float(half[0]))
     top = float(up[0]) + _BAR
     low = float(up[0])
     bar = [(-width, low), (width, low), (width, top), (-width, top)]
-    column = np.full_like(below, float(shown(end)))
+    column = np.full_like(below, float(coordinate(end)))
     pieces = [
         (bar, tip_K),
         *_slices(up, half, along_K),
         *_slices(below, column, under_K),
     ]
     edges = np.cumsum([0.0, *(layer.thickness_um or deepest for layer in contact.layers)])
-    floors = -shown(np.minimum(edges, deepest))
+    floors = -coordinate(np.minimum(edges, deepest))
     sides = [
         [(way * float(x), float(y)) for x, y in zip(half, up, strict=True)] for way in (-1.0, 1.0)
     ]

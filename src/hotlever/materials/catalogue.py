@@ -103,7 +103,7 @@ def _lines(
     values: Mapping[str, Any],
     laws: Mapping[Law | StatedLaw, str],
 ) -> list[str]:
-    """Return a heading, the parameters with values, and the laws with what is said of them."""
+    """Return a heading, the parameters with values, and the laws with their sources."""
     rows = [["  parameter", "unit", "from", "to", values_are, ""]]
     for own, parameter in parameters.items():
         value = values.get(own)
@@ -111,21 +111,21 @@ def _lines(
         limits = f"{parameter.lower:.4g}", f"{parameter.upper:.4g}"
         rows.append([f"  {own}", parameter.unit, *limits, default, parameter.meaning])
     lines = [head, *aligned(rows)]
-    for law, said in laws.items():
+    for law, source in laws.items():
         low, high = law.temperature_range
         title = (law.__doc__ or "").partition("\n")[0].partition(",")[0].rstrip(".")
         first = "" if isinstance(law, StatedLaw) else f"{title}: "
-        lines.append(f"  {first}{said}; {low:g} to {high:g} K")
+        lines.append(f"  {first}{source}; {low:g} to {high:g} K")
     return lines
 
 
 def examples() -> dict[str, Kind]:
     """Return each kind of silicon with the values of the reference probe, and each preset."""
-    made = {name: _example(name) for name in KINDS if name not in _EXAMPLES}
-    made[_THIN] = made["n-silicon"].model_copy(update={"c_kappa": "thickness"})
+    materials = {name: _example(name) for name in KINDS if name not in _EXAMPLES}
+    materials[_THIN] = materials["n-silicon"].model_copy(update={"c_kappa": "thickness"})
     for name, preset in PRESETS.items():
-        made[name] = material_of({"kind": preset.kind, "preset": name}, name)
-    return made
+        materials[name] = material_of({"kind": preset.kind, "preset": name}, name)
+    return materials
 
 
 def curves(

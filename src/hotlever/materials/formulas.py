@@ -44,7 +44,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[[Any, Any], Any]]] = {
 }
 CONSTANTS = {"pi": np.pi}
 #: What no parameter can be called.
-TAKEN = {TEMPERATURE, *FUNCTIONS, *CONSTANTS}
+RESERVED_NAMES = {TEMPERATURE, *FUNCTIONS, *CONSTANTS}
 #: Operators, and their derivatives by what stands before and behind them.
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], tuple[Any, Any, Any]]] = {
     ast.Add: lambda x, y: (x + y, 1.0, 1.0),
@@ -84,7 +84,7 @@ def names_in(text: str) -> set[str]:
     >>> sorted(names_in("rho0 * exp(1e-3*(T - T0))"))
     ['T0', 'rho0']
     """
-    return set(_NAME.findall(text)) - TAKEN
+    return set(_NAME.findall(text)) - RESERVED_NAMES
 
 
 def parsed(text: str) -> Expression:
@@ -138,7 +138,7 @@ def _check(node: ast.AST, names: dict[str, None], text: str, depth: int, steps: 
         case ast.Name(id=name):
             if name in FUNCTIONS:
                 raise ValueError(f"{where}: {name} is a function, expected {name}(…)")
-            if name not in TAKEN:
+            if name not in RESERVED_NAMES:
                 names[name] = None
             return
         case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):

@@ -20,9 +20,9 @@ from hotlever.records import Record
 from hotlever.types import Array
 
 
-def class_name(made: type) -> str:
+def class_name(material_class: type) -> str:
     """Return the name of a class with its module, as files and messages state it."""
-    return f"{made.__module__}.{made.__qualname__}"
+    return f"{material_class.__module__}.{material_class.__qualname__}"
 
 
 class Kind(Record):

@@ -36,7 +36,7 @@ def material_of(
     values: Mapping[str, Any],
     where: str,
     folder: Path | None = None,
-    made: type[Kind] | None = None,
+    material_class: type[Kind] | None = None,
 ) -> Kind:
     """Make a material of a section of a probe file.
 
@@ -49,7 +49,7 @@ def material_of(
         Names the section in an error.
     folder : path, optional
         What names of files of tables are relative to.
-    made : type, optional
+    material_class : type, optional
         A class of this kind with laws of its own.
 
     Raises
@@ -68,20 +68,20 @@ def material_of(
     if not isinstance(kind, str) or kind not in KINDS:
         raise unknown_name("kind", str(kind), KINDS, where)
     usual = {**usual_values(kind), **_preset(values.get("preset"), kind, where)}
-    if made is None or not issubclass(made, KINDS[kind]):
-        made = KINDS[kind]
+    if material_class is None or not issubclass(material_class, KINDS[kind]):
+        material_class = KINDS[kind]
     try:
         stated = with_tables(values, folder)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     # of a metal that follows a table the coefficient of a preset has no use
-    useless = made.without_use({**usual, **stated})
+    useless = material_class.without_use({**usual, **stated})
     usual = {name: value for name, value in usual.items() if name not in useless}
-    return made.from_values({**usual, **stated}, where)
+    return material_class.from_values({**usual, **stated}, where)
 
 
 def remade(
-    material: Kind | Material, made: type[Record], values: Mapping[str, Any], name: str
+    material: Kind | Material, material_class: type[Record], values: Mapping[str, Any], name: str
 ) -> Record:
     """Return a material as one of a class of one's own; see `Probe.with_material`.
 
@@ -91,14 +91,16 @@ def remade(
         If the class is none for it, or a value is impossible.
     """
     base = KINDS[material.kind] if isinstance(material, Kind) else Material
-    if not issubclass(made, base):
-        raise InputError(f"{name}: found {made.__name__}, expected a class made of {base.__name__}")
+    if not issubclass(material_class, base):
+        raise InputError(
+            f"{name}: found {material_class.__name__}, expected a class made of {base.__name__}"
+        )
     own = {**material.model_dump(exclude_none=True), **values}
-    if not issubclass(made, Kind):
-        return made.from_values(own, f"[{name}]")
-    useless = {*made.without_use(own)} - values.keys()
+    if not issubclass(material_class, Kind):
+        return material_class.from_values(own, f"[{name}]")
+    useless = {*material_class.without_use(own)} - values.keys()
     own = {key: value for key, value in own.items() if key not in useless}
-    return material_of(own, f"[{name}]", made=made)
+    return material_of(own, f"[{name}]", material_class=material_class)
 
 
 def materials_of(
@@ -141,8 +143,8 @@ def materials_of(
             continue
         if not isinstance(section, dict):
             raise InputError(f"{here} must be a section, found {quoted(section)}")
-        made: Any = (classes or {}).get(name)
-        materials[name] = material_of(section, here, folder, made)
+        material_class: Any = (classes or {}).get(name)
+        materials[name] = material_of(section, here, folder, material_class)
     return materials
 
 
@@ -257,15 +259,15 @@ def classes_at_hand(laws: Any, where: str) -> dict[str, type[Record]]:
     if not isinstance(laws, Mapping):
         raise InputError(f"{where}: [{LAWS}] must be a section, found {quoted(laws)}")
     # of classes made again under a name, in a notebook, the last
-    made = {class_name(each): each for base in (Kind, Material) for each in _made_of(base)}
+    classes = {class_name(each): each for base in (Kind, Material) for each in _made_of(base)}
     for name, law in laws.items():
-        if str(law) not in made:
+        if str(law) not in classes:
             raise InputError(
                 f"{where}: '{excerpt(str(name))}' follows laws of its own, those of the Python "
                 f"class {excerpt(str(law), 80)}, which no file holds: expected Python that has "
                 "imported it"
             )
-    return {name: made[law] for name, law in laws.items()}
+    return {name: classes[law] for name, law in laws.items()}
 
 
 def _made_of(base: type[Record]) -> list[type[Record]]:
