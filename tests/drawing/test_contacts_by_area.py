@@ -97,7 +97,7 @@ def test_a_contact_that_is_a_film_too_is_not_noted():
 
 
 @pytest.mark.parametrize(
-    ("terminal", "given", "message"),
+    ("terminal", "section", "message"),
     [
         ("supply", {"area": box(-1, -12, 60, 12)}, "'supply', at .*: it covers the tip"),
         ("supply", {"area": box(-9, -3, -2, 3)}, "'supply', polygon 1, .* lies outside the sil"),
@@ -107,9 +107,9 @@ def test_a_contact_that_is_a_film_too_is_not_noted():
         ("supply", {}, r"\[terminals.supply\]: area is missing"),
     ],
 )
-def test_terminals_by_area_that_are_wrong(terminal, given, message):
+def test_terminals_by_area_that_are_wrong(terminal, section, message):
     values = reference_points()
-    values["terminals"][terminal] = given
+    values["terminals"][terminal] = section
     with pytest.raises((InputError, DrawingError), match=message) as caught:
         Probe.from_sections(values, "probe.toml")
     assert "\n" not in str(caught.value)

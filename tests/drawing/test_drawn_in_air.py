@@ -96,14 +96,14 @@ def test_a_slanted_lever_against_the_full_three_dimensional_simulation(tmp_path)
 def test_slices_follow_a_lever_that_is_turned(tmp_path):
     pytest.importorskip("ngsolve")
     coarse = SolidMeshOptions(refinement=0.4, grading=0.7)
-    shown = []
+    slices = []
     for turn in (False, True):
         file = written(tmp_path / f"{turn}.gds", turn=turn)
         probe = drawn(file, TURNED_TIP if turn else TIP).in_medium("air")
         (state,) = SolidLever(probe, coarse, air_order=2).solve([6.0])
-        shown.append(temperature_slices(state))
-    assert shown[0].axis.values.tolist() == ["x", "y", "x", "y"]
-    assert shown[1].axis.values.tolist() == ["along", "across", "along", "across"]
-    rise = shown[0].temperature.values - 293.0
-    away = np.abs(shown[1].temperature.values - 293.0 - rise)
+        slices.append(temperature_slices(state))
+    assert slices[0].axis.values.tolist() == ["x", "y", "x", "y"]
+    assert slices[1].axis.values.tolist() == ["along", "across", "along", "across"]
+    rise = slices[0].temperature.values - 293.0
+    away = np.abs(slices[1].temperature.values - 293.0 - rise)
     assert np.nanquantile(away, 0.95) < 0.03 * np.nanmax(rise)

@@ -69,9 +69,9 @@ def test_the_reference_probe_shows_what_it_does_as_a_built_in_shape(lever):
     mine, built_in = (
         SimilarLevers(one).linearised(one.probe, REACH, None, names) for one in (drawn, same)
     )
-    shown = built_in.branch.values[1:, :3]
-    np.testing.assert_allclose(mine.branch.values[1:, :3], shown, rtol=1e-11)
-    apart = (mine.shown - built_in.shown)[1:, :3] * REFERENCE.values(names) / shown[..., None]
+    expected = built_in.branch.values[1:, :3]
+    np.testing.assert_allclose(mine.branch.values[1:, :3], expected, rtol=1e-11)
+    apart = (mine.shown - built_in.shown)[1:, :3] * REFERENCE.values(names) / expected[..., None]
     assert np.abs(apart).max() < 2e-5
     # and on a mesh of its own
     u = np.linspace(2.0, 9.0, 8)
@@ -98,8 +98,8 @@ def test_derivatives_have_taylor_order_two(name, similar, start):
     slopes = start.shown[1:, :2, VARIED.index(name)]
     for step in (0.02, 0.01):
         way = step * (value or 1.0)
-        moved = POINTED.replace({name: value + way})
-        branch = similar.linearised(moved, REACH, start, (name,)).branch
+        perturbed_probe = POINTED.replace({name: value + way})
+        branch = similar.linearised(perturbed_probe, REACH, start, (name,)).branch
         change = (branch.values[: start.branch.u.size] - start.branch.values)[1:, :2]
         rest.append(np.abs((change - way * slopes) / start.branch.values[1:, :2]).max())
     assert rest[0] < 1e-3
@@ -110,9 +110,9 @@ def test_a_moved_mesh_shows_what_a_new_one_does(similar, start):
     """Far away too, where corners on arcs have moved along curves."""
     probe = POINTED.with_(radius_um=1.2, hole_radius_um=1.0, slit_um=3.2, track_um=0.06)
     u = np.linspace(2.0, 9.0, 8)
-    moved = similar.linearised(probe, REACH, start, VARIED[:1]).branch.curve(u)[:, :2]
+    predicted = similar.linearised(probe, REACH, start, VARIED[:1]).branch.curve(u)[:, :2]
     new = Lever(probe, COARSE).branch_to(6.0).curve(u)[:, :2]
-    np.testing.assert_allclose(moved, new, rtol=1e-3)
+    np.testing.assert_allclose(predicted, new, rtol=1e-3)
 
 
 # --- dimensions -------------------------------------------------------------------------------

@@ -63,10 +63,10 @@ def test_on_the_same_mesh_turned_nothing_changes(file, tmp_path):
     there = drawn(other, TURNED_TIP)
     here = drawn(file)
     mesh = mesh_layout(here.layout())
-    moved = MeshTri(turned(mesh.elements.p), mesh.elements.t)
+    turned_mesh = MeshTri(turned(mesh.elements.p), mesh.elements.t)
     layout = there.layout()
     assert [one.name for one in layout.regions] == [one.name for one in here.layout().regions]
-    same = ProbeMesh(layout, moved, mesh.region, terminal_facets(moved, layout))
+    same = ProbeMesh(layout, turned_mesh, mesh.region, terminal_facets(turned_mesh, layout))
     expected = Lever(here, space=FullSpace(mesh)).sweep(BIAS)
     found = Lever(there, space=FullSpace(same)).sweep(BIAS)
     for name in SHOWN:

@@ -12,9 +12,9 @@ from hotlever.lever import Lever
 from hotlever.probe import Probe
 
 
-def changed(**given) -> Probe:
+def changed(**changes) -> Probe:
     values = reference_points()
-    values["probe"] |= given
+    values["probe"] |= changes
     return Probe.from_sections(values, "p")
 
 

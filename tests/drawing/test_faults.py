@@ -102,8 +102,8 @@ WRONG = {
 def test_what_is_drawn_wrongly_is_named_with_its_place(name):
     section, part, (number, outline), message = WRONG[name]
     values = reference_points()
-    given = values[section][part]
-    group = [given] if isinstance(given[0][0], float | int) else list(given)
+    coordinates = values[section][part]
+    group = [coordinates] if isinstance(coordinates[0][0], float | int) else list(coordinates)
     group[number : number + 1] = [outline]
     values[section][part] = group
     with pytest.raises(DrawingError, match=message) as caught:

@@ -64,9 +64,9 @@ def broken(draw):
     where = draw(st.integers(0, len(outline) - 1))
     kind = draw(st.sampled_from(["move", "omit", "double", "swap", "add"]))
     step = [draw(st.sampled_from([-1, 1])) * 10 ** draw(length(-4, 2)) for _ in range(2)]
-    moved = [outline[where][0] + step[0], outline[where][1] + step[1]]
+    shifted_corner = [outline[where][0] + step[0], outline[where][1] + step[1]]
     if kind == "move":
-        outline[where] = moved
+        outline[where] = shifted_corner
     elif kind == "omit":
         del outline[where]
     elif kind == "double":
@@ -74,7 +74,7 @@ def broken(draw):
     elif kind == "swap":
         outline[where - 1], outline[where] = outline[where], outline[where - 1]
     else:
-        values["layers"][part].append([outline[where - 1], outline[where], moved])
+        values["layers"][part].append([outline[where - 1], outline[where], shifted_corner])
     return values
 
 
@@ -82,14 +82,16 @@ def solved(values, **surroundings):
     """What the lever shows at a bias, None if the drawing is refused in one line."""
     try:
         lever = Lever(Probe.from_sections(values, "probe.toml").with_(**surroundings), COARSE)
-        shown = lever.dataset(lever.solve([0.5]))
+        dataset = lever.dataset(lever.solve([0.5]))
     except HotleverError as refused:
         return check_told(str(refused))
     # no silent gap: what goes in comes out
-    np.testing.assert_allclose(shown.ground_current_mA, shown.current_mA, rtol=1e-6)
-    np.testing.assert_allclose(shown.end_heat_mW + shown.air_heat_mW, shown.power_mW, rtol=1e-6)
-    assert shown.current_mA.item() > 0
-    return shown
+    np.testing.assert_allclose(dataset.ground_current_mA, dataset.current_mA, rtol=1e-6)
+    np.testing.assert_allclose(
+        dataset.end_heat_mW + dataset.air_heat_mW, dataset.power_mW, rtol=1e-6
+    )
+    assert dataset.current_mA.item() > 0
+    return dataset
 
 
 def check_told(text):
@@ -115,8 +117,8 @@ def test_broken_drawings_are_solved_or_refused(values):
 @few
 @given(levers(), st.booleans())
 def test_valid_drawings_are_solved_in_air(values, chip):
-    shown = solved(values, medium="air", chip=chip)
-    assert 0 < shown.air_heat_mW.item() < shown.power_mW.item()
+    dataset = solved(values, medium="air", chip=chip)
+    assert 0 < dataset.air_heat_mW.item() < dataset.power_mW.item()
 
 
 @few

@@ -32,10 +32,10 @@ def read(tmp_path, text, columns=None, circuit=None):
 
 @pytest.mark.parametrize("name", FILES)
 def test_each_file_is_read_or_asks_one_question(tmp_path, name):
-    how, said = outcome(FILES[name], tmp_path)
-    assert how in ("read", "asked"), said
-    assert how == "read" or name not in CLEAR, said
-    assert how == "asked" or name not in ASKED, said
+    how, message = outcome(FILES[name], tmp_path)
+    assert how in ("read", "asked"), message
+    assert how == "read" or name not in CLEAR, message
+    assert how == "asked" or name not in ASKED, message
 
 
 def test_the_unit_of_a_buffer_is_that_of_its_rows(tmp_path):

@@ -332,14 +332,14 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(tmp_path_factory, part, p
 
 
 @pytest.mark.parametrize(
-    ("columns", "said"),
+    ("columns", "message"),
     [
         ({"V_b (V)": "V_b", "I_h (mA)": "V_r"}, "its unit is mV, expected mA as --column says"),
         ({"V_b (V)": "V_b", "I_h (mA)": "V_b"}, "is V_b and I_h, expected one of them"),
     ],
 )
-def test_a_column_is_not_told_to_be_what_it_is_not(tmp_path, columns, said):
+def test_a_column_is_not_told_to_be_what_it_is_not(tmp_path, columns, message):
     path = tmp_path / "data.csv"
     path.write_text("V_b (V),I_h (mA),V_r (mV)\n1,0.1,60\n2,0.2,120\n")
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         read_measurement(path, columns)

@@ -28,7 +28,7 @@ def read(tmp_path, head, *columns, **options):
     return read_measurement(write(tmp_path, head + "\n".join(lines) + "\n"), **options)
 
 
-def said(data):
+def messages(data):
     return [note.split(": ", 1)[1] for note in data.notes]
 
 
@@ -68,26 +68,26 @@ def test_sweeps_are_told_apart(bias, lengths):
 def test_all_sweeps_are_used_and_said(tmp_path):
     data = read(tmp_path, IV, BOTH_WAYS, current_at(BOTH_WAYS))
     assert data.bias_V.size == 33
-    assert said(data) == ["2 sweeps, all of them used: up (17 rows), down (16 rows)"]
+    assert messages(data) == ["2 sweeps, all of them used: up (17 rows), down (16 rows)"]
     assert data.understood[0][2] == "up (17 rows), down (16 rows)"
 
 
 def test_a_repeated_header_begins_another_sweep(tmp_path):
     text = "\n".join(f"{bias},{current_at(bias):.5f}" for bias in RAMP)
     data = read_measurement(write(tmp_path, f"{IV}{text}\n\n{IV}{text}\n"))
-    assert said(data) == ["2 sweeps, all of them used: up (17 rows), up (17 rows)"]
+    assert messages(data) == ["2 sweeps, all of them used: up (17 rows), up (17 rows)"]
 
 
 @pytest.mark.parametrize(
-    ("noise", "shift", "told"), [(0.0, 0.02, 1), (3e-3, 0.0, 0), (0.0, 0.0, 0)]
+    ("noise", "shift", "count"), [(0.0, 0.02, 1), (3e-3, 0.0, 0), (0.0, 0.0, 0)]
 )
-def test_sweeps_that_differ_beyond_noise_are_told(tmp_path, noise, shift, told):
+def test_sweeps_that_differ_beyond_noise_are_told(tmp_path, noise, shift, count):
     rng = np.random.default_rng(7)
     current = current_at(BOTH_WAYS) + noise * rng.normal(size=33)
     current[17:] += shift * np.sin(np.pi * BOTH_WAYS[17:] / 8.0)
-    notes = said(read(tmp_path, IV, BOTH_WAYS, current))
-    assert len(notes) == 1 + told
-    if told:
+    notes = messages(read(tmp_path, IV, BOTH_WAYS, current))
+    assert len(notes) == 1 + count
+    if count:
         assert (
             "I_h of sweep 2 differs from that of sweep 1 by 1.3% of its largest value" in notes[1]
         )
@@ -98,13 +98,13 @@ def test_a_hysteresis_of_three_times_the_noise_is_told(share, least):
     rng, up = np.random.default_rng(3), np.linspace(0.0, 8.0, 41)
     bias = np.concatenate((up, up[-2::-1]))
     largest = current_at(8.0)
-    told = 0
+    detections = 0
     for _ in range(40):
         current = current_at(bias) + 1e-3 * largest * rng.normal(size=bias.size)
         current[41:] += share * largest * np.sin(np.pi * bias[41:] / 8.0)
-        told += bool(disagreements(bias, sweeps_of(bias), {"I_h": current}))
-    assert told >= least
-    assert told <= 2 or share > 0.0
+        detections += bool(disagreements(bias, sweeps_of(bias), {"I_h": current}))
+    assert detections >= least
+    assert detections <= 2 or share > 0.0
 
 
 # --- polarities --------------------------------------------------------------------------------
@@ -117,9 +117,10 @@ def test_both_polarities_are_one_lever(tmp_path):
     np.testing.assert_allclose(data.current_mA, current_at(np.abs(bias)), rtol=1e-6)
     np.testing.assert_allclose(data.reader_V, 0.06 * np.abs(bias), rtol=1e-6)
     assert (
-        "V_b is negative, and counts as positive with I_h and V_r, and in 15 more" in said(data)[0]
+        "V_b is negative, and counts as positive with I_h and V_r, and in 15 more"
+        in messages(data)[0]
     )
-    assert "negative, down (17 rows), up (16 rows)" in said(data)[1]
+    assert "negative, down (17 rows), up (16 rows)" in messages(data)[1]
 
 
 def test_an_offset_near_zero_keeps_its_sign(tmp_path):
@@ -153,7 +154,7 @@ def test_a_curve_that_folds_without_a_resistor_is_told_apart_along_another(tmp_p
     kohm = data.series_resistance_ohm / 1000.0
     assert np.all(np.diff(data.bias_V) > 0)
     np.testing.assert_allclose(data.bias_V - kohm * data.current_mA, lever, rtol=1e-6, atol=1e-6)
-    assert "9.3 kOhm are reckoned with instead, which changes nothing" in said(data)[0]
+    assert "9.3 kOhm are reckoned with instead, which changes nothing" in messages(data)[0]
 
 
 def test_a_current_driven_measurement_is_fitted_as_a_voltage_driven_one(tmp_path, coarse):
@@ -197,9 +198,9 @@ def test_gas_and_pressure_count(tmp_path, comment, medium, gas, pressure):
 
 def test_a_gas_that_is_only_mentioned_is_noted(tmp_path):
     data = read(tmp_path, f"# taken in N2 by hand\n{IV}", [1.0], [0.14])
-    assert "line 1: '# taken in N2 by hand' does not set the medium" in said(data)[0]
+    assert "line 1: '# taken in N2 by hand' does not set the medium" in messages(data)[0]
     data = read(tmp_path, f"# medium: nitrogen; 5 % helium\n{IV}", [1.0], [0.14])
-    assert "line 1: '5 % helium' does not set the medium" in said(data)[0]
+    assert "line 1: '5 % helium' does not set the medium" in messages(data)[0]
     with pytest.raises(InputError, match="medium is 'nitrogen, 5 % helium', expected"):
         read(tmp_path, f"# medium: nitrogen, 5 % helium\n{IV}", [1.0], [0.14])
 
@@ -222,7 +223,7 @@ def test_the_pressure_of_a_vacuum_is_shown_and_is_no_matter(tmp_path):
     assert ("medium", "vacuum", "line 1, 0.01 mbar") in data.understood
     assert data.notes == ()
     data = read(tmp_path, f"# medium: helium, 1e-6 mbar\n{IV}", [1.0], [0.14])
-    assert said(data) == ["line 1: 1e-06 mbar of any gas count as vacuum"]
+    assert messages(data) == ["line 1: 1e-06 mbar of any gas count as vacuum"]
 
 
 # --- what is told ---------------------------------------------------------------------------------

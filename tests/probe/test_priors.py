@@ -100,10 +100,10 @@ def test_a_probe_file_states_priors_which_win_over_the_usual_ones(tmp_path):
     assert known["n_d"] == Prior(3.3e17, 0.10)
     assert known["length_um"].spread == 0.02
     assert known["p"].spread != 0.02
-    asked = {"n_d": Prior(4e17, 0.01), "gap_um": "± 1%"}
+    own_priors = {"n_d": Prior(4e17, 0.01), "gap_um": "± 1%"}
     assert known_beforehand(probe, None) == known
-    both = known_beforehand(probe, asked)
-    assert (both["n_d"], both["gap_um"]) == (asked["n_d"], Prior(3.2, 0.01))
+    both = known_beforehand(probe, own_priors)
+    assert (both["n_d"], both["gap_um"]) == (own_priors["n_d"], Prior(3.2, 0.01))
     assert both["p"] == known["p"]
     assert known_beforehand(probe, {}) == {}
     path.write_text(path.read_text().replace('n_d = "3', 'n_q = "3'))
@@ -157,9 +157,9 @@ def test_everything_that_a_prior_may_have_is_a_parameter():
 
 
 def test_values_are_moved_in_whatever_section_they_are():
-    moved = PROBE.replace({"n_d": 4e17, "gap_um": 3.0, "series_resistance_ohm": 5.0})
-    assert moved == PROBE.with_(n_d=4e17, gap_um=3.0, series_resistance_ohm=5.0)
-    np.testing.assert_array_equal(moved.values(["gap_um", "n_d"]), [3.0, 4e17])
+    changed_probe = PROBE.replace({"n_d": 4e17, "gap_um": 3.0, "series_resistance_ohm": 5.0})
+    assert changed_probe == PROBE.with_(n_d=4e17, gap_um=3.0, series_resistance_ohm=5.0)
+    np.testing.assert_array_equal(changed_probe.values(["gap_um", "n_d"]), [3.0, 4e17])
 
 
 def test_a_prior_of_the_gas_counts_in_air_only():

@@ -160,13 +160,13 @@ def test_whatever_is_changed_in_a_file_it_is_a_probe_or_one_line_says_why(tmp_pa
     path = tmp_path / "probe.toml"
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
 
-    def said() -> str:
+    def outcome() -> str:
         try:
             return str(Probe.from_file(path).shape.shape)
         except InputError as error:
             return str(error)
 
-    assert 0 < len(said()) < 500
+    assert 0 < len(outcome()) < 500
 
 
 def test_a_tip_on_the_axis_is_at_zero_and_not_at_minus_zero(run, tmp_path):

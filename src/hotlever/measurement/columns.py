@@ -79,7 +79,7 @@ class Assignment(NamedTuple):
 
     symbol: str | None
     unit: str | None
-    told: str  #: as it was written
+    quantity: str  #: as it was written
     heading: str
 
 
@@ -99,17 +99,17 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     >>> parse_columns(["I_h (uA)=Current", "V_b (V)=2"])
     {'I_h (uA)': 'Current', 'V_b (V)': '2'}
     """
-    return {each.told: each.heading for each in assignments(texts)}
+    return {each.quantity: each.heading for each in assignments(texts)}
 
 
 def assignments(
-    told: Iterable[str | os.PathLike[str]] | Mapping[str, str] | None,
+    columns: Iterable[str | os.PathLike[str]] | Mapping[str, str] | None,
 ) -> list[Assignment]:
     """Return what is said of columns, in texts or parsed; see `parse_columns`."""
-    if told is None or isinstance(told, Mapping):
-        told = [f"{quantity}={heading}" for quantity, heading in (told or {}).items()]
+    if columns is None or isinstance(columns, Mapping):
+        columns = [f"{quantity}={heading}" for quantity, heading in (columns or {}).items()]
     assigned: list[Assignment] = []
-    for where, line in (line for text in told for line in _lines(text)):
+    for where, line in (line for text in columns for line in _lines(text)):
         quantity, _, heading = (part.strip(' \t"') for part in line.partition("="))
         if not heading:
             raise InputError(
@@ -207,11 +207,11 @@ def find_columns(
             )
         columns[symbol] = _column(table, symbol, index, unit)
     in_time = driven or TIME in columns
-    taken = unused | {column.index for column in columns.values()}
+    unavailable = unused | {column.index for column in columns.values()}
     candidates = defaultdict[str, list[int]](list)
     for index, heading in enumerate(table.names):
         named, _ = _quantity(heading)
-        if named is not None and named not in columns and index not in taken:
+        if named is not None and named not in columns and index not in unavailable:
             candidates[named].append(index)
     for symbol, indices in candidates.items():
         # its own symbol names a quantity before any other name
@@ -304,11 +304,11 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
     if has_bias and observed & columns.keys():
         return
     names = ", ".join(repr(excerpt(name)) for name in table.names[:9])
-    given = f"the header names {names}" if table.is_named else "numbers without a header row"
+    header = f"the header names {names}" if table.is_named else "numbers without a header row"
     voltages = (name for name in table.names if conversion(name_and_unit(name)[1] or "", "V"))
     example = next(voltages, "HEADING" if table.is_named else "1")
     raise InputError(
-        f"{table.where(-1)}: {given}; expected 'V_b (V)' and at least one of 'I_h (mA)', "
+        f"{table.where(-1)}: {header}; expected 'V_b (V)' and at least one of 'I_h (mA)', "
         "'V_r (mV)', 'V_bridge (mV)', 'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; beside a time V_b, "
         "or a wave form "
         f"such as --pulse 10V,5us, and any of them; other names with {_assignment('V_b', example)}"
@@ -326,8 +326,8 @@ def constant_bias(table: TextTable) -> float | None:
 
 def is_taken_as_bias(columns: Mapping[str, Column], assigned: Sequence[Assignment]) -> bool:
     """Whether the bias is a voltage that nobody calls so."""
-    told = any(each.symbol == "V_b" for each in assigned)
-    return not told and "V_b" in columns and quantity_of(columns["V_b"].heading) != "V_b"
+    is_assigned = any(each.symbol == "V_b" for each in assigned)
+    return not is_assigned and "V_b" in columns and quantity_of(columns["V_b"].heading) != "V_b"
 
 
 def note_on_bias(

@@ -109,16 +109,16 @@ class Settings:
         for line, text in table.comments:
             where = f"{table.path}: line {line}"
             for part in _BETWEEN.split(text):
-                given = _setting(part, where)
-                if given is None:
+                values = _setting(part, where)
+                if values is None:
                     settings.notes.append(
                         f"{where}: '{excerpt(part)}' is not understood and not used, expected a "
                         "line like '# R_s (kOhm): 5.6', '# base temperature (K): 293' or "
                         "'# medium: air'"
                     )
-                elif not given and _words(part) & _GASES:
+                elif not values and _words(part) & _GASES:
                     mentioned.append((where, part))
-                for name, value in (given or {}).items():
+                for name, value in (values or {}).items():
                     first = settings.values.get(name, value)
                     if first != value:
                         raise InputError(f"{where}: {name} is {value}, but {first} further up")
@@ -162,10 +162,10 @@ class Settings:
                 del self.values["pressure_mbar"]
                 self.put("medium", "vacuum", f"{line}, {pressure:g} mbar")
             elif medium in (None, "vacuum"):
-                said = "no gas is named" if medium is None else "this is no vacuum"
+                reason = "no gas is named" if medium is None else "this is no vacuum"
                 raise InputError(
-                    f"{where}: the pressure is {pressure:g} mbar and {said}, expected a line like "
-                    f"'# medium: air, {pressure:g} mbar', or at most {VACUUM_MBAR:g} mbar"
+                    f"{where}: the pressure is {pressure:g} mbar and {reason}, expected a line "
+                    f"like '# medium: air, {pressure:g} mbar', or at most {VACUUM_MBAR:g} mbar"
                 )
         if self.values.get("medium") == "nitrogen":
             self.values["medium"] = "air"
@@ -219,18 +219,18 @@ def _gas(text: str, where: str) -> dict[str, Any]:
     """
     pressure, words = _pressure(text, where), _words(text)
     media = {_MEDIA[word] for word in words & set(_MEDIA)}
-    given: dict[str, Any] = {} if pressure is None else {"pressure_mbar": pressure}
+    settings: dict[str, Any] = {} if pressure is None else {"pressure_mbar": pressure}
     if pressure is not None and pressure <= VACUUM_MBAR:
         media &= {"vacuum"}
     else:
         first = re.match(r"[\W\d_]*([a-z]+\d?)", text[:_LONGEST].lower())
         denied = words & _NOT and (first is None or first[1] not in _MEDIA)
-        if len(media) > 1 or denied or words & _OTHER_GASES or not (media or given):
+        if len(media) > 1 or denied or words & _OTHER_GASES or not (media or settings):
             raise InputError(
                 f"{where}: medium is '{excerpt(text)}', expected vacuum, air or nitrogen, with its "
                 "pressure; for other gases say air, and gas_conductivity in the probe file"
             )
-    return {**given, "medium": media.pop()} if media else given
+    return {**settings, "medium": media.pop()} if media else settings
 
 
 def _pressure(text: str, where: str) -> float | None:

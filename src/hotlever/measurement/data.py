@@ -170,8 +170,8 @@ class Measurement:
         ('current', 'reader', 'tip')
         """
         circuit = circuit_of(sweep)
-        shown = ["bias_V", *(measurand.name for measurand in OBSERVABLES.values())]
-        columns: dict[str, Any] = {name: sweep[name].values for name in shown if name in sweep}
+        names = ["bias_V", *(measurand.name for measurand in OBSERVABLES.values())]
+        columns: dict[str, Any] = {name: sweep[name].values for name in names if name in sweep}
         return cls(
             **columns,
             tip_error_K=np.full(sweep.bias_V.size, np.nan),

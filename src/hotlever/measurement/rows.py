@@ -161,13 +161,13 @@ def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
         for name in (FITTED[observable].name for observable in measurement.observables):
             columns[name] = np.where(_far_off(columns[name], step), np.nan, columns[name])
     observed = [columns[FITTED[name].name] for name in measurement.observables]
-    shown = np.isfinite(observed).any(axis=0)
-    used = {name: values[shown] for name, values in columns.items()}
+    has_data = np.isfinite(observed).any(axis=0)
+    used = {name: values[has_data] for name, values in columns.items()}
     # rows with the same columns filled have the same mean bias for all of them
     filled = np.isfinite(list(used.values()))
-    group = np.unique([step[shown], *filled], axis=1, return_inverse=True)[1]
+    group = np.unique([step[has_data], *filled], axis=1, return_inverse=True)[1]
     count = np.bincount(group)
-    order = np.argsort(np.bincount(group, np.flatnonzero(shown)) / count, kind="stable")
+    order = np.argsort(np.bincount(group, np.flatnonzero(has_data)) / count, kind="stable")
     rows = count[order].astype(float)
 
     def mean(values: Array) -> Array:

@@ -288,8 +288,8 @@ class Circuit(SweptSupply):
         return self
 
     @model_serializer(mode="wrap")
-    def _contacts_are_sections(self, given: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        values = given(self)
+    def _contacts_are_sections(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        values = handler(self)
         contacts = values.pop("contacts")
         if self.swept == type(self).model_fields["swept"].default:
             del values["swept"]

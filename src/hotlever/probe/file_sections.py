@@ -119,8 +119,8 @@ def parts_of(
     parts: dict[str, Any] = {"shape": shape, MATERIALS: materials}
     for name in (name for name in PARTS if name in values):
         usual = REFERENCE.model_dump() if name == MATERIAL else {}
-        made = classes.get(name, PARTS[name])
-        parts[name] = made.from_values({**usual, **values[name]}, f"{where}: [{name}]")
+        record_class = classes.get(name, PARTS[name])
+        parts[name] = record_class.from_values({**usual, **values[name]}, f"{where}: [{name}]")
     return parts
 
 

@@ -111,13 +111,13 @@ class Monitors(Record):
     @classmethod
     def from_values(cls, values: dict[str, Any], where: str) -> Self:
         """Check monitors, or what their sections hold; `where` names their origin in an error."""
-        made = {
-            name: given
-            if isinstance(given, Monitor)
-            else Monitor.from_values(given, f"{where}: {name}")
-            for name, given in values.items()
+        monitors = {
+            name: section
+            if isinstance(section, Monitor)
+            else Monitor.from_values(section, f"{where}: {name}")
+            for name, section in values.items()
         }
-        return cls.model_validate(made)
+        return cls.model_validate(monitors)
 
     @property
     def named(self) -> dict[str, Monitor]:
@@ -132,7 +132,7 @@ class Monitors(Record):
         InputError
             If one is not, see `Monitor.check`.
         """
-        taken = {*QUANTITIES, *(f"{name}_V" for name in layout.terminal_names)}
+        existing_columns = {*QUANTITIES, *(f"{name}_V" for name in layout.terminal_names)}
         for name, monitor in self.named.items():
             if not _NAME.fullmatch(name):
                 raise InputError(
@@ -140,7 +140,7 @@ class Monitors(Record):
                     "letters, digits and _"
                 )
             for column in (name, f"{name}_K", f"{name}_V"):
-                if column in taken:
+                if column in existing_columns:
                     raise InputError(
                         f"{where}: the name {quoted(name)} is taken, there is a column {column}: "
                         "expected another"

@@ -123,8 +123,8 @@ class MovingMesh:
                 "other corners; expected a fit or priors without it"
             )
         now, before, after = alike
-        moved = self._follow(after) - self._follow(before)
-        return Movement(now, before, after, step, moved / (2 * step))
+        displacement = self._follow(after) - self._follow(before)
+        return Movement(now, before, after, step, displacement / (2 * step))
 
     def mesh_of(self, probe: ProbeParts) -> ProbeMesh:
         """Return the mesh of a probe with other dimensions.

@@ -167,7 +167,7 @@ class ProbeParts(Record):
     @property
     def laws(self) -> dict[str, str]:
         """The names of these classes, as files state them."""
-        return {name: class_name(made) for name, made in self.classes.items()}
+        return {name: class_name(record_class) for name, record_class in self.classes.items()}
 
     @property
     def made_of(self) -> dict[str, Kind]:

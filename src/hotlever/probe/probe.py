@@ -143,12 +143,12 @@ class Probe(ProbeParts):
         """
         return Probe.from_sections(changed_sections(self, changes), "probe", like=self)
 
-    def with_material(self, section: str, made: type[Record], **values: Any) -> Probe:
+    def with_material(self, section: str, material_class: type[Record], **values: Any) -> Probe:
         """Return the probe with a class of one's own for one of its materials.
 
-        The `section` is its name, or ``material`` for the silicon of that section. The class is
-        `made` of its kind, see `hotlever.materials.kind.Kind`, or of `hotlever.materials.Material`;
-        the `values` are in its section in place of what it held.
+        The `section` is its name, or ``material`` for the silicon of that section. The
+        `material_class` is derived from its kind, see `hotlever.materials.kind.Kind`, or from
+        `hotlever.materials.Material`; the `values` are in its section in place of what it held.
 
         Raises
         ------
@@ -159,9 +159,11 @@ class Probe(ProbeParts):
         if section not in [*self.materials, *plain]:
             raise unknown_name("material", section, [*self.materials, *plain])
         if section == MATERIAL:
-            changed: dict[str, Any] = {MATERIAL: remade(self.material, made, values, section)}
+            changed: dict[str, Any] = {
+                MATERIAL: remade(self.material, material_class, values, section)
+            }
         else:
-            new = remade(self.materials[section], made, values, section)
+            new = remade(self.materials[section], material_class, values, section)
             changed = {MATERIALS: {**self.materials, section: new}}
         return type(self).from_values({**dict(self), **changed}, "probe")
 
@@ -198,9 +200,9 @@ class Probe(ProbeParts):
         >>> print(probe.monitors["spot"])
         at (40, 0) µm
         """
-        made = Monitors.from_values({**self.monitors, **monitors}, "monitors")
-        made.check(self.layout(), "monitors")
-        return self.model_copy(update={"monitor": made})
+        all_monitors = Monitors.from_values({**self.monitors, **monitors}, "monitors")
+        all_monitors.check(self.layout(), "monitors")
+        return self.model_copy(update={"monitor": all_monitors})
 
     def to_toml(self) -> str:
         """Return the probe as a commented probe file."""
@@ -227,5 +229,5 @@ class Probe(ProbeParts):
 
     def draw(self, title: str = "") -> Figure:
         """Return a figure of the probe from above, with its heater, terminals and tip."""
-        made: Figure = plotting.figures().probe_drawing(self.layout(), title)
-        return made
+        figure: Figure = plotting.figures().probe_drawing(self.layout(), title)
+        return figure

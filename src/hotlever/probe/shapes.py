@@ -129,10 +129,10 @@ class Parametric(Shape):
         """Raise a ValueError if it cannot be drawn and meshed."""
         etched = self.etched
         for name in self._by_edge_bias() if self.edge_bias_um else ():
-            left = getattr(etched, name)
+            size_um = getattr(etched, name)
             _need(
-                left >= _SMALLEST,
-                f"with edge_bias_um = {self.edge_bias_um:g}, {name} is {left:.2g} µm, expected "
+                size_um >= _SMALLEST,
+                f"with edge_bias_um = {self.edge_bias_um:g}, {name} is {size_um:.2g} µm, expected "
                 f"{_SMALLEST} µm or more",
             )
         etched._parts_fit()

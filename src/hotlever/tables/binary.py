@@ -217,10 +217,10 @@ def _channel(channel: Any) -> str:
 
 def _properties(file: Any, groups: Mapping[str, Any]) -> dict[str, Any]:
     """Return what is said of the file, and of its groups."""
-    said: dict[str, Any] = {}
+    properties: dict[str, Any] = {}
     for each in (file, *groups.values()):
-        said = {**each.properties, **said}
-    return said
+        properties = {**each.properties, **properties}
+    return properties
 
 
 def _times(channels: list[Any]) -> tuple[float, float] | None:

@@ -94,8 +94,8 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
 
     def width(index: int) -> int:
         names = headings_in(lines[index][1])
-        asked = [name for name in names if len(name) <= _LONGEST_HEADING]
-        return len(names) if sum(map(is_heading, asked)) >= 2 else 0
+        short_names = [name for name in names if len(name) <= _LONGEST_HEADING]
+        return len(names) if sum(map(is_heading, short_names)) >= 2 else 0
 
     plain = [index for index, (_, line) in enumerate(lines) if not is_comment(line)]
     named: list[int] = []
@@ -285,16 +285,16 @@ def _columns_of_fields(lines: list[Line], separator: str) -> list[Line]:
 def _rows_beside_settings(lines: list[Line], separator: str) -> list[Line]:
     comments: list[Line] = []
     rows: list[Line] = []
-    said: dict[str, str] = {}
+    settings: dict[str, str] = {}
     for number, line in lines:
         key, value, *cells = (cell.strip() for cell in line.split(separator))
         if key:
-            said[key.lower()] = value
+            settings[key.lower()] = value
             comments.append((number, f"# {key}: {value}"))
         rows.append((number, separator.join(cells[_IN_FRONT - 2 :])))
-    time, unit = said.get("horizontal units", ""), said.get("vertical units", "")
+    time, unit = settings.get("horizontal units", ""), settings.get("vertical units", "")
     names = (
         f"TIME ({time})" if time else "TIME",
-        said.get("source", "CH1") + f" ({unit})" * bool(unit),
+        settings.get("source", "CH1") + f" ({unit})" * bool(unit),
     )
     return [*comments, (lines[0][0], separator.join(names)), *rows]

@@ -247,8 +247,8 @@ class TextTable:
     @property
     def settings(self) -> dict[str, str]:
         """What its comments say in the form ``key = value``; of two, the first counts."""
-        said = [key_and_value(line) for _, line in self.comments]
-        return {key: value for key, value in reversed(said) if value}
+        pairs = [key_and_value(line) for _, line in self.comments]
+        return {key: value for key, value in reversed(pairs) if value}
 
     def where(self, row: int) -> str:
         """Name file and line of a row (-1: the header row), to begin an error with."""

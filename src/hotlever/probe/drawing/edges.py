@@ -114,17 +114,17 @@ def cut_away(
         if outline.boundary.distance(middle) > _OFF:
             name = min(areas, key=lambda name: areas[name].boundary.distance(middle))
             borders.append(Terminal(name, start, end))
-    left = [
+    remaining_ends = [
         end
         for end in ends
         if rest.boundary.distance(shapely.Point(np.mean([end.start, end.end], axis=0))) < _OFF
     ]
-    names = {end.name for end in (*left, *borders)}
+    names = {end.name for end in (*remaining_ends, *borders)}
     for name in (*areas, *(end.name for end in ends)):
         if name not in names:
             what = "between it and the tip another terminal, stated by area, takes all of the "
             raise DrawingError(f"{what}{body}", terminal_part(name), place=areas.get(name, outline))
-    return rest, [*left, *borders]
+    return rest, [*remaining_ends, *borders]
 
 
 def covered(layout: Layout, terminals: Iterable[DrawnTerminal], films: Iterable[Ring]) -> list[str]:
@@ -251,15 +251,15 @@ class Etching:
         sides, cuts = self._sides(ends)
         strip = shapely.union_all([side.buffer(self._far, **_STYLE) for side in sides])
         if bias_um > 0:
-            moved = self.drawn.union(strip).difference(shapely.union_all(cuts))
+            etched_area = self.drawn.union(strip).difference(shapely.union_all(cuts))
         else:
-            moved = self.drawn.difference(strip)
-        pieces = parts_of(moved.simplify(STANDS_OUT * tolerance))
+            etched_area = self.drawn.difference(strip)
+        pieces = parts_of(etched_area.simplify(STANDS_OUT * tolerance))
         if len(pieces) != 1:
             what = f"with edge_bias_um = {bias_um:g} {len(pieces)} pieces are left, expected one"
             raise DrawingError(what, body, place=self.drawn)
         self.outline: Polygon = pieces[0]
-        self.ends = [moved for end in ends for moved in self._moved(end)]
+        self.ends = [etched_end for end in ends for etched_end in self._etched_ends(end)]
 
     def _sides(self, ends: list[Terminal]) -> tuple[list[BaseGeometry], list[Polygon]]:
         """Return the lines that are etched, and what lies beyond the leg ends."""
@@ -318,7 +318,7 @@ class Etching:
         corners = [start - aside[0] * direction, end + aside[1] * direction]
         return Polygon([*corners, corners[1] + outward, corners[0] + outward])
 
-    def _moved(self, end: Terminal) -> list[Terminal]:
+    def _etched_ends(self, end: Terminal) -> list[Terminal]:
         """Return a terminal on the etched outline: to the corners, if it went to the corners."""
         start, final = np.array(end.start), np.array(end.end)
         corners = shapely.get_coordinates(self.drawn)
@@ -326,10 +326,10 @@ class Etching:
         whole = [np.linalg.norm(corners - at, axis=1).min() < _NEAR for at in (start, final)]
         line = (tuple(start - longer * whole[0]), tuple(final + longer * whole[1]))
         return [
-            Terminal(end.name, *moved)
+            Terminal(end.name, *segment)
             for edge in outline_edges(self.outline)
             if along(edge, (end.start, end.end), self._tolerance)
-            and (moved := along(edge, line, self._tolerance))
+            and (segment := along(edge, line, self._tolerance))
         ]
 
     def layer(self, shape: BaseGeometry) -> BaseGeometry:

@@ -276,13 +276,13 @@ def _area(area: Any, what: str) -> Polygon | MultiPolygon:
     return polygons(what, [ring], 0.0)[0]
 
 
-def _stated(given: Any) -> Any:
+def _stated(entry: Any) -> Any:
     """Return what a section says of a layer, of an area, or of an area that is all contact."""
-    if isinstance(given, Layer):
-        own = {"material": given.material, "thickness_um": given.thickness_um}
+    if isinstance(entry, Layer):
+        own = {"material": entry.material, "thickness_um": entry.thickness_um}
         own = {key: value for key, value in own.items() if value is not None}
-        return {DRAWN: _stated(given.drawn), **own} if own else _stated(given.drawn)
-    if isinstance(given, Mapping):
-        return {key: _stated(area) for key, area in given.items()}
+        return {DRAWN: _stated(entry.drawn), **own} if own else _stated(entry.drawn)
+    if isinstance(entry, Mapping):
+        return {key: _stated(area) for key, area in entry.items()}
     # the name of a layer, or a list of points, stays as it is
-    return rings_of(given) if isinstance(given, Polygon | MultiPolygon) else given
+    return rings_of(entry) if isinstance(entry, Polygon | MultiPolygon) else entry

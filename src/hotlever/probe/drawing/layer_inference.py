@@ -223,36 +223,39 @@ def _farthest(best: _Silicon) -> str:
 
 def _terminals(best: _Silicon, sheet: Sheet, inferred: LayerInference) -> None:
     """Tell supply, ground and reader by what lies between them."""
-    given: dict[str, Drawn] = {name: name for name in best.touching}
-    if len(given) == 1:
-        (only,) = given
+    candidates: dict[str, Drawn] = {name: name for name in best.touching}
+    if len(candidates) == 1:
+        (only,) = candidates
         rings = sheet.rings(sheet.layers[only], lines=True)
         if len(rings) > 1:
             # several contacts on one layer
-            given = {f"polygon {n} of {only}": (ring,) for n, ring in enumerate(rings, start=1)}
+            candidates = {
+                f"polygon {n} of {only}": (ring,) for n, ring in enumerate(rings, start=1)
+            }
     why = "it touches the outline along an edge"
-    if len(given) < 2:
+    if len(candidates) < 2:
         heater = inferred.layers.get(HEATER)
         middle = best.areas[heater] if isinstance(heater, str) else best.shape.centroid
         base = _base(best.shape, middle)
-        given = {f"edge {number}": (edge,) for number, edge in enumerate(base, start=1)}
+        candidates = {f"edge {number}": (edge,) for number, edge in enumerate(base, start=1)}
         why = "one of the edges in a line far from the heater; no layer marks a terminal"
-    if len(given) < 2:
+    if len(candidates) < 2:
         inferred.doubts.append("no edges that could be terminals: supply and ground are missing")
         return
     rings_by = {
         name: sheet.rings(sheet.layers[drawn], lines=True) if isinstance(drawn, str) else drawn
-        for name, drawn in given.items()
+        for name, drawn in candidates.items()
     }
     try:
         named = _named(best, inferred, rings_by)
     except DrawingError as error:
         inferred.doubts.append(f"terminals cannot be told apart ({error.what})")
         named = {
-            role: (name, "") for role, name in zip((SUPPLY, GROUND, READER), given, strict=False)
+            role: (name, "")
+            for role, name in zip((SUPPLY, GROUND, READER), candidates, strict=False)
         }
     for role, (name, reason) in named.items():
-        inferred.terminals[role] = given[name]
+        inferred.terminals[role] = candidates[name]
         inferred.reasons[terminal_part(role)] = "; ".join(filter(None, (why, reason)))
 
 

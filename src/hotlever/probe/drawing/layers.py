@@ -133,15 +133,15 @@ def layer_values(
     body = BODY if BODY in section else SILICON
     if body not in section:
         raise _missing(SILICON, section, where)
-    named = {name for name, given in section.items() if isinstance(given, Mapping)}
+    named = {name for name, entry in section.items() if isinstance(entry, Mapping)}
     layers = {}
-    for name, given in section.items():
+    for name, entry in section.items():
         if name in named:
-            own = _of_material(given, kinds, f"{where.removesuffix(']')}.{name}]")
+            own = _of_material(entry, kinds, f"{where.removesuffix(']')}.{name}]")
         elif name == body:
-            own = {DRAWN: given, "material": HIGH_DOPED, "kind": "high-doped-silicon"}
+            own = {DRAWN: entry, "material": HIGH_DOPED, "kind": "high-doped-silicon"}
         else:
-            own = {DRAWN: given, "material": LOW_DOPED, "kind": "n-silicon"}
+            own = {DRAWN: entry, "material": LOW_DOPED, "kind": "n-silicon"}
         layers[name] = {"name": name, **own}
     if BODY in section and BODY not in named:
         raise InputError(
@@ -169,23 +169,23 @@ def _missing(name: str, section: Mapping[str, Any], where: str) -> InputError:
     return InputError(f"{where}: {name} is missing{hint}")
 
 
-def _of_material(given: Mapping[str, Any], kinds: Mapping[str, str], where: str) -> dict[str, Any]:
+def _of_material(entry: Mapping[str, Any], kinds: Mapping[str, str], where: str) -> dict[str, Any]:
     """Return what a section says of a layer, with the kind of its material."""
-    if DRAWN not in given:
+    if DRAWN not in entry:
         raise InputError(f"{where}: {DRAWN} is missing")
     for key in ("name", "kind"):
-        if key in given:
+        if key in entry:
             raise unknown_name("key", key, (DRAWN, "material", "thickness_um"), where)
-    if "material" not in given:
+    if "material" not in entry:
         raise InputError(f"{where}: material is missing")
-    material = given["material"]
+    material = entry["material"]
     if not isinstance(material, str):
         raise InputError(f"{where}: material = {quoted(material)}: expected a name")
     if not kinds:
         raise InputError(f"{where}: material = {quoted(material)}: there is no [materials]")
     if material not in kinds:
         raise unknown_name("material", material, kinds, where)
-    return {**given, "kind": kinds[material]}
+    return {**entry, "kind": kinds[material]}
 
 
 def terminal_values(section: Mapping[str, Any], where: str) -> dict[str, dict[str, Any]]:
@@ -200,13 +200,13 @@ def terminal_values(section: Mapping[str, Any], where: str) -> dict[str, dict[st
         if name not in section:
             raise _missing(name, section, where)
     terminals = {}
-    for name, given in section.items():
-        by_area, here = isinstance(given, Mapping), f"{where.removesuffix(']')}.{name}]"
-        others = [key for key in given if key != AREA] if by_area else []
+    for name, entry in section.items():
+        by_area, here = isinstance(entry, Mapping), f"{where.removesuffix(']')}.{name}]"
+        others = [key for key in entry if key != AREA] if by_area else []
         if others:
             raise unknown_name("key", others[0], (AREA,), here)
-        if by_area and not given:
+        if by_area and not entry:
             raise InputError(f"{here}: {AREA} is missing")
-        drawn = given[AREA] if by_area else given
+        drawn = entry[AREA] if by_area else entry
         terminals[name] = {"name": name, DRAWN: drawn, "by_area": by_area}
     return terminals

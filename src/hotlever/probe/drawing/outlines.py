@@ -230,11 +230,11 @@ def snapped(shape: BaseGeometry, outline: BaseGeometry, distance: float) -> Base
         feet = shapely.line_interpolate_point(lines, along)
         away = shapely.distance(feet, points[:, None])
         best, rows = away.argmin(axis=1), np.arange(len(points))
-        moved = shapely.get_coordinates(feet[rows, best])
-        return np.where((away[rows, best] < distance)[:, None], moved, coordinates)
+        nearest = shapely.get_coordinates(feet[rows, best])
+        return np.where((away[rows, best] < distance)[:, None], nearest, coordinates)
 
-    moved = shapely.transform(near, onto)
-    return moved if moved.is_valid else shapely.make_valid(moved)
+    snapped_shape = shapely.transform(near, onto)
+    return snapped_shape if snapped_shape.is_valid else shapely.make_valid(snapped_shape)
 
 
 def check_widths(part: str, shape: Polygon, drawn: list[Polygon], narrowest: float) -> None:

@@ -49,13 +49,13 @@ class ParametricDrawing(Shape):
             If an argument is no dimension with a default.
         """
         name = f"{_module(function)}.{function.__qualname__}"
-        made = _SHAPES.get(name)
-        if made is None or made.draw is not function:
+        shape_class = _SHAPES.get(name)
+        if shape_class is None or shape_class.draw is not function:
             fields: dict[str, Any] = {"function": (str, name), **_dimensions(function)}
-            made = create_model(function.__name__, __base__=ParametricDrawing, **fields)
-            made.draw = staticmethod(function)
-            _SHAPES[name] = made
-        return made
+            shape_class = create_model(function.__name__, __base__=ParametricDrawing, **fields)
+            shape_class.draw = staticmethod(function)
+            _SHAPES[name] = shape_class
+        return shape_class
 
     @classmethod
     def read(
@@ -72,15 +72,15 @@ class ParametricDrawing(Shape):
         """
         name = str(values.get("function"))
         # a file does not name what is run
-        made = cls if hasattr(cls, "draw") else _SHAPES.get(name)
-        if made is None or made.name() != name:
+        shape_class = cls if hasattr(cls, "draw") else _SHAPES.get(name)
+        if shape_class is None or shape_class.name() != name:
             raise InputError(
                 f"{where}: [probe]: function = {quoted(name)} is Python, which no file holds: "
                 "expected Probe.from_drawing(function) before it is read, or a lever saved as "
                 "GDSII"
             )
         own = {**values, "kinds": tuple(kinds.items())}
-        return made.from_values(own, f"{where}: [probe]")
+        return shape_class.from_values(own, f"{where}: [probe]")
 
     @classmethod
     def name(cls) -> str:
@@ -137,8 +137,10 @@ def sections_of(
         return "drawing", drawing.sections()
     if not inspect.isfunction(drawing):
         raise InputError(f"found {quoted(drawing)}, expected a Drawing or a function")
-    made = ParametricDrawing.of(drawing)
-    defaults = {name: field.default for name, field in made.model_fields.items() if name != "kinds"}
+    shape_class = ParametricDrawing.of(drawing)
+    defaults = {
+        name: field.default for name, field in shape_class.model_fields.items() if name != "kinds"
+    }
     return drawing.__qualname__, {"probe": defaults}
 
 
@@ -177,12 +179,13 @@ def _dimensions(function: Callable[..., Drawing]) -> dict[str, Any]:
             float,
             Field(default=float(default), gt=0, le=_LONGEST_UM, description=meaning),
         )
-    taken = {EDGE_BIAS: "every drawing"} | {
+    owners = {EDGE_BIAS: "every drawing"} | {
         name: f"[{section}]" for section, part in PARTS.items() for name in part.model_fields
     }
-    for name in fields.keys() & taken.keys():
+    for name in fields.keys() & owners.keys():
         raise InputError(
-            f"{function.__qualname__}: argument {name} is a name of {taken[name]}, expected another"
+            f"{function.__qualname__}: argument {name} is a name of {owners[name]}, expected "
+            "another"
         )
     return fields
 

@@ -209,20 +209,20 @@ class DrawnShape(DrawingFile, Shape):
             own[DRAWN] = _rings(sheet, own, f"{where}: [layers] {own['name']}")
         for own in terminals.values():
             own[DRAWN] = _rings(sheet, own, f"{where}: [terminals] {own['name']}", lines=True)
-        made = tuple(
+        drawn_layers = tuple(
             DrawnLayer.from_values(layer, f"{where}: [layers.{name}]")
             for name, layer in layers.items()
         )
         ends = tuple(DrawnTerminal(**terminal) for terminal in terminals.values())
         try:
             if sheet is not None:
-                _check_unit(sheet, next(layer for layer in made if layer.is_body))
-            return cls.from_values({**values, "layers": made, "terminals": ends}, here)
+                _check_unit(sheet, next(layer for layer in drawn_layers if layer.is_body))
+            return cls.from_values({**values, "layers": drawn_layers, "terminals": ends}, here)
         except DrawingError as error:
             raise error.again(
                 where=where if sheet is None else sheet.file,
                 drawn=named.get(error.part),
-                outlines={part.part: part.drawn for part in (*made, *ends)},
+                outlines={part.part: part.drawn for part in (*drawn_layers, *ends)},
             ) from None
 
 
@@ -253,23 +253,23 @@ def _rings(
     sheet: Sheet | None, own: Mapping[str, Any], where: str, *, lines: bool = False
 ) -> Rings:
     """Return the outlines of a layer, of a list of points or of a list of such lists."""
-    given = own[DRAWN]
-    if sheet is not None and isinstance(given, str):
-        layer = sheet.layer(given, where)
+    drawn = own[DRAWN]
+    if sheet is not None and isinstance(drawn, str):
+        layer = sheet.layer(drawn, where)
         if layer.lines and not lines:
             x, y = layer.lines[0][0]
             raise InputError(
-                f"{sheet.file}: {own['name']} (layer {given}), at ({x:.3f}, {y:.3f}) µm: an "
+                f"{sheet.file}: {own['name']} (layer {drawn}), at ({x:.3f}, {y:.3f}) µm: an "
                 "outline that is not closed"
             )
         return sheet.rings(layer, lines=lines)
-    for outlines in ([given], given) if isinstance(given, list | tuple) and given else ():
+    for outlines in ([drawn], drawn) if isinstance(drawn, list | tuple) and drawn else ():
         try:
             return tuple(map(_OUTLINE.validate_python, outlines))
         except ValidationError:
             continue
     raise InputError(
-        f'{where} = {quoted(given)}: expected a layer such as "1/0", or points such as '
+        f'{where} = {quoted(drawn)}: expected a layer such as "1/0", or points such as '
         "[[0.0, -1.5], [0.0, 1.5]] (µm)"
     )
 

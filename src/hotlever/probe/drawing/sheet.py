@@ -141,9 +141,9 @@ def read_sheet(
     elif sheet.cell is None:
         if not sheet.top:
             raise InputError(f"{path}: holds no cell")
-        shown = ", ".join(sheet.top[:10]) + (", …" if len(sheet.top) > 10 else "")
+        top_cells = ", ".join(sheet.top[:10]) + (", …" if len(sheet.top) > 10 else "")
         raise InputError(
-            f"{path}: {len(sheet.top)} top cells, expected one or its name as `cell` ({shown})"
+            f"{path}: {len(sheet.top)} top cells, expected one or its name as `cell` ({top_cells})"
         )
     elif sheet.cell not in sheet.cells:
         raise unknown_name("cell", sheet.cell, sheet.cells, str(path))
