@@ -26,11 +26,11 @@ Run = Callable[..., tuple[int, str, str]]
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block of a page; `shown` is the output printed right below it."""
+    """A fenced block of a page; `output` is what is printed right below it."""
 
     language: str
     content: str
-    shown: str | None
+    output: str | None
 
 
 def beside_examples(folder: Path) -> Path:
@@ -42,13 +42,13 @@ def beside_examples(folder: Path) -> Path:
 def blocks(text: str, *languages: str) -> list[Block]:
     """Return the fenced blocks in some languages."""
     found = list(_FENCE.finditer(text))
-    shown: list[str | None] = [None] * len(found)
+    outputs: list[str | None] = [None] * len(found)
     for place, (block, following) in enumerate(pairwise(found)):
         if following["language"] == "text" and following.start() == block.end():
-            shown[place] = following["content"]
+            outputs[place] = following["content"]
     return [
         Block(block["language"], block["content"], output)
-        for block, output in zip(found, shown, strict=True)
+        for block, output in zip(found, outputs, strict=True)
         if block["language"] in languages
     ]
 
@@ -85,22 +85,24 @@ def run_commands(content: str, run: Run) -> str:
     return printed
 
 
-def missing_lines(shown: str, printed: str, within: float = 0.01) -> list[str]:
+def missing_lines(expected: str, printed: str, within: float = 0.01) -> list[str]:
     """Return the lines shown on a page that were not printed, in order, up to rounding.
 
     Numbers may differ by a share `within` and a unit of rounding.
     """
     lines = iter(printed.splitlines())
     return [
-        line for line in shown.splitlines() if not any(_alike(line, each, within) for each in lines)
+        line
+        for line in expected.splitlines()
+        if not any(_alike(line, each, within) for each in lines)
     ]
 
 
-def _alike(shown: str, printed: str, within: float) -> bool:
+def _alike(expected: str, printed: str, within: float) -> bool:
     """Whether two lines have the same words, and numbers that differ by little."""
-    if _words(shown) != _words(printed):
+    if _words(expected) != _words(printed):
         return False
-    pairs = zip(_NUMBER.finditer(shown), _NUMBER.finditer(printed), strict=True)
+    pairs = zip(_NUMBER.finditer(expected), _NUMBER.finditer(printed), strict=True)
     return all(_close(mine, theirs, within) for mine, theirs in pairs)
 
 

@@ -44,7 +44,7 @@ def on_coarse_meshes() -> Iterator[None]:
         yield
 
 
-def coarse_fit(*given: Any, **options: Any) -> Fit:
+def coarse_fit(*arguments: Any, **options: Any) -> Fit:
     """Fit on coarse meshes, in the worker processes of a batch too."""
     with on_coarse_meshes():
-        return fit(*given, **options)
+        return fit(*arguments, **options)

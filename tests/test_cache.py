@@ -25,14 +25,14 @@ def folder(tmp_path, monkeypatch) -> Path:
     return tmp_path / "cache"
 
 
-def kept(number: int = 0) -> Path:
+def write_cache_file(number: int = 0) -> Path:
     path = cache_file("kind", {"number": number})
     store_arrays(path, ARRAYS)
     return path
 
 
 def test_what_is_stored_comes_back(folder):
-    path = kept()
+    path = write_cache_file()
     assert path.parent == folder / "kind"
     found = stored(path, dict)
     np.testing.assert_equal(found, ARRAYS)
@@ -40,7 +40,7 @@ def test_what_is_stored_comes_back(folder):
 
 
 def test_any_damage_means_making_it_again(folder):
-    path = kept()
+    path = write_cache_file()
     whole = path.read_bytes()
     header = range(200), range(len(whole) - 200, len(whole))
     for place in (place for part in header for place in part):
@@ -57,7 +57,7 @@ def test_any_damage_means_making_it_again(folder):
 
 
 def test_a_file_of_another_content_is_made_again(folder):
-    assert stored(kept(), lambda arrays: arrays["none"]) is None
+    assert stored(write_cache_file(), lambda arrays: arrays["none"]) is None
     assert kept_files(folder) == []
 
 
@@ -124,7 +124,7 @@ def test_all_that_the_makers_import_is_in_the_digest():
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs to become another user")
 def test_a_cache_that_may_not_be_read_or_written_only_costs_time(folder):
-    path = kept()
+    path = write_cache_file()
     for mode in (0o000, 0o500):
         child = os.fork()
         if child == 0:  # permissions do not hold for root
@@ -141,13 +141,13 @@ def test_a_cache_that_may_not_be_read_or_written_only_costs_time(folder):
 
 
 def test_what_was_not_used_for_longest_goes_first(folder, monkeypatch):
-    size = kept().stat().st_size
-    paths = [kept(number) for number in range(4)]
+    size = write_cache_file().stat().st_size
+    paths = [write_cache_file(number) for number in range(4)]
     for age, path in enumerate(paths):
         os.utime(path, (1000 + age, 1000 + age))
     assert stored(paths[0], dict) is not None
     monkeypatch.setenv("HOTLEVER_CACHE_GB", str(3.5 * size / 1e9))
-    last = kept(4)
+    last = write_cache_file(4)
     assert {path for _, path in kept_files(folder)} == {paths[0], paths[3], last}
 
 
@@ -155,11 +155,11 @@ def test_what_was_not_used_for_longest_goes_first(folder, monkeypatch):
 def test_a_size_that_is_none_is_said(folder, monkeypatch, size):
     monkeypatch.setenv("HOTLEVER_CACHE_GB", size)
     with pytest.raises(InputError, match=f"HOTLEVER_CACHE_GB = {size}: expected a number"):
-        kept()
+        write_cache_file()
 
 
 def test_the_command_shows_and_clears_and_leaves_other_files(folder, run, monkeypatch):
-    kept()
+    write_cache_file()
     foreign = folder / "kind" / "mine.npz"
     foreign.write_text("mine")
     status, out, _ = run("cache")

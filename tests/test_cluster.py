@@ -21,17 +21,17 @@ def square(number: int) -> int:
 @pytest.fixture
 def credentials(tmp_path, monkeypatch):
     """Files of credentials, as the settings name them that the environment makes."""
-    made = Security.temporary()
+    security = Security.temporary()
     files = {
         "ca-file": "tls_ca_file",
         "client.cert": "tls_client_cert",
         "client.key": "tls_client_key",
     }
     for attribute in files.values():
-        (tmp_path / attribute).write_text(getattr(made, attribute))
+        (tmp_path / attribute).write_text(getattr(security, attribute))
     settings = {f"distributed.comm.tls.{key}": str(tmp_path / name) for key, name in files.items()}
     with dask.config.set(settings):
-        yield made
+        yield security
 
 
 def test_a_scheduler_with_tls_is_found_by_dask_s_settings(credentials):

@@ -70,8 +70,8 @@ def test_examples_run_and_print_what_the_page_shows(name, run, tmp_path, capsys)
             else:
                 exec(compile(block.content, name, "exec"), names)
                 printed = capsys.readouterr().out
-            if block.shown is not None:
-                assert missing_lines(block.shown, printed) == [], printed
+            if block.output is not None:
+                assert missing_lines(block.output, printed) == [], printed
 
 
 def test_a_line_that_was_not_printed_is_noticed():

@@ -28,9 +28,9 @@ def test_files_that_contributors_are_led_to_exist():
 
 def test_commands_that_contributors_are_told_are_targets_of_make():
     targets = set(re.findall(r"^([\w-]+):", read("Makefile"), re.MULTILINE))
-    told = set(re.findall(r"\bmake\s+(env|test[\w-]*)", read("CONTRIBUTING.md")))
-    assert told == {"env", "test", "test-slow", "test-app", "test-hostile", "test-pythons"}
-    assert told <= targets
+    documented = set(re.findall(r"\bmake\s+(env|test[\w-]*)", read("CONTRIBUTING.md")))
+    assert documented == {"env", "test", "test-slow", "test-app", "test-hostile", "test-pythons"}
+    assert documented <= targets
 
 
 def test_hooks_run_what_make_test_checks_before_the_tests():

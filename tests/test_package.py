@@ -190,12 +190,12 @@ def test_a_probe_otherwise_is_made_by_name():
 @pytest.mark.parametrize("kind", ["Probe", "Lever", "Circuit", "Material"])
 def test_what_is_shown_in_a_terminal_says_what_it_is(coarse, kind):
     probe = coarse.probe
-    shown = {
+    instance = {
         "Probe": probe,
         "Lever": coarse,
         "Circuit": probe.circuit,
         "Material": probe.material,
     }[kind]
-    text = repr(shown)
+    text = repr(instance)
     assert "object at 0x" not in text
     assert len(text.splitlines()) < 40

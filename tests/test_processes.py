@@ -73,8 +73,8 @@ def fail(kind: str) -> None:
 
 @pytest.fixture(scope="module")
 def workers():
-    with local_workers(2) as made:
-        yield made
+    with local_workers(2) as processes:
+        yield processes
 
 
 def children() -> list[psutil.Process]:

@@ -33,8 +33,8 @@ def test_command_line_example(run, folder):
     (example,) = blocks(README, "sh")
     assert 0 < len(commands(example.content)) == len(example.content.splitlines()) <= 10
     run_commands(example.content, run)
-    made = {path.name for path in folder.iterdir()}
-    assert {"probe.toml", "probe.png", "sweep.csv", "one.nc", "fields", "fit.json"} <= made
+    names = {path.name for path in folder.iterdir()}
+    assert {"probe.toml", "probe.png", "sweep.csv", "one.nc", "fields", "fit.json"} <= names
 
 
 def test_make_targets_and_links_exist():

@@ -14,11 +14,11 @@ BIAS = np.array([0.1, 1.0, 2.0 / 3.0, 8.25])
 CURRENT = BIAS / 7e3
 
 
-def written(path, *groups, **said):
+def written(path, *groups, **root_properties):
     """Write groups of channels: each their name, unit, values and further properties."""
     nptdms = pytest.importorskip("nptdms")
     with nptdms.TdmsWriter(path) as writer:
-        objects = [nptdms.RootObject(said)]
+        objects = [nptdms.RootObject(root_properties)]
         for number, channels in enumerate(groups):
             for name, unit, values, *properties in channels:
                 all_properties = {"unit_string": unit} | dict(*properties)

@@ -32,9 +32,9 @@ def test_a_calibration_is_as_near_to_the_truth_as_it_says_and_the_page_too(name,
     assert len(off) == 4
     assert max(np.abs(off)) < 2.0
     page = (ROOT / "docs" / "examples" / f"{name}.md").read_text(encoding="utf-8")
-    shown = [line for line in page.splitlines() if line.startswith("| ")]
-    assert len(shown) == 6 + len(EXAMPLES[name].values)
-    assert missing_lines("\n".join(shown), printed, within=0.05) == [], printed
+    table = [line for line in page.splitlines() if line.startswith("| ")]
+    assert len(table) == 6 + len(EXAMPLES[name].values)
+    assert missing_lines("\n".join(table), printed, within=0.05) == [], printed
 
 
 def test_the_real_curve_agrees_with_itself_and_its_probe_says_how_little_is_known():
@@ -61,14 +61,14 @@ def test_the_real_curve_agrees_with_itself_and_its_probe_says_how_little_is_know
 
 def test_the_drawing_is_that_of_its_tool(tmp_path):
     boron_lever().saveas(tmp_path / "made.dxf")
-    made, shipped = (
+    generated_sheet, shipped_sheet = (
         read_sheet(path, None, tolerance_um=TOLERANCE_UM)
         for path in (
             tmp_path / "made.dxf",
             ROOT / "src" / "hotlever" / "examples" / "boron-lever.dxf",
         )
     )
-    assert made.layers.keys() == shipped.layers.keys()
-    for name, layer in made.layers.items():
-        for one, other in zip(layer.rings, shipped.layers[name].rings, strict=True):
+    assert generated_sheet.layers.keys() == shipped_sheet.layers.keys()
+    for name, layer in generated_sheet.layers.items():
+        for one, other in zip(layer.rings, shipped_sheet.layers[name].rings, strict=True):
             np.testing.assert_allclose(one, other)

@@ -92,7 +92,7 @@ def stored(path: Path | None, make: Callable[[Arrays], T]) -> T | None:
     try:
         # opened here: np.load leaves a file it cannot read open
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-            made = make(dict(arrays))
+            content = make(dict(arrays))
     except (FileNotFoundError, PermissionError):
         return None
     except Exception:
@@ -102,7 +102,7 @@ def stored(path: Path | None, make: Callable[[Arrays], T]) -> T | None:
         return None
     with suppress(OSError):
         os.utime(path)
-    return made
+    return content
 
 
 def store_arrays(path: Path | None, arrays: Mapping[str, NDArray[Any]]) -> None:

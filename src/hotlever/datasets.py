@@ -301,8 +301,8 @@ class Plots:
         >>> len(sweep.hotlever.plot().axes)
         4
         """
-        made: Figure = plotting.figures().figure_of(self._data)
-        return made
+        figure: Figure = plotting.figures().figure_of(self._data)
+        return figure
 
 
 @cache

@@ -164,9 +164,9 @@ class Outputs:
 
     def __init__(self, *inputs: Name | None) -> None:
         self._inputs = [Path(path) for path in inputs if path is not None]
-        self._asked: set[Path] = set()
+        self._targets: set[Path] = set()
         self._written: dict[Path, Path] = {}
-        self._made: list[Path] = []
+        self._new_folders: list[Path] = []
 
     def file(self, path: Name | None, *suffixes: str) -> None:
         """Check that a file can be written, and is of one of some types.
@@ -199,9 +199,9 @@ class Outputs:
         self._ask(path, folder)
 
     def _ask(self, path: Name, target: Path) -> None:
-        if target in self._asked:
+        if target in self._targets:
             raise InputError(f"{path}: two outputs of this name, expected different ones")
-        self._asked.add(target)
+        self._targets.add(target)
 
     def target(self, path: Name) -> Path:
         """Return the file that writing to `path` makes or replaces: links lead to it.
@@ -251,10 +251,10 @@ class Outputs:
             for temporary in self._written.values():
                 temporary.unlink(missing_ok=True)
             # the innermost first; one that is not empty stays
-            for folder in self._made:
+            for folder in self._new_folders:
                 with suppress(OSError):
                     folder.rmdir()
-            self._written, self._made = {}, []
+            self._written, self._new_folders = {}, []
 
 
 #: The outputs of the `together` block that is running.
@@ -362,7 +362,7 @@ def output_folder(path: Name) -> Path:
     except OSError as error:
         raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from error
     if outputs is not None:
-        outputs._made[:0] = missing
+        outputs._new_folders[:0] = missing
     return folder
 
 

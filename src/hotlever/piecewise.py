@@ -251,9 +251,9 @@ def hermite_weights(nodes: Array, at: Array, derivative: int = 0) -> Array:
     powers = t[:, :, None] ** degree
     slopes = degree * t[:, :, None] ** np.maximum(degree - 1, 0)
     moments = np.concatenate([powers, slopes], axis=1)
-    wanted = np.zeros((len(nodes), degree.size, 1))
-    wanted[:, derivative] = float(np.prod(np.arange(1, derivative + 1)))
-    weights = np.linalg.solve(np.swapaxes(moments, 1, 2), wanted)[:, :, 0]
+    right_hand_side = np.zeros((len(nodes), degree.size, 1))
+    right_hand_side[:, derivative] = float(np.prod(np.arange(1, derivative + 1)))
+    weights = np.linalg.solve(np.swapaxes(moments, 1, 2), right_hand_side)[:, :, 0]
     weights[:, nodes.shape[1] :] *= width
     return np.asarray(weights / width**derivative)
 

@@ -141,6 +141,6 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
         message = f"expected {_LIMITS[first['type']]} {limit:g}"
     if not key:
         return InputError(f"{place}{message}")
-    given = first["input"]
-    value = f"{given:.12g}" if isinstance(given, float) else quoted(given)
+    input_value = first["input"]
+    value = f"{input_value:.12g}" if isinstance(input_value, float) else quoted(input_value)
     return InputError(f"{place}{key} = {value}: {message[0].lower()}{message[1:]}")

@@ -242,9 +242,9 @@ def state(folder: Path) -> list[tuple[str, bytes]]:
 
 def problems(case: list[str], status: int, out: str, err: str) -> Iterator[str]:
     # notes may stand before it
-    said = [line for line in err.splitlines() if line.startswith("hotlever: ")]
-    if status != 2 or len(said) != 1 or len(said[0]) > 1500:
-        yield f"{case}: status {status}, {len(said)} lines: {err[-300:]!r}"
+    lines = [line for line in err.splitlines() if line.startswith("hotlever: ")]
+    if status != 2 or len(lines) != 1 or len(lines[0]) > 1500:
+        yield f"{case}: status {status}, {len(lines)} lines: {err[-300:]!r}"
     if out:
         yield f"{case}: {out[:200]!r}"
     if "Traceback" in err or "internal error" in err:

@@ -52,7 +52,7 @@ def infinite(found: Any) -> str:
         parts = found
     elif isinstance(found, list | tuple):
         parts = dict(enumerate(found))
-    return next((f"{name}: {said}" for name, one in parts.items() if (said := infinite(one))), "")
+    return next((f"{name}: {place}" for name, one in parts.items() if (place := infinite(one))), "")
 
 
 def test_the_names_are_those_of_all_families(known):
@@ -86,8 +86,8 @@ def test_a_spoilt_file_is_read_or_refused_in_one_line(known, name, tmp_path):
             found.append(f"number {number}: {type(error).__name__}: {str(error)[:LINE]}")
         else:
             read += 1
-            if said := infinite(content):
-                found.append(f"number {number}: infinite: {said}")
+            if place := infinite(content):
+                found.append(f"number {number}: infinite: {place}")
         assert path.read_bytes() == raw, number
         assert [one.name for one in tmp_path.iterdir()] == [path.name], number
     print(f"{name}: {read} read, {number + 1 - read} refused")

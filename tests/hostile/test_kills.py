@@ -77,8 +77,10 @@ def below(process: psutil.Process, word: str = "spawn_main") -> list[psutil.Proc
 def write_levers(lever: Lever, folder: Path) -> list[str]:
     bias, names = np.linspace(2.0, 11.0, 9), [f"lever-{number}.csv" for number in range(6)]
     for number, name in enumerate(names):
-        made = lever.with_material(lever.probe.material.with_(c_kappa=0.64 + 0.01 * number))
-        sweep = made.sweep(bias)
+        similar_lever = lever.with_material(
+            lever.probe.material.with_(c_kappa=0.64 + 0.01 * number)
+        )
+        sweep = similar_lever.sweep(bias)
         rows = zip(bias, sweep.current_mA.values, sweep.tip_K.values, strict=True)
         text = "\n".join(",".join(map(str, row)) for row in rows)
         (folder / name).write_text(f"V_b (V),I_h (mA),T_tip (K)\n{text}\n")

@@ -51,7 +51,7 @@ def open_app(reporter: Reporter, request: AppRequest) -> None:
                 f"--host {request.host}: others could reach your files; add --yes-share if they "
                 "should"
             )
-        password = os.environ.get(_PASSWORD) or _asked()
+        password = os.environ.get(_PASSWORD) or _ask_password()
         if len(password) < _LEAST_PASSWORD:
             raise InputError(
                 f"{_PASSWORD}: a password of {len(password)} characters, expected "
@@ -75,7 +75,7 @@ def open_app(reporter: Reporter, request: AppRequest) -> None:
     )
 
 
-def _asked() -> str:
+def _ask_password() -> str:
     """Ask for a password."""
     if sys.stdin is None or not sys.stdin.isatty():
         raise InputError(f"--yes-share: expected a password in {_PASSWORD}, or a terminal")

@@ -41,8 +41,8 @@ def command_line(word: str = "") -> Any:
     )
     app.callback()(root)
     groups = {"": app}
-    asked = {name: command for name, command in _EVERY.items() if name.split()[0] == word}
-    for name, command in (asked or _EVERY).items():
+    commands = {name: command for name, command in _EVERY.items() if name.split()[0] == word}
+    for name, command in (commands or _EVERY).items():
         group, _, last = name.rpartition(" ")
         if group not in groups:
             groups[group] = typer.Typer(cls=Commands, help=_GROUPS[group], rich_markup_mode=None)
@@ -109,9 +109,9 @@ class _Command(typer.core.TyperCommand):
         names = {name for option in valued for name in option.opts}
         if _SPREAD in names:
             args = spread_option(args, _SPREAD, names)
-        _, _, given = self.make_parser(ctx).parse_args(list(args))
-        for option in given:
-            if given.count(option) > 1 and not option.multiple:
+        _, _, param_order = self.make_parser(ctx).parse_args(list(args))
+        for option in param_order:
+            if param_order.count(option) > 1 and not option.multiple:
                 raise InputError(f"{option.opts[-1]}: given twice, expected once")
         return super().parse_args(ctx, args)
 

@@ -28,11 +28,11 @@ def show_cache(reporter: Reporter, request: CacheRequest) -> None:
         for _, path in kept_files(folder):
             with suppress(OSError):
                 path.unlink()
-    kept = kept_files(folder)
+    files = kept_files(folder)
     sizes: dict[str, list[int]] = defaultdict(list)
-    for status, path in kept:
+    for status, path in files:
         sizes[path.parent.name].append(status.st_size)
-    sizes["in all"] = [status.st_size for status, _ in kept]
+    sizes["in all"] = [status.st_size for status, _ in files]
     lines = [f"{folder} (at most {largest_size() / 1e9:g} GB)"]
     for kind, bytes_of in sizes.items():
         lines.append(f"{kind:<10} {len(bytes_of):>6} files {sum(bytes_of) / 1e6:>10.1f} MB")

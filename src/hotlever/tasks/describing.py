@@ -105,13 +105,13 @@ def _sections(probe: Probe) -> list[str]:
     lines = []
     for name, part in {**parts, **probe.materials}.items():
         usual = name == "surroundings"
-        kept = part.model_dump(
+        fields = part.model_dump(
             exclude={"kind", "preset"}, exclude_none=True, exclude_defaults=usual
         )
         values = [
             f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}"
             for key, value in part
-            if key in kept
+            if key in fields
         ]
         values[:0] = [part.kind] if isinstance(part, Kind) else []
         lines += [f"{name}: {', '.join(values)}"] if values else []

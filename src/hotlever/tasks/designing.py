@@ -24,7 +24,7 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
         optimise_design(reporter, request)
         return
     output, outputs = request.output, request.outputs()
-    asked: Any = {"power_mW": request.power, "air": request.air}
+    options: Any = {"power_mW": request.power, "air": request.air}
     check_number("--power", request.power, 1e-3, 1000)
     check_number("--annealing-K", request.annealing_K, 700, 1700)
     check_number("--annealing-min", request.annealing_min, 1e-3, 1e5)
@@ -41,7 +41,7 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
     )
     if not varied:
         with reporter.progress("design") as update:
-            sensitivities = study.sensitivities(start, progress=update, **asked)
+            sensitivities = study.sensitivities(start, progress=update, **options)
         reporter.give(study.sensitivity_text(sensitivities) + "\n")
         if start.probe.shape.shape == DRAWING:
             names = ", ".join(start.numbers)
@@ -50,7 +50,7 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
             )
         return
     with reporter.progress("design") as update:
-        data = study.vary(start, varied, progress=update, **asked)
+        data = study.vary(start, varied, progress=update, **options)
     reporter.note(*study.design_notes(data))
     with outputs.together():
         if output is not None and output.suffix.lower() == ".nc":

@@ -74,9 +74,9 @@ def _fit_one(
 ) -> None:
     (data,), waveform = request.data, request.read_waveform()
     measurement = read_measurement_of(probe, data, request.columns, waveform)
-    asked = [name for name in ("--posterior", "--profiles") if getattr(request, name[2:])]
-    if asked:
-        measurement.need_rest(asked[0])
+    analyses = [name for name in ("--posterior", "--profiles") if getattr(request, name[2:])]
+    if analyses:
+        measurement.need_rest(analyses[0])
     options.of(probe, in_time=measurement.time_us is not None)  # raises before anything is said
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes, *measurement.unused)
@@ -87,9 +87,9 @@ def _fit_one(
     texts = [fit_text(result)]
     uncertainty: Uncertainty | None = None
     failure: HotleverError | KeyboardInterrupt | None = None
-    if asked and not result.describes_data:
+    if analyses and not result.describes_data:
         reporter.note("no posterior and no profiles of a lever that does not show these data")
-    elif asked:
+    elif analyses:
         try:
             uncertainty = _examine(reporter, request, result)
             reporter.note(*uncertainty.statements())

@@ -161,7 +161,7 @@ class FitRequest(DriveRequest, LeversRequest):
         from hotlever.estimation import FitOptions
 
         usual = USUAL in (self.prior or [])
-        given, stated = parse_priors(self.prior, probe), probe.stated_priors
+        priors, stated = parse_priors(self.prior, probe), probe.stated_priors
         choices: dict[str, Any] = {
             name: getattr(self, name) for name in ("robust", "drift", "weights", "medium")
         }
@@ -171,7 +171,7 @@ class FitRequest(DriveRequest, LeversRequest):
                 name: parse_number(text, f"--fix {name}") if text else None
                 for name, text in parse_pairs("--fix", self.fix, bare=True).items()
             },
-            priors=stated if given is None else {**stated, **given} if given or usual else {},
+            priors=stated if priors is None else {**stated, **priors} if priors or usual else {},
             usual_priors=usual,
             free=() if self.free is None else tuple(map(str.strip, self.free.split(","))),
             **choices,

@@ -56,7 +56,7 @@ def written(types: tuple[str, ...], *names: str, default: Any = None, **texts: A
 class Request:
     """What is asked of a task that writes files."""
 
-    def given(self, *names: str) -> list[str]:
+    def non_default_options(self, *names: str) -> list[str]:
         """Return the options, of fields of some names, that say other than if left out."""
         options, by_name = [], {own.name: own for own in fields(self)}
         for name in names:
@@ -69,12 +69,12 @@ class Request:
 
     def refuse(self, *names: str, why: str) -> None:
         """Refuse options of which any would do nothing, or contradict."""
-        for option in self.given(*names):
+        for option in self.non_default_options(*names):
             raise InputError(f"{option}: {why}")
 
     def at_most_one(self, *names: str) -> None:
         """Refuse several of some options."""
-        if len(options := self.given(*names)) > 1:
+        if len(options := self.non_default_options(*names)) > 1:
             raise InputError(f"{' and '.join(options)}: expected only one of them")
 
     def inputs(self) -> list[Path]:

@@ -74,14 +74,14 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
     kept_at: list[float] = []
     states: list[State] = []
     ends: list[State] = []
-    told = count_up()
+    point_numbers = count_up()
     with reporter.progress("pulse") as update:
 
         def keep(t: float, state: State) -> None:
             ends[1:] = [state]
             if frames is not None:
                 frames.keep(t, state)
-            if next(told) % per_step == 0 and request.fields is not None:
+            if next(point_numbers) % per_step == 0 and request.fields is not None:
                 kept_at.append(t)
                 states.append(state)
 
@@ -146,8 +146,8 @@ def _draw_film(
     """Draw a film; what comes and goes between its frames is told."""
     from hotlever import figures
 
-    shown = np.interp(curve.time, *np.transpose([(t, state.tip_K) for t, state in states]))
-    off, rise = np.abs(shown - curve.tip_K).max().item(), np.ptp(curve.tip_K.values)
+    interpolated_K = np.interp(curve.time, *np.transpose([(t, state.tip_K) for t, state in states]))
+    off, rise = np.abs(interpolated_K - curve.tip_K).max().item(), np.ptp(curve.tip_K.values)
     if off > _COARSE * rise:
         reporter.note(
             f"the {len(states)} frames of {path} are too few for all that the tip does: between "
@@ -249,8 +249,8 @@ class Control:
         """Draw which gains of this sign are stable."""
         law = self.controller
         data = self.loop.gain_map(float(np.sign(law.integral)), law.filter_us)
-        made: Figure = figures.gain_map(data, (law.proportional, law.integral))
-        return made
+        figure: Figure = figures.gain_map(data, (law.proportional, law.integral))
+        return figure
 
     def notes(self, history: xr.Dataset) -> list[str]:
         """Say that the lever is not held at the end, if its bias is at the limit."""
@@ -266,10 +266,10 @@ class Control:
         time, ratio = self.settling
         way, tip = self.end.tip_K - self.start.tip_K, history.tip_K.values
         over = float(np.max(np.sign(way) * (tip - self.end.tip_K)))
-        told = f"{over:.2g} K ({over / abs(way):.0%} of the step)" if over > 0.0 else "none"
+        overshoot = f"{over:.2g} K ({over / abs(way):.0%} of the step)" if over > 0.0 else "none"
         return [
             ["tip, at rest before and after", f"{self.start.tip_K:.1f} K, {self.end.tip_K:.1f} K"],
-            *([["tip, overshoot", told]] if resolved else []),
+            *([["tip, overshoot", overshoot]] if resolved else []),
             ["tip, at the end", f"{tip[-1]:.1f} K at {history.time[-1].item():.4g} µs"],
             ["closed loop", f"time constant {time:.3g} µs, damping ratio {ratio:.2g}"],
         ]

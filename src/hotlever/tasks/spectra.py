@@ -103,15 +103,15 @@ def check_linear_law(reporter: Reporter, request: RamanCheckRequest) -> None:
 
     outputs = request.outputs()
     check = paper_check(calibration_named(request.calibration))
-    said = conclusion(check)
+    statement = conclusion(check)
     with outputs.together():
         draw(request.plot, lambda figures: figures.raman_check(check))
         if request.output is not None:
             lines = check.drop_dims("temperature_K").to_dataframe().rename_axis("name")
             numbers = {"truth": check.truth, "hottest_K": check.hottest_K}
-            numbers |= {"lines": lines.reset_index().to_dict("records"), "conclusion": said}
+            numbers |= {"lines": lines.reset_index().to_dict("records"), "conclusion": statement}
             write_text(request.output, json_text(numbers))
-    reporter.give(f"{said}\n")
+    reporter.give(f"{statement}\n")
 
 
 def _answer(reporter: Reporter, text: str, output: Path | None) -> None:
@@ -286,8 +286,8 @@ def _options(
         if shape is None:
             shape = calibration.line_shape
             resolution = calibration.resolution_cm if resolution is None else resolution
-    asked: Any = shape or "lorentzian"
-    return PeakOptions(asked, resolution)
+    line_shape: Any = shape or "lorentzian"
+    return PeakOptions(line_shape, resolution)
 
 
 def _describe(listener: Listener, calibration: RamanCalibration) -> None:

@@ -126,8 +126,8 @@ def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
 
 def contact_notes(data: xr.Dataset) -> list[str]:
     """Return what should be known of a lever in contact, by the bias or in time."""
-    told = what_the_current_tells(data) if "current_by_resistance" in data else ""
-    return [*notes_of(data), *([told] if told else [])]
+    note = what_the_current_tells(data) if "current_by_resistance" in data else ""
+    return [*notes_of(data), *([note] if note else [])]
 
 
 def what_the_current_tells(data: xr.Dataset) -> str:
