@@ -46,6 +46,6 @@ def test_a_curve_is_smoothed_with_one_thread(monkeypatch):
     monkeypatch.setattr(knee, "cho_factor", factorised)
     x = np.linspace(0.0, 1.0, 12)
     with threadpool_limits(2, user_api="blas"):
-        knee.SmoothCurve(x, np.sin(x), np.full(12, 1e-3))
+        knee.GaussianProcess(x, np.sin(x), np.full(12, 1e-3))
     assert seen
     assert all(threads == {1} for threads in seen)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hotlever.calibration.knee import (
+    GaussianProcess,
     IVCurve,
     KneeOutsideError,
-    SmoothCurve,
     find_knee,
     scale_to,
 )
@@ -135,7 +135,7 @@ def test_a_smooth_curve_covers_the_truth():
     pulls = []
     for _ in range(25):
         noisy = np.sin(4 * x) + 0.02 * rng.standard_normal(x.size)
-        curve = SmoothCurve(x, noisy, np.ones_like(x))
+        curve = GaussianProcess(x, noisy, np.ones_like(x))
         around = np.array([at - step, at, at + step])
         likeliest, *others = (
             np.array([values[1], (values[2] - values[0]) / (2 * step)])

@@ -251,7 +251,7 @@ class SmoothCurves:
         power, lever_V = self.points.power_mW, self.points.lever_V
         # at the knee an error of the current changes the lever voltage, at a power, by R_s times it
         noise = curve.circuit.series_kohm * self.points.current_mA / lever_V
-        self._smooth = SmoothCurve(self._along(power), np.log(lever_V / np.sqrt(power)), noise)
+        self._smooth = GaussianProcess(self._along(power), np.log(lever_V / np.sqrt(power)), noise)
         self.current_noise = self._smooth.noise_factor
 
     def _along(self, power: Array) -> Array:
@@ -276,12 +276,12 @@ class SmoothCurves:
         return IVCurve(np.asarray(circuit.bias(power / current, current)), current, circuit)
 
 
-class SmoothCurve:
-    """A curve with its uncertainty, found from noisy values by largest likelihood.
+class GaussianProcess:
+    """A smooth curve with its uncertainty, found from noisy values by largest likelihood.
 
-    Gaussian-process regression (Rasmussen and Williams, "Gaussian Processes for Machine Learning",
-    MIT Press (2006), chapters 2, 4 and 5) with the Matérn 5/2 covariance: functions with two
-    derivatives, no more, which does not round off a sharp bend as smoother covariances do.
+    Rasmussen and Williams, "Gaussian Processes for Machine Learning", MIT Press (2006), chapters 2,
+    4 and 5, with the Matérn 5/2 covariance: functions with two derivatives, no more, which does not
+    round off a sharp bend as smoother covariances do.
 
     Parameters
     ----------

@@ -41,6 +41,8 @@ from hotlever.types import Array
 
 #: A vacuum model that needs this factor is told that its lever is probably in air.
 _LOOKS_LIKE_AIR = 1.08
+#: Levers of a kind have their knees within this factor of each other's power.
+_ALIKE = 10.0
 #: Largest relative error of a knee estimated from the points below it, to go on with.
 _WORST_ESTIMATE = 0.3
 #: How far (standard deviations) a parameter is moved for a derivative.
@@ -122,8 +124,8 @@ def calibrated_by_knee(
     Raises
     ------
     InputError
-        If the points neither show the knee nor tell its power to 30 %, or the power of the probe
-        turns.
+        If the points neither show the knee nor tell its power to 30 %, it is far from that of the
+        reference, or the power of the probe turns.
     ComputationError
         If the probe has no knee.
     """
@@ -144,7 +146,14 @@ def calibrated_by_knee(
             f"{outside}; until then the power of the knee is estimated from the points below it, "
             f"as {value_with_error(knee.power_mW, knee.power_mW_stderr)} mW"
         )
-    rows, knee_mW = smooth_rows(curve, knee.power_mW, vacuum), knee.power_mW
+    knee_mW, like_mW = knee.power_mW, reference.knee_mW
+    if not 1.0 / _ALIKE < knee_mW / like_mW < _ALIKE:
+        raise InputError(
+            f"the knee is at {knee_mW:.3g} mW, that of the lever it is compared with at "
+            f"{like_mW:.3g} mW, expected within a factor of {_ALIKE:g}; are bias and current in "
+            "their units?"
+        )
+    rows = smooth_rows(curve, knee_mW, vacuum)
     power = rows.power_mW
     tip, of_model = reference.at(power, knee_mW), model.at(power, knee_mW)
     parts = {
@@ -154,7 +163,7 @@ def calibrated_by_knee(
     }
     if law is not None:
         parts["power law"] = np.abs(of_model - tip)
-    if law is None or knee_mW > _LOOKS_LIKE_AIR * reference.knee_mW:
+    if law is None or knee_mW > _LOOKS_LIKE_AIR * like_mW:
         in_air = curve_of_model(lever.in_medium("air").branch())
         parts["constant k"] = np.abs(in_air.at(power, knee_mW) - of_model)
     used, residual = (law, 0.0) if law is not None else law_of_model(vacuum, model.knee_mW)

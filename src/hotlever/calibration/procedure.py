@@ -140,15 +140,7 @@ def calibrate(
                 raise InputError(
                     f"the paper's rule {lack}; expected a probe or a fit, in the medium of the data"
                 )
-        # a power law holds for vacuum, whatever the lever is in
-        anywhere = measured if law is None else replace(measured, medium=None)
-        probe, of_circuit = with_measured_circuit(origin, anywhere, "vacuum")
-        probe.circuit.need_cold_start("a power law")
-        try:
-            result = calibrated_by_knee(measured, probe, law, route)
-        except InputError as error:
-            raise InputError(f"{measured.path or 'measurement'}: {error}") from error
-        return replace(result, notes=[*of_circuit, *notes, *result.notes])
+        return _by_the_rule(measured, origin, law, route, notes)
     if pulse is not None:
         origin.circuit.need_cold_start("a calibration for pulses")
 
@@ -177,6 +169,21 @@ def calibrate(
     elif pulse is not None:
         notes.append("the pulse was not followed, since it would be that of another lever")
     return replace(result, notes=notes)
+
+
+def _by_the_rule(
+    measured: Measurement, origin: Probe, law: PowerLaw | None, route: str, notes: list[str]
+) -> Calibration:
+    """Calibrate a lever by the paper's rule."""
+    # a power law holds for vacuum, whatever the lever is in
+    anywhere = measured if law is None else replace(measured, medium=None)
+    probe, of_circuit = with_measured_circuit(origin, anywhere, "vacuum")
+    probe.circuit.need_cold_start("a power law")
+    try:
+        result = calibrated_by_knee(measured, probe, law, route)
+    except InputError as error:
+        raise InputError(f"{measured.path or 'measurement'}: {error}") from error
+    return replace(result, notes=[*of_circuit, *notes, *result.notes])
 
 
 def _in_either(result: Calibration, other: Calibration) -> Calibration:
