@@ -56,6 +56,17 @@ def test_join_by_bias_in_the_name_leaves_other_rows_empty(tmp_path):
     ]
 
 
+def test_a_negative_bias_in_a_name_is_one(tmp_path):
+    """Not in the order of the files, in which -1 comes before -2."""
+    log = tmp_path / "log.csv"
+    log.write_text("V_b (V),I_h (mA)\n-2.0,-0.2\n-1.0,-0.1\n1.0,0.1\n")
+    found = read(
+        ("tip_-1V.txt", 310.0, 1.0), ("tip_-2V.txt", 340.0, 1.0), ("tip_1V.txt", 311.0, 1.0)
+    )
+    rows = join(read_bias_log(log), found).splitlines()[1:]
+    assert [row.split(",")[2] for row in rows] == ["340.0", "310.0", "311.0"]
+
+
 def test_a_log_of_two_sweeps_names_its_columns_twice(tmp_path):
     log = tmp_path / "log.txt"
     log.write_text("V_b (V)  I_h (mA)\n1  0.14\nV_b (V)  I_h (mA)\n2  0.28\n")

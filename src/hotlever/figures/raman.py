@@ -47,8 +47,8 @@ def thermometry(
     series : sequence of Line
         The hot-plate spectra, to be stacked in place of `lines`.
     """
-    used = np.array([line.used for line in lines], dtype=bool)
-    lines, table = [line for line in lines if line.used], table.isel(spectrum=used)
+    used = np.array([line.correction.use for line in lines], dtype=bool)
+    lines, table = [line for line in lines if line.correction.use], table.isel(spectrum=used)
     names = list(map(str, table.file.values))
     if calibration is None:
         with figure(4.2, 5.4) as (made, axes):

@@ -46,11 +46,6 @@ class Line:
     correction: Correction = NOTHING  #: by hand
 
     @property
-    def used(self) -> bool:
-        """Whether it is measured, and not left out."""
-        return self.correction.use
-
-    @property
     def window(self) -> tuple[float, float]:
         """The part that is fitted, cm⁻¹."""
         return self.correction.of(PeakOptions()).window
@@ -58,7 +53,7 @@ class Line:
     @property
     def flags(self) -> list[str]:
         """What was noticed of the line, and done by hand."""
-        if not self.used:
+        if not self.correction.use:
             return ["left-out"]
         flags = ["no-line"] if self.peak is None else list(self.peak.flags)
         return flags if self.correction == NOTHING else [*flags, "by-hand"]

@@ -35,7 +35,7 @@ TEMPERATURE, ERROR = "T_tip (K)", "dT_tip (K)"
 _BIAS = re.compile(r"(V_?b|bias)\b", re.I)
 _FILE = re.compile(r"(file|spectrum|spectra)\b", re.I)
 _OLD = re.compile(r"d?T_?tip\b", re.I)
-_IN_NAME = re.compile(r"(?:^|[^0-9A-Za-z.,-])(\d+(?:[.,p]\d+)?)\s?V(?![a-zA-Z0-9])")
+_IN_NAME = re.compile(r"(?:^|[^0-9A-Za-z.,-])(-?\d+(?:[.,p]\d+)?)\s?V(?![a-zA-Z0-9])")
 
 
 def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:

@@ -156,7 +156,7 @@ class Thermometry:
         stray = [f"{table}: passed over {name}, of no folder read here" for name in elsewhere]
         _note_some(self.listener, stray)
         lines = _measure(self.listener, spectra, self.options, self.corrections, "spectra")
-        used = [line for line in lines if line.used]
+        used = [line for line in lines if line.correction.use]
         if not used:
             raise InputError(f"{table}: leaves out every spectrum, expected some to use")
         if all(line.peak is None for line in used):
@@ -198,7 +198,8 @@ def _measure(
     with listener.progress(label) as update:
         lines = series.measure(spectra, options, update, corrections)
     if len(lines) > 1:
-        without = [line.spectrum.name for line in lines if line.used and line.peak is None]
+        used = [line for line in lines if line.correction.use]
+        without = [line.spectrum.name for line in used if line.peak is None]
         _note_some(listener, [f"{name}: no silicon line" for name in without])
     return lines
 
