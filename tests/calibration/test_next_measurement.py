@@ -109,7 +109,7 @@ def test_of_levers_drawn_from_the_priors_one_in_a_hundred_is_hotter_than_said():
     random, count = np.random.default_rng(0), len(lever.names)
     surrogate = lever.surrogate.reading(Rows(np.array([plan.safe_V])))
     drawn = (spread @ random.standard_normal((len(spread), 1500)))[:count].T
-    tips = [surrogate.shown(lever.parameters(away))[TIP, 0] for away in drawn]
+    tips = [surrogate.values_at(lever.parameters(away))[TIP, 0] for away in drawn]
     assert 0.003 < np.mean(np.array(tips) > 900.0) < 0.03
     assert np.quantile(tips, 0.99) == pytest.approx(900.0, abs=60.0)
 

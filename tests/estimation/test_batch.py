@@ -46,14 +46,14 @@ def fits_on_coarse_meshes() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def texts(coarse: Lever) -> list[str]:
     """Data of levers that differ in c_kappa."""
-    made = []
+    texts = []
     for c_kappa in TRUTHS:
         material = coarse.probe.material.with_(c_kappa=c_kappa)
         sweep = coarse.with_material(material).sweep(BIAS)
         rows = zip(BIAS, sweep.current_mA.values, sweep.tip_K.values, strict=True)
         lines = [",".join(map(str, row)) for row in rows]
-        made.append("\n".join(["V_b (V),I_h (mA),T_tip (K)", *lines, ""]))
-    return made
+        texts.append("\n".join(["V_b (V),I_h (mA),T_tip (K)", *lines, ""]))
+    return texts
 
 
 @pytest.fixture

@@ -104,7 +104,7 @@ def test_values_of_the_circuit_have_their_derivatives(bridged):
     for place, name in enumerate(names[:4]):
         (value,) = bridged.probe.values([name])
         up, down = (
-            at.surrogate.shown(bridged.probe.replace({name: value * (1 + h)}).values(names))
+            at.surrogate.values_at(bridged.probe.replace({name: value * (1 + h)}).values(names))
             for h in (1e-4, -1e-4)
         )
         slope = (up - down)[ROW] / (2e-4 * value)

@@ -13,7 +13,7 @@ from hotlever.estimation.posterior import CurvedQuantity
 GRADIENT = np.array([100.0, 20.0])
 
 
-class _Shown:
+class _Surrogate:
     """Two data, exp(a) / s and b / 0.5, or the quantity alone."""
 
     def __init__(self, of_data, share=1.0):
@@ -26,13 +26,13 @@ class _Shown:
         slopes = np.diag([grown, 2.0])
         return np.array([[grown, 2.0 * point[1]]]), slopes[None]
 
-    def shown(self, point):
+    def values_at(self, point):
         return self.predict(point)[0]
 
 
 def curved(share):
     """The quantity, where data know exp(a) within a share of it."""
-    origin, data = np.zeros(2), _Shown(True, share)
+    origin, data = np.zeros(2), _Surrogate(True, share)
     slopes = data.predict(origin)[1]
     objective = SimpleNamespace(
         names=("a", "b"),
@@ -47,7 +47,7 @@ def curved(share):
     probe = SimpleNamespace(values=lambda names: origin)
     at = SimpleNamespace(probe=probe, slopes=slopes, surrogate=data)
     posterior = SimpleNamespace(objective=objective, at=at, covariance=np.diag([share**2, 0.25]))
-    return CurvedQuantity(posterior, _Shown(False), 0)
+    return CurvedQuantity(posterior, _Surrogate(False), 0)
 
 
 def exact(share, errors):

@@ -48,8 +48,8 @@ def test_a_drifting_zero_is_found_and_taken_out(coarse, model, drifting):
 def test_without_the_option_the_fit_says_that_the_zero_drifts(coarse, model, drifting):
     estimated = estimate(drifting, coarse.probe, FitOptions(), model=model)
     at, slopes = estimated.prediction, estimated.posterior.slopes
-    said = estimated.residuals.drifting_zeros(at.values, slopes)
-    assert any("--drift would take that out" in text for text in said)
+    notes = estimated.residuals.drifting_zeros(at.values, slopes)
+    assert any("--drift would take that out" in text for text in notes)
 
 
 def test_data_without_drift_raise_no_suspicion(coarse, model):

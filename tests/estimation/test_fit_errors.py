@@ -33,9 +33,9 @@ def test_measurement_errors_weigh_the_data(coarse, coarse_fast, monkeypatch):
     measurement = twin(coarse, noise=0.003)
     trusted = with_errors(measurement, current=1e-3, reader=0.3, tip=600.0)
     # what a current alone hardly tells is held
-    given = {"fixed": {"n_d": TRUTH["n_d"], "a1": None}, "model": coarse_fast}
-    result = fit(trusted, coarse.probe, weights="errors", **given)
-    alone = fit(measurement, coarse.probe, observables=["current"], **given)
+    options = {"fixed": {"n_d": TRUTH["n_d"], "a1": None}, "model": coarse_fast}
+    result = fit(trusted, coarse.probe, weights="errors", **options)
+    alone = fit(measurement, coarse.probe, observables=["current"], **options)
     assert result.residual_rms["current_mA"] == pytest.approx(
         alone.residual_rms["current_mA"], rel=1e-3
     )

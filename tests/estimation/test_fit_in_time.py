@@ -33,10 +33,10 @@ def folder(tmp_path, monkeypatch):
 def test_a_scale_of_the_heat_capacity_is_found(coarse):
     names = ["heat_capacity_scale", "n_d"]
     twin = coarse.with_probe(coarse.probe.replace({"heat_capacity_scale": 1.08, "n_d": 5.9e17}))
-    shown = simulate(twin, WAVE, at=TIMES, tolerance_K=0.02)
+    history = simulate(twin, WAVE, at=TIMES, tolerance_K=0.02)
     noise = np.random.default_rng(0).normal(1.0, 1e-5, (2, TIMES.size))
     measured = Measurement.in_time(
-        TIMES, WAVE, shown.current_mA.values * noise[0], shown.reader_V.values * noise[1]
+        TIMES, WAVE, history.current_mA.values * noise[0], history.reader_V.values * noise[1]
     )
     # a model may have its parameters in another order than the fit
     as_it_is = partial(ExperimentInTime.of, waveform=WAVE, names=names[::-1], lever=coarse)
@@ -48,7 +48,7 @@ def test_a_scale_of_the_heat_capacity_is_found(coarse):
         "n_d": pytest.approx(5.9e17, rel=1e-3),
     }
     assert 0.0 < found.parameters["heat_capacity_scale"].stderr < 3e-3
-    np.testing.assert_allclose(found.band.tip_K, shown.tip_K, atol=0.5)
+    np.testing.assert_allclose(found.band.tip_K, history.tip_K, atol=0.5)
     assert (found.band.tip_stderr_K < 0.5).all()
     assert found.evaluations < 10
 
@@ -142,7 +142,7 @@ def test_a_slow_sweep_with_times_stays_one(folder):
 
 
 @pytest.mark.parametrize(
-    ("text", "given", "said"),
+    ("text", "options", "message"),
     [
         (
             PULSE + "0,0,0\n1,0,0\n1,5,0.5\n",
@@ -161,9 +161,9 @@ def test_a_slow_sweep_with_times_stays_one(folder):
     ],
     ids=str,
 )
-def test_what_is_wrong_is_said(folder, text, given, said):
-    with pytest.raises(InputError, match=said):
-        read(text, **given)
+def test_what_is_wrong_is_said(folder, text, options, message):
+    with pytest.raises(InputError, match=message):
+        read(text, **options)
 
 
 def test_noise_without_a_wave_form_is_refused(folder):
@@ -176,7 +176,7 @@ def test_noise_without_a_wave_form_is_refused(folder):
 
 
 @pytest.mark.parametrize(
-    ("wave", "given", "said"),
+    ("wave", "options", "message"),
     [
         (step(4.0), {"free": ["heater_width_um"]}, "heater_width_um: cannot be varied in time"),
         (sine(3.0, 0.5, 2e4), {}, "begins at 3 V"),
@@ -185,10 +185,10 @@ def test_noise_without_a_wave_form_is_refused(folder):
     ],
     ids=str,
 )
-def test_what_cannot_be_varied_is_said(coarse, wave, given, said):
+def test_what_cannot_be_varied_is_said(coarse, wave, options, message):
     measured = Measurement.in_time([1.0, 2.0], wave, [0.5, 0.5])
-    with pytest.raises(InputError, match=said):
-        fit(measured, coarse.probe, **given)
+    with pytest.raises(InputError, match=message):
+        fit(measured, coarse.probe, **options)
 
 
 def test_columns_that_do_not_match_are_refused():

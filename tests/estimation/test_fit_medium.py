@@ -12,7 +12,7 @@ from hotlever.probe import Probe
 
 
 @pytest.mark.parametrize(
-    ("asked", "in_file", "in_probe", "expected", "noted"),
+    ("option", "in_file", "in_probe", "expected", "noted"),
     [
         (None, None, "vacuum", "vacuum", False),
         (None, None, "air", "air", False),
@@ -24,8 +24,8 @@ from hotlever.probe import Probe
         ("air", None, "vacuum", "air", False),
     ],
 )
-def test_medium_of_a_fit(asked, in_file, in_probe, expected, noted):
+def test_medium_of_a_fit(option, in_file, in_probe, expected, noted):
     measurement = replace(read_measurement("src/hotlever/examples/lever-a.csv"), medium=in_file)
-    probe, notes = with_measured_circuit(Probe.reference().in_medium(in_probe), measurement, asked)
+    probe, notes = with_measured_circuit(Probe.reference().in_medium(in_probe), measurement, option)
     assert probe.surroundings.medium == expected
     assert any("medium" in note for note in notes) == noted

@@ -35,7 +35,7 @@ def wired(circuit: str) -> Probe:
     )
 
 
-def shown(lever: Lever, bias: np.ndarray) -> np.ndarray:
+def solved_observables(lever: Lever, bias: np.ndarray) -> np.ndarray:
     """What is observed of states that are solved one by one."""
     data = lever.dataset(lever.solve(bias))
     return observables_of(data)
@@ -52,18 +52,20 @@ def test_predictions_are_states_and_their_slopes_have_taylor_order_two(circuit):
     names = ("base_temperature_K", "heater_width_um")
     similar = SimilarLevers(Lever(probe, COARSE))
     between = ExperimentAtRest(similar, None, BIAS, names).predict(probe)
-    off = np.abs(between.values - shown(similar.lever(probe), BIAS)).max(axis=1)
+    off = np.abs(between.values - solved_observables(similar.lever(probe), BIAS)).max(axis=1)
     assert np.all(off < [2e-5, 2e-5, 0.02, 2e-4])
     # slopes between the states of the branch are those of nearby ones
     branch = between.linearised.branch
     bias = probe.circuit.bias(*branch.values[2:-2:9, :2].T)
     at = ExperimentAtRest(similar, None, bias, names).predict(probe, between)
-    start = shown(similar.lever(probe), bias)
+    start = solved_observables(similar.lever(probe), bias)
     for place, name in enumerate(names):
         (value,) = probe.values([name])
         levers = [similar.lever(probe.replace({name: value * (1 + step)})) for step in STEPS]
         rest = [
-            np.abs(shown(one, bias) - start - step * value * at.slopes[:, :, place]).max(axis=1)
+            np.abs(
+                solved_observables(one, bias) - start - step * value * at.slopes[:, :, place]
+            ).max(axis=1)
             for step, one in zip(STEPS, levers, strict=True)
         ]
         assert np.log2(rest[0] / rest[1]).min() > 1.8, name

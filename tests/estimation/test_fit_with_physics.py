@@ -24,8 +24,8 @@ def truth() -> Probe:
 def measured(truth) -> Measurement:
     sweep, noise = Lever(truth, COARSE).sweep(BIAS), np.random.default_rng(1).normal
     current, reader = (
-        shown.values * (1 + 1e-3 * noise(size=BIAS.size))
-        for shown in (sweep.current_mA, sweep.reader_V)
+        column.values * (1 + 1e-3 * noise(size=BIAS.size))
+        for column in (sweep.current_mA, sweep.reader_V)
     )
     nothing = np.full(BIAS.size, np.nan)
     return Measurement(BIAS, current, reader, nothing, nothing)

@@ -155,7 +155,7 @@ def test_how_far_a_prior_is_pulled_is_what_the_others_gain_without_it(solved):
     every, count = np.arange(residual.size), len(one.options.varied)
     for row, name in enumerate(one.options.varied, start=residual.size - count):
         gained = least(every) - least(np.delete(every, row))
-        assert one.posterior.moved[name].pull ** 2 == pytest.approx(gained, rel=0.05, abs=0.05), (
+        assert one.posterior.shifts[name].pull ** 2 == pytest.approx(gained, rel=0.05, abs=0.05), (
             name
         )
 
@@ -194,8 +194,8 @@ def test_errors_that_data_share_weigh_as_one():
     np.testing.assert_allclose(own, np.linalg.inv(expected))
     size, left = residuals.in_common(values, slopes, own)["raman_scale"]
     assert left == pytest.approx(np.sqrt(every[2, 2]))
-    told = (shared / error**2) @ difference / (1.0 + np.sum((shared / error) ** 2))
-    assert size == pytest.approx(-told)
+    scale_error = (shared / error**2) @ difference / (1.0 + np.sum((shared / error) ** 2))
+    assert size == pytest.approx(-scale_error)
 
 
 def test_scales_are_as_uncertain_as_priors_say(data):
@@ -254,5 +254,5 @@ def test_priors_of_files_that_say_no_distribution_are_read(found, tmp_path):
 
 def test_a_prior_that_does_not_count_is_said_to_have_no_effect(data):
     priors = {"n_d": default_priors(NOMINAL)["n_d"], "gas_conductivity": Prior(1.0, 0.1)}
-    said = "priors that do not count in vacuum, and have no effect: gas_conductivity"
-    assert said in estimate(data[0], NOMINAL, FitOptions(priors=priors)).notes
+    note = "priors that do not count in vacuum, and have no effect: gas_conductivity"
+    assert note in estimate(data[0], NOMINAL, FitOptions(priors=priors)).notes

@@ -65,11 +65,13 @@ class Bent:
         self._bend = bend
 
     def predict(self, probe, near=None):
-        values, slopes = self._shown(np.array([float(probe)]))
-        surrogate = SimpleNamespace(predict=self._shown, shown=lambda x: self._shown(x)[0])
+        values, slopes = self._prediction(np.array([float(probe)]))
+        surrogate = SimpleNamespace(
+            predict=self._prediction, values_at=lambda x: self._prediction(x)[0]
+        )
         return SimpleNamespace(values=values, slopes=slopes, probe=probe, surrogate=surrogate)
 
-    def _shown(self, x):
+    def _prediction(self, x):
         tip = TIPS + SLOPES * (x[0] + self._bend * x[0] ** 2)
         slope = SLOPES * (1 + 2 * self._bend * x[0])
         return np.stack([0 * tip, 0 * tip, tip]), np.stack([0 * tip, 0 * tip, slope])[:, :, None]
@@ -116,12 +118,12 @@ def test_what_is_linear_has_the_linearised_error():
     np.testing.assert_allclose([TIPS - low, high - TIPS], [BAND * SLOPES] * 2)
 
 
-@pytest.mark.parametrize("moved", [[0.0, 0.0, 0.0], [0.0, 10.0, 0.0]])
-def test_a_tip_that_nothing_unknown_moves_is_known_exactly(moved, monkeypatch):
-    monkeypatch.setattr(f"{__name__}.SLOPES", np.array(moved))
+@pytest.mark.parametrize("slopes", [[0.0, 0.0, 0.0], [0.0, 10.0, 0.0]])
+def test_a_tip_that_nothing_unknown_moves_is_known_exactly(slopes, monkeypatch):
+    monkeypatch.setattr(f"{__name__}.SLOPES", np.array(slopes))
     known = profile(0.12)
-    fixed = np.array(moved) == 0.0
-    low, high = known.credible_interval(TIPS, np.array(moved), np.zeros(3))
+    fixed = np.array(slopes) == 0.0
+    low, high = known.credible_interval(TIPS, np.array(slopes), np.zeros(3))
     np.testing.assert_array_equal(low[fixed], TIPS[fixed])
     np.testing.assert_array_equal(high[fixed], TIPS[fixed])
     assert (high[~fixed] > TIPS[~fixed]).all()

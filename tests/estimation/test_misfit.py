@@ -93,8 +93,8 @@ def test_the_scale_of_a_thermometer_is_no_misfit():
 def test_outliers_stand_alone(rows, where):
     off = np.zeros(COUNT)
     off[list(rows)] = 0.02
-    said = f"current is off in neighbouring rows, {where}" if where else ""
-    assert run_of_outliers(compared(off), MODEL) == said
+    expected = f"current is off in neighbouring rows, {where}" if where else ""
+    assert run_of_outliers(compared(off), MODEL) == expected
 
 
 @pytest.mark.slow

@@ -60,8 +60,8 @@ def test_what_costs_less_or_may_not_be_made_again_counts():
 
 
 def test_the_law_of_a_noise_is_found_again_and_outliers_hardly_move_it():
-    shown = np.linspace(0.1, 2.0, 40)
-    errors = NoiseLaw(1e-3, 2e-3).at(shown)
+    values = np.linspace(0.1, 2.0, 40)
+    errors = NoiseLaw(1e-3, 2e-3).at(values)
     errors[7] *= 50.0
-    law = NoiseLaw.of(errors, shown)
-    np.testing.assert_allclose(law.at(shown[8:]), errors[8:], rtol=0.05)
+    law = NoiseLaw.of(errors, values)
+    np.testing.assert_allclose(law.at(values[8:]), errors[8:], rtol=0.05)

@@ -75,18 +75,23 @@ def test_what_is_predicted_is_what_levers_show(probe, touching):
     names = (INTERFACE, "apex_radius_um", "c_kappa", "base_temperature_K")
     model = experiment(probe, names, np.array([0.0, 0.3]))
     near = model.predict(probe)
-    moved = near.probe.values(names) * np.array([1.05, 0.98, 1.01, 1.001])
-    there = probe.replace(dict(zip(names, moved.tolist(), strict=True)))
+    parameters = near.probe.values(names) * np.array([1.05, 0.98, 1.01, 1.001])
+    there = probe.replace(dict(zip(names, parameters.tolist(), strict=True)))
     solved = model.predict(there, near)
     away = np.abs(solved.values - near.values).max(axis=1)
-    for shown, slopes in (near.surrogate.predict(moved), (near.surrogate.shown(moved), None)):
-        off = np.abs(shown - solved.values).max(axis=1)
+    for values, slopes in (
+        near.surrogate.predict(parameters),
+        (near.surrogate.values_at(parameters), None),
+    ):
+        off = np.abs(values - solved.values).max(axis=1)
         # there is no bridge
         assert ((off < 0.02 * away) | np.isnan(off)).all()
         assert np.isnan(off).sum() == 1
         if slopes is not None:
-            steps = slopes @ (1e-4 * moved)
-            change = near.surrogate.shown(1.0001 * moved) - near.surrogate.shown(0.9999 * moved)
+            steps = slopes @ (1e-4 * parameters)
+            change = near.surrogate.values_at(1.0001 * parameters) - near.surrogate.values_at(
+                0.9999 * parameters
+            )
             np.testing.assert_allclose(2.0 * steps, change, rtol=5e-3, atol=1e-7)
     # by itself: an independent statement of what is read there
     data = sweep_in_contact(touching.with_probe(probe), [8.0])
@@ -103,13 +108,13 @@ def test_what_is_predicted_is_what_levers_show(probe, touching):
 def test_an_approach_in_air_is_followed_between_a_few_distances(probe):
     in_air = probe.with_(medium="air", surface_gap_um=0.7)
     distance = np.geomspace(0.01, 20.0, 9)
-    shown = experiment(in_air, ("c_kappa",), distance).predict(in_air).values[0]
+    currents = experiment(in_air, ("c_kappa",), distance).predict(in_air).values[0]
     for row in (1, 5):
         gap = 0.7 + float(distance[row])
         there = out_of_contact(Lever(in_air, COARSE)).probe.replace({"surface_gap_um": gap})
         current = Lever(there, COARSE).sweep([8.0]).current_mA.item()
-        assert shown[row] == pytest.approx(current, rel=2e-5)
-    assert np.ptp(shown) > 5e-3 * shown[0]
+        assert currents[row] == pytest.approx(current, rel=2e-5)
+    assert np.ptp(currents) > 5e-3 * currents[0]
 
 
 def test_the_interface_follows_from_rows_in_and_out_of_contact(probe, measured):

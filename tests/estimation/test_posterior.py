@@ -138,8 +138,8 @@ def test_effective_sample_size_of_an_autoregressive_chain():
 def sampled(coarse, reduced, bias=BIAS):
     """The reduced lever as samples see it, and what it shows of a material."""
     lever = SampledLever(reduced_experiment(coarse, reduced, bias), coarse.probe)
-    shown, names = lever.at.surrogate.shown, tuple(PARAMETERS)
-    return lambda material: shown(coarse.with_material(material).probe.values(names))
+    values_at, names = lever.at.surrogate.values_at, tuple(PARAMETERS)
+    return lambda material: values_at(coarse.with_material(material).probe.values(names))
 
 
 def test_the_surrogate_shows_nearby_what_the_full_lever_does(coarse, reduced):
@@ -224,8 +224,8 @@ def test_the_posterior_of_a_fit_with_priors_agrees_with_its_covariance(informed)
     assert posterior.attrs["surrogate_error_K"] < 10.0
     band = predictive_band(informed, posterior, bias=BIAS, samples=100)
     low, _, _, _, high = band.tip_K.values
-    said = informed.band.tip_stderr_K.values
-    np.testing.assert_allclose((high - low) / 3.92, said, rtol=0.5, atol=0.3)
+    stderr = informed.band.tip_stderr_K.values
+    np.testing.assert_allclose((high - low) / 3.92, stderr, rtol=0.5, atol=0.3)
 
 
 def test_a_profile_counts_priors(informed):
@@ -238,8 +238,8 @@ def test_other_probes_are_predicted_by_powers_nearly_as_they_are_solved(coarse):
     names = ("n_d", "heater_length_um", "base_temperature_K")
     lever = SampledLever(experiment_of(coarse.probe, BIAS, names=names), coarse.probe)
     there = coarse.probe.with_(n_d=5.5e17, heater_length_um=4.1, base_temperature_K=295.0)
-    exact, shown = Lever(there).sweep(BIAS).tip_K.values, lever.at.surrogate.shown
-    assert np.abs(shown(there.values(names))[2] - exact).max() < 2.0
+    exact, values_at = Lever(there).sweep(BIAS).tip_K.values, lever.at.surrogate.values_at
+    assert np.abs(values_at(there.values(names))[2] - exact).max() < 2.0
     assert lever.error_K(there) < 2.0
 
 
@@ -251,9 +251,9 @@ def test_what_was_known_to_a_factor_is_compared_in_logarithms():
         probe=Probe.reference(), parameters={"n_d": fitted}, stated_priors={"n_d": known}
     )
     normal = np.random.default_rng(0).standard_normal(4000)
-    told = "n_d is as known before: these data do not tell"
-    assert told not in uncertainty._about(fit, "n_d", 1.5e18 * np.exp(0.30 * normal))
-    assert told in uncertainty._about(fit, "n_d", 1.5e18 * np.exp(0.39 * normal))
+    statement = "n_d is as known before: these data do not tell"
+    assert statement not in uncertainty._about(fit, "n_d", 1.5e18 * np.exp(0.30 * normal))
+    assert statement in uncertainty._about(fit, "n_d", 1.5e18 * np.exp(0.39 * normal))
 
 
 def test_data_that_determine_fewer_parameters_have_no_covariance():

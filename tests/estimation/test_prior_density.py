@@ -28,8 +28,8 @@ def test_a_joint_prior_is_as_wide_as_its_covariance():
     joint = PriorDensity.of_estimate(["a", "b"], values, covariance, np.array([True, True]))
     slopes = joint.slopes(values)
     np.testing.assert_allclose(np.linalg.inv(slopes.T @ slopes), covariance, rtol=1e-12)
-    moved = values * 1.001
-    np.testing.assert_allclose(joint.deviations(moved), slopes @ (moved - values), rtol=1e-3)
+    nearby = values * 1.001
+    np.testing.assert_allclose(joint.deviations(nearby), slopes @ (nearby - values), rtol=1e-3)
 
 
 def test_what_may_be_zero_is_no_logarithm_in_a_joint_prior():

@@ -135,7 +135,7 @@ def test_a_search_that_was_ended_says_that_it_has_not_converged(coarse):
     far = Probe.reference().with_(n_d=1.2e17, c_kappa=1.0)
     data = curve(Probe.reference(), 9.0, 15)
     residuals = Residuals(data, ["current"])
-    model = full_experiment(coarse, residuals.bias).measuring(residuals.bias, residuals.shown)
+    model = full_experiment(coarse, residuals.bias).measuring(residuals.bias, residuals.measured)
     options = SearchOptions(most_branches=2)
     objective = Objective(residuals, far, model.names, list(PARAMETERS))
     search = Optimiser(objective, Predictor(model), options)

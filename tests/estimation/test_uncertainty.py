@@ -53,17 +53,17 @@ def drawn(fitted, shift=0.0, widen=1.0, rhat=1.0, effective=2000.0, **others) ->
     )
 
 
-def said(fitted, **options) -> list[str]:
+def statements(fitted, **options) -> list[str]:
     return Uncertainty(fitted, drawn(fitted, **options), None, {}).statements()
 
 
 def test_a_posterior_that_the_standard_errors_describe_needs_no_words(fitted):
-    assert said(fitted) == []
+    assert statements(fitted) == []
 
 
 def test_another_posterior_than_the_standard_errors_say_is_named(fitted):
     for options in ({"shift": 1.5}, {"widen": 2.0}):
-        texts = said(fitted, **options)
+        texts = statements(fitted, **options)
         assert len(texts) == 2
         assert texts[0].startswith("c_kappa: 95 % of the posterior lies between")
 
@@ -71,18 +71,18 @@ def test_another_posterior_than_the_standard_errors_say_is_named(fitted):
 def test_a_parameter_that_is_not_determined_is_named(fitted):
     rng = np.random.default_rng(1)
     at_bound = 1.0 + np.abs(rng.normal(0, 0.3, size=(8, 500)))
-    assert said(fitted, p=at_bound) == [
+    assert statements(fitted, p=at_bound) == [
         "p is not determined by these data: its posterior reaches its bound 1"
     ]
     wide = rng.uniform(1.3, 3.7, size=(8, 500))
-    assert said(fitted, p=wide) == [
+    assert statements(fitted, p=wide) == [
         "p is not determined by these data: its posterior is about as wide as its bounds"
     ]
 
 
 def test_chains_that_disagree_or_are_short_are_said(fitted):
     for options in ({"rhat": 1.2}, {"effective": 50.0}):
-        (text,) = said(fitted, **options)
+        (text,) = statements(fitted, **options)
         assert text.startswith("the posterior of c_kappa, p is not settled")
 
 

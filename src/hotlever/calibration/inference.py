@@ -270,7 +270,7 @@ def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -
 
 def _misfit(estimate: Estimate, priors: Mapping[str, PriorUse]) -> str:
     """Return why data are not described by what was fitted to them; empty if they are."""
-    of_data, moved = (estimate.residuals, estimate.prediction.values), estimate.posterior.moved
+    of_data, moved = (estimate.residuals, estimate.prediction.values), estimate.posterior.shifts
     if reason := lack_of_fit_text(*of_data) or run_of_outliers(*of_data):
         return reason
     name = max(moved, key=lambda name: abs(moved[name].pull), default="")

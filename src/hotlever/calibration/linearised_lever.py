@@ -220,7 +220,7 @@ class LinearisedLever:
             first = up(gradient)
             values, slopes = surrogate.predict(first)
             rates = self._coordinates.rates(self._coordinates.point(first))
-            shown = surrogate.shown(up(slopes[TIP, 0] * rates))
+            shown = surrogate.values_at(up(slopes[TIP, 0] * rates))
         except ComputationError:
             return np.inf
         return max(float(values[TIP, 0]), float(shown[TIP, 0]))

@@ -220,7 +220,7 @@ def budget_of_estimate(
     # of what is hotter no lever was solved, and it may melt
     ended = predicted.values[: len(OBSERVABLES)].copy()
     ended[TIP] = surrogate.branch.hottest_K
-    hottest = surrogate.contact.shown(ended, estimate.probe.values(objective.names))[observable, 0]
+    hottest = surrogate.contact.added(ended, estimate.probe.values(objective.names))[observable, 0]
     beyond = max(interval.high, made.interval_K[1]) > hottest
     return replace(made, monte_carlo=_NO_INTERVAL if beyond else interval)
 

@@ -54,7 +54,7 @@ class Work(Generic[Result]):
     ending: str
     probe: Probe
     options: FitOptions
-    asked: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass
@@ -173,10 +173,10 @@ def estimate_many(
     outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
     outputs.folder(target)
     files = {name: target / f"{name}{work.ending}" for name in data}
-    asked = {"probe": work.probe.sections(), "options": work.options.values(), **work.asked}
-    asked["version"] = __version__
+    request = {"probe": work.probe.sections(), "options": work.options.values(), **work.settings}
+    request["version"] = __version__
     if columns:
-        asked["columns"] = dict(columns)
+        request["columns"] = dict(columns)
     batch, waiting, requests = Batch[Result](), dict[str, Measurement](), dict[str, Any]()
 
     def tell() -> None:
@@ -195,7 +195,7 @@ def estimate_many(
             batch.fail(path, error)
             continue
         # all that a result depends on, for its file: the same again need not be made
-        requests[name] = dict(without_nan({"sha256": measurement.sha256, **asked}))
+        requests[name] = dict(without_nan({"sha256": measurement.sha256, **request}))
         # whoever changes the code of a class of materials keeps its name
         again = not work.probe.classes
         earlier = _written_before(files[name], work, requests[name]) if again else None
@@ -259,8 +259,8 @@ def lever_names(paths: Sequence[str | os.PathLike[str]]) -> dict[str, Path]:
         name = path.stem if alone else "_".join(path.relative_to(path.anchor).parts)
         # a file name need not be text; and not all disks tell a from A
         name = name.encode(errors="backslashreplace").decode()
-        taken, number, plain = {other.casefold() for other in names}, 2, name
-        while name.casefold() in taken:
+        existing, number, plain = {other.casefold() for other in names}, 2, name
+        while name.casefold() in existing:
             name, number = f"{plain}-{number}", number + 1
         names[name] = path
     return names

@@ -89,7 +89,7 @@ class PosteriorDensity:
     objective : Objective
     at : Prediction
         About which it is approximated.
-    shown : callable
+    forward_model : callable
         Return the observables (m, n) at a point; picklable, if it is sampled in processes.
     noise : {"each", "common"}
         What shares a noise scale: an observable, or all.
@@ -99,11 +99,11 @@ class PosteriorDensity:
         self,
         objective: Objective,
         at: Prediction,
-        shown: Callable[[Array], Array],
+        forward_model: Callable[[Array], Array],
         noise: Noise = "each",
     ) -> None:
         self.objective, self.optimum = objective, objective.point(at.probe)
-        self._shown = shown
+        self._forward_model = forward_model
         self._residual = objective.residuals.weighted(at.values)
         self._jacobian = objective.of_data(at.slopes, self.optimum)
         # the data that share a noise scale
@@ -116,7 +116,7 @@ class PosteriorDensity:
         if np.any(point <= low) or np.any(point >= high):
             return -math.inf
         try:
-            residual = self.objective.residuals.weighted(self._shown(point))
+            residual = self.objective.residuals.weighted(self._forward_model(point))
         except ComputationError:
             return -math.inf
         unlikely = float(residual @ residual)
@@ -282,17 +282,17 @@ def sample(
         states = run(_started, [(density, approximation, walkers, number) for number in seeds])
         for done in range(0, total, _BLOCK):
             steps = min(_BLOCK, total - done)
-            moved = run(_advanced, [(density, approximation, state, steps) for state in states])
-            states = [state for state, _, _ in moved]
-            points.append([positions for _, positions, _ in moved])
-            densities.append([logarithms for _, _, logarithms in moved])
+            blocks = run(_advanced, [(density, approximation, state, steps) for state in states])
+            states = [state for state, _, _ in blocks]
+            points.append([positions for _, positions, _ in blocks])
+            densities.append([logarithms for _, _, logarithms in blocks])
             if progress is not None:
                 progress(done + steps, total)
-    kept = (
+    after_warm_up = (
         np.concatenate(values, axis=1)[:, _WARM_UP:].swapaxes(1, 2)
         for values in (points, densities)
     )
-    return Chains(*kept)
+    return Chains(*after_warm_up)
 
 
 def worth(values: Array) -> tuple[float, float]:

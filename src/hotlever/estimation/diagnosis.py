@@ -200,9 +200,9 @@ class _Curve:
         rows = Rows(np.zeros(0))
         surrogate = CurveSurrogate(probe, names, lever.branch, lever.shown, rows)
         u = np.linspace(float(lever.branch.u[1]), lever.branch.end_u, _POINTS)
-        shown = np.maximum(lever.branch.curve(u)[:, :2], 1e-12)
+        outputs = np.maximum(lever.branch.curve(u)[:, :2], 1e-12)
         powers = surrogate.powers(u)[:, :2]
-        return cls(probe, np.zeros(len(names)), names, np.array(spreads), np.log(shown), powers)
+        return cls(probe, np.zeros(len(names)), names, np.array(spreads), np.log(outputs), powers)
 
     def current(self, away: Array, rows: MeasuredRows) -> Array:
         """Return I_h (mA) at the biases, for logarithms of parameters over the probe's.
@@ -287,8 +287,8 @@ class Diagnosis:
         limit = max(_AS_LIKELY * best.squares, best.squares + _AS_LIKELY_BY)
         as_likely = [explained for explained in explanations if explained.squares <= limit]
         as_likely.sort(key=lambda explained: explained.hypothesis.far_fetched)
-        asked = dict.fromkeys(explained.question for explained in as_likely)
-        return " or: ".join(list(asked)[:_CAUSES_NAMED])
+        questions = dict.fromkeys(explained.question for explained in as_likely)
+        return " or: ".join(list(questions)[:_CAUSES_NAMED])
 
     @cached_property
     def _without(self) -> _Explanation:
@@ -303,7 +303,7 @@ class Diagnosis:
         return _Curve.of(probe, known_beforehand(probe, self._stated))
 
     def _explains(self, explained: _Explanation) -> bool:
-        return explained.squares < _EACH * self._rows.kept.size + _ALTOGETHER
+        return explained.squares < _EACH * self._rows.included.size + _ALTOGETHER
 
     def _search(self, hypothesis: Hypothesis) -> _Explanation:
         """Estimate the lever with a hypothesis, from each of its starts; return the best."""
@@ -321,8 +321,8 @@ class Diagnosis:
         curve = explained.curve
         values = curve.probe.values(curve.names) * np.exp(explained.away)
         try:
-            moved = curve.probe.with_(**dict(zip(curve.names, values.tolist(), strict=True)))
-            curve = replace(self._solved(moved), probe=curve.probe, at=explained.away)
+            estimate = curve.probe.with_(**dict(zip(curve.names, values.tolist(), strict=True)))
+            curve = replace(self._solved(estimate), probe=curve.probe, at=explained.away)
         except (InputError, ComputationError):
             return explained
         again = self._estimated(explained.hypothesis, explained.unknown, curve)
@@ -343,8 +343,8 @@ class Diagnosis:
             missing = curve.current(point[:count] * spreads, rows) - rows.current_mA
             missing /= _OWN * size + _LARGEST * size.max()
             soft = _SOFT * np.sqrt(np.log1p((missing / _SOFT) ** 2)) * np.sign(missing)
-            kept = np.where(rows.kept, soft, np.sqrt(_LEFT_OUT))
-            return np.concatenate([kept, point[:count][informed]])
+            residuals = np.where(rows.included, soft, np.sqrt(_LEFT_OUT))
+            return np.concatenate([residuals, point[:count][informed]])
 
         begin = np.append(curve.at / spreads, [0.0] * hypothesis.free)
         widest = np.append(np.log(_WIDEST) / spreads, [np.inf] * hypothesis.free)

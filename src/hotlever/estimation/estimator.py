@@ -82,12 +82,12 @@ def fit(
         If the lever cannot be solved at the start, or the fit does not converge.
     """
     options = chosen_options(options, choices)
-    given = Probe.reference() if probe is None else Probe.coerce(probe)
-    whole = given_measurement(measurement, given)
+    nominal = Probe.reference() if probe is None else Probe.coerce(probe)
+    whole = given_measurement(measurement, nominal)
 
     def fitted(medium: Any) -> tuple[Estimate, Fit]:
         within = replace(options, medium=medium)
-        solution = estimate(whole, given, within, model=model, progress=progress, seen=seen)
+        solution = estimate(whole, nominal, within, model=model, progress=progress, seen=seen)
         return solution, _fit_of(solution)
 
     solution, result = in_medium(options.medium, fitted, _either)
@@ -156,7 +156,7 @@ def _band(estimate: Estimate) -> xr.Dataset:
 
 
 def in_medium(
-    asked: str | None,
+    requested_medium: str | None,
     answered: Callable[[str | None], tuple[Estimate, Answer]],
     of_either: Callable[[Answer, Answer], Answer],
 ) -> tuple[Estimate, Answer]:
@@ -166,7 +166,7 @@ def in_medium(
 
     Parameters
     ----------
-    asked : str or None
+    requested_medium : str or None
         None is what measurement and probe say.
     answered : callable
         Return an estimate in a medium, and the outcome that is read from it.
@@ -179,8 +179,8 @@ def in_medium(
     ComputationError
         If the lever can be solved in none of them.
     """
-    if asked != UNKNOWN_MEDIUM:
-        return answered(asked)
+    if requested_medium != UNKNOWN_MEDIUM:
+        return answered(requested_medium)
     answers: dict[str, tuple[Estimate, Answer]] = {}
     failures: dict[str, ComputationError] = {}
     for medium in get_args(Medium):
@@ -214,8 +214,8 @@ def error_of_choice(tip_K: Array, other_K: Array) -> Array:
 
 def _how_well(estimate: Estimate, answer: Outcome) -> str:
     rms = estimate.residuals.rms(estimate.prediction.values)
-    shown = ", ".join(f"{value:.2g} {name.rsplit('_', 1)[1]}" for name, value in rms.items())
-    return f"{'does not describe' if answer.reason else 'describes'} the data (rms {shown})"
+    rms_text = ", ".join(f"{value:.2g} {name.rsplit('_', 1)[1]}" for name, value in rms.items())
+    return f"{'does not describe' if answer.reason else 'describes'} the data (rms {rms_text})"
 
 
 def undetermined(fit: Fit) -> list[str]:

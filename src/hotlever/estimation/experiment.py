@@ -40,7 +40,7 @@ TIP = list(FITTED).index("tip")
 _BEYOND_ZERO = 0.05
 #: Levers that most searches solve, for a progress bar to fill; latest predictions that are at hand
 #: and tell how values bend between them.
-_USUAL_LEVERS, _KEPT = 8, 5
+_USUAL_LEVERS, _MOST_AT_HAND = 8, 5
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class Predictor:
         if probe not in self._at_hand:
             self._at_hand[probe] = self._solved(probe)
         self._at_hand[probe] = self._at_hand.pop(probe)  # the latest
-        if len(self._at_hand) > _KEPT:
+        if len(self._at_hand) > _MOST_AT_HAND:
             del self._at_hand[next(iter(self._at_hand))]
         return self._at_hand[probe]
 
@@ -220,8 +220,8 @@ class Correction:
 
     def added(self, branch: Branch, at: Array) -> Branch:
         """Return a branch of the fast lever with what it lacks, for some values of parameters."""
-        moved, u = at - self.at, branch.u
-        changes, slopes = (self.values(u, n) + self.slopes(u, n) @ moved for n in (0, 1))
+        offset, u = at - self.at, branch.u
+        changes, slopes = (self.values(u, n) + self.slopes(u, n) @ offset for n in (0, 1))
         return shifted(branch, changes, slopes)
 
 
@@ -231,7 +231,7 @@ class ExperimentAtRest:
 
     The full lever corrects the fast one, unless it is None. What is predicted depends on the
     probe alone: correcting the model makes another one. Derivatives are by ``names``, and
-    are corrected too if ``first_order``. Where it is known what was measured, as ``shown``, each
+    are corrected too if ``first_order``. Where it is known what was measured, as ``measured``, each
     bias stands for the state nearest to that (`hotlever.estimation.surrogate`), otherwise for that
     of a slow ramp.
     """
@@ -242,16 +242,16 @@ class ExperimentAtRest:
     names: tuple[str, ...]
     first_order: bool = True
     correction: Correction | None = None
-    shown: Array | None = None
+    measured: Array | None = None
 
     def measuring(
-        self, bias: Array, shown: Array | None, distance_um: Array | None = None
+        self, bias: Array, measured: Array | None, distance_um: Array | None = None
     ) -> ExperimentAtRest:
         """Return the model at other biases (V), with what was measured there, if that is known.
 
         Distances count over a sample, see `hotlever.estimation.over_a_sample`.
         """
-        return replace(self, bias=bias, shown=shown)
+        return replace(self, bias=bias, measured=measured)
 
     def coarse(self) -> Self:
         """Return the model with a lever that is solved for any parameters, not corrected."""
@@ -289,10 +289,10 @@ class ExperimentAtRest:
         if self.correction:
             branch = self.correction.added(branch, probe.values(self.names))
             by_parameter = by_parameter + self.correction.slopes(branch.u)
-        rows = Rows(self.bias, self.shown)
-        shown = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
+        rows = Rows(self.bias, self.measured)
+        prediction = rows.differentiated(branch, by_parameter, probe.circuit, self.names)
         surrogate = CurveSurrogate(probe, self.names, branch, by_parameter, rows)
-        values, slopes = surrogate.contact.differentiated(*shown, probe.values(self.names))
+        values, slopes = surrogate.contact.differentiated(*prediction, probe.values(self.names))
         lever = probe.circuit.lever_voltage(self.bias, values[0])
         columns = {"bias_V": self.bias, "lever_V": lever, **named(values)}
         return PredictionAtRest(probe, values, slopes, surrogate, columns, slopes[TIP], linearised)

@@ -32,7 +32,7 @@ class MeasuredRows:
     bias_V: Array
     current_mA: Array
     series_kohm: float
-    kept: Array
+    included: Array
 
 
 @dataclass(frozen=True)
@@ -158,10 +158,10 @@ def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
     level = current >= current.max() * (1.0 - _LEVEL)
     if level.sum() >= _LEVEL_ROWS and (~level).sum() >= _BELOW:
         text = f"is the current clipped at {current.max():.3g} mA, by the range of its meter?"
-        clipped.append(Hypothesis(lambda _: text, lambda rows, _: replace(rows, kept=~level)))
+        clipped.append(Hypothesis(lambda _: text, lambda rows, _: replace(rows, included=~level)))
 
     def part(first: bool, rows: MeasuredRows, cut: float) -> MeasuredRows:
-        return replace(rows, kept=(number < cut) == first)
+        return replace(rows, included=(number < cut) == first)
 
     def asks(cut: float) -> str:
         return (

@@ -98,7 +98,7 @@ class Estimate(Optimum):
             if name in before
         }
         for error in self.residuals.common:
-            size, left = self.posterior.moved[error.name]
+            size, left = self.posterior.shifts[error.name]
             after = 1.0 + error.share * size, error.share * left
             used[error.name] = PriorUse(1.0, error.share, *after)
         return used
@@ -135,7 +135,7 @@ class Estimate(Optimum):
 
 def estimate(
     whole: Measurement,
-    given: Probe,
+    nominal: Probe,
     options: FitOptions,
     *,
     before: PriorDensity = FLAT,
@@ -155,8 +155,8 @@ def estimate(
     measurement = averaged(whole, options.robust)
     in_time = measurement.time_us is not None
     if in_time:
-        given.circuit.need_cold_start("a fit in time")
-    probe, notes = with_measured_circuit(given, measurement, options.medium)
+        nominal.circuit.need_cold_start("a fit in time")
+    probe, notes = with_measured_circuit(nominal, measurement, options.medium)
     notes += note_on_averages(whole, measurement) + check_sample(measurement, probe)
     options = options.of(probe, in_time=in_time)
     priors = priors_of(options.priors, probe, "priors", in_time=in_time)
@@ -226,7 +226,7 @@ def _observables(
     where = measurement.path or "measurement"
     # without a contact there is no such measurement
     can_be = {*probe.observables, *OF_A_CONTACT}
-    shown = tuple(name for name in measurement.observables if name in can_be)
+    fittable = tuple(name for name in measurement.observables if name in can_be)
     for name in options.observables or measurement.observables:
         symbol = FITTED[name].symbol
         if name not in measurement.observables:
@@ -234,14 +234,14 @@ def _observables(
                 f"{where}: no values of {name} (column {symbol}); it has "
                 f"{', '.join(measurement.observables)}"
             )
-        if name in shown:
+        if name in fittable:
             continue
-        if options.observables is None and shown:
+        if options.observables is None and fittable:
             notes.append(f"{symbol}: {_MISSING[name]}, so that these values are not fitted")
         else:
-            expected = f"fit {', '.join(shown)}" if shown else "there is nothing else to fit"
+            expected = f"fit {', '.join(fittable)}" if fittable else "there is nothing else to fit"
             raise InputError(f"{where}: {symbol}: {_MISSING[name]}; {expected}")
-    return shown if options.observables is None else tuple(options.observables)
+    return fittable if options.observables is None else tuple(options.observables)
 
 
 # --- the search ---------------------------------------------------------------------------------
@@ -346,8 +346,8 @@ class Search:
                 if portion == 1:
                     raise
                 break
-        moved = _has_moved(experiment.fast.drawn, start)
-        return (experiment.drawn_anew(start) if moved else experiment), start
+        mesh_is_outdated = _has_moved(experiment.fast.drawn, start)
+        return (experiment.drawn_anew(start) if mesh_is_outdated else experiment), start
 
 
 def _is_far(residuals: Residuals, at: Prediction) -> bool:

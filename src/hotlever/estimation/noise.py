@@ -44,14 +44,14 @@ _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
 _OF_NOISE, _OF_DISCREPANCY, _TELLING = 4.0, 2.0, 7
 
 
-def relative_noise(difference: Array, shown: Array, leverage: Array, least: float) -> Array:
+def relative_noise(difference: Array, predicted: Array, leverage: Array, least: float) -> Array:
     """Return the noise of data relative to its root mean square, (n,); one where there is none.
 
     Parameters
     ----------
     difference : ndarray, shape (n,)
         Data minus prediction; NaN where nothing was measured.
-    shown : ndarray, shape (n,)
+    predicted : ndarray, shape (n,)
         The prediction.
     leverage : ndarray, shape (n,)
         The share of each datum's noise that the fit has taken up.
@@ -66,7 +66,7 @@ def relative_noise(difference: Array, shown: Array, leverage: Array, least: floa
     """
     here = np.isfinite(difference)
     squares = difference[here] ** 2 / np.maximum(1.0 - leverage[here], _LEAST_FREE)
-    size = shown[here] ** 2
+    size = predicted[here] ** 2
     shape = 1.0 - _SHARES[:, None] + _SHARES[:, None] * size / np.mean(size)
     by_shape = np.append(squares / shape, np.full((_SHARES.size, 1), least**2), axis=1)
     scale = np.median(by_shape, axis=1, keepdims=True) + np.mean(by_shape, axis=1, keepdims=True)
@@ -179,17 +179,17 @@ class DataErrors:
     def take_scatter(
         self,
         difference: Array,
-        shown: Array,
+        predicted: Array,
         leverage: Array | float = 0.0,
         discrepancy: float = 0.0,
     ) -> None:
-        """Give observables without measurement errors their scatter about what is shown.
+        """Give observables without measurement errors their scatter about a prediction.
 
         Outliers count as little as they weigh. The `leverage`, (observables, n), is the share of
         each datum's noise that a fit has taken up. The `discrepancy` is by how much a model is off
         that describes the data, a share of the largest value: it is an error of every datum beside
         its scatter, or beside what was measured of it. With it the noise may go with the size of
-        what is shown (see `relative_noise`), and is not what is smooth; without it is the same
+        what is predicted (see `relative_noise`), and is not what is smooth; without it is the same
         everywhere.
         """
         weight = np.where(self.present, self.down**2, 0.0)
@@ -199,7 +199,7 @@ class DataErrors:
         if discrepancy:
             for row in np.flatnonzero(self.without):
                 self._relative[row] = relative_noise(
-                    difference[row], shown[row], leverage[row], float(least[row, 0])
+                    difference[row], predicted[row], leverage[row], float(least[row, 0])
                 )
         squares = np.nansum(weight * (difference / self._relative) ** 2, axis=1, keepdims=True)
         free = np.maximum(np.sum(weight - leverage, axis=1, keepdims=True), 1.0)
@@ -305,16 +305,16 @@ def errors_of_scales(
     for name, observable in SCALES.items():
         if observable not in observables:
             continue
-        shown = np.abs(measurement.observable(observable))
+        magnitudes = np.abs(measurement.observable(observable))
         share = METERS
         if observable == "tip":
-            shown = np.abs(shown - base_temperature_K)
-            stated = measurement.tip_error_K / np.maximum(shown, _WARM_K)
+            magnitudes = np.abs(magnitudes - base_temperature_K)
+            stated = measurement.tip_error_K / np.maximum(magnitudes, _WARM_K)
             is_stated = np.isfinite(stated).any()
             share = float(np.nanmedian(stated)) if is_stated else RAMAN_ERROR_SHARE
         if name in priors:
             share = priors[name].spread
-        errors.append(CommonError(name, observable, share, share * shown))
+        errors.append(CommonError(name, observable, share, share * magnitudes))
     return errors
 
 
@@ -341,8 +341,8 @@ class CommonCovariance:
             return np.asarray(rows)
         size = np.linalg.norm(self._pattern, axis=0)
         along = self._pattern / np.maximum(size, 1e-300)
-        kept = 1.0 / np.sqrt(1.0 + size**2) - 1.0
-        return np.asarray(rows + along @ (kept * (along.T @ rows).T).T)
+        eigenvalue_changes = 1.0 / np.sqrt(1.0 + size**2) - 1.0
+        return np.asarray(rows + along @ (eigenvalue_changes * (along.T @ rows).T).T)
 
     def of_errors(self, rows: Array) -> tuple[Array, dict[str, Array]]:
         """Return how estimates follow errors of one standard deviation, independent of each other.
@@ -371,10 +371,10 @@ class CommonCovariance:
         By decorrelated slopes (N, p), and the covariance of the parameters that a fit leaves.
         """
         own = self.decorrelated(rows)
-        taken = np.einsum("ij,jk,ik->i", self._pattern, self._left, self._pattern)
-        return np.asarray(taken + np.einsum("ij,jk,ik->i", own, covariance, own))
+        common_leverage = np.einsum("ij,jk,ik->i", self._pattern, self._left, self._pattern)
+        return np.asarray(common_leverage + np.einsum("ij,jk,ik->i", own, covariance, own))
 
-    def told(self, differences: Array, slopes: Array, covariance: Array) -> dict[str, Moved]:
+    def estimates(self, differences: Array, slopes: Array, covariance: Array) -> dict[str, Moved]:
         """Return the errors as the data tell them, by name.
 
         By weighted differences (N,) as if data had no errors in common, and their slopes (N, p) by
@@ -382,5 +382,5 @@ class CommonCovariance:
         """
         by = self.sizes(slopes)
         left = np.sqrt(np.diag(self._left + by @ covariance @ by.T))
-        moved = map(Moved, self.sizes(differences).tolist(), left.tolist())
-        return dict(zip((error.name for error in self._errors), moved, strict=True))
+        shifts = map(Moved, self.sizes(differences).tolist(), left.tolist())
+        return dict(zip((error.name for error in self._errors), shifts, strict=True))

@@ -141,18 +141,18 @@ class Objective:
             If no such lever can be drawn.
         """
         values = self.coordinates.values(point).tolist()
-        moved = probe.replace(dict(zip(self.varied, values, strict=True)))
+        candidate = probe.replace(dict(zip(self.varied, values, strict=True)))
         try:
-            moved.shape.check()
+            candidate.shape.check()
         except ValueError as error:
             raise InputError(f"probe: {error}") from None
-        return moved
+        return candidate
 
     def among(self, parameters: Array, point: Array) -> Array:
         """Return the parameters `names` of a lever, (k,), with the values of a point."""
-        moved = parameters.copy()
-        moved[self.columns] = self.coordinates.values(point)
-        return moved
+        candidate = parameters.copy()
+        candidate[self.columns] = self.coordinates.values(point)
+        return candidate
 
     # --- residuals --------------------------------------------------------------------------------
 
@@ -330,9 +330,9 @@ class Subproblem:
             )
         return values, slopes
 
-    def shown(self, point: Array) -> Array:
+    def values_at(self, point: Array) -> Array:
         """Return the values of `predict` alone: a sampler asks for thousands."""
-        values = self._surrogate.shown(self.objective.among(self._parameters, point))
+        values = self._surrogate.values_at(self.objective.among(self._parameters, point))
         for along, missed in self._bends:
             values = values + missed * float(along @ (point - self.origin)) ** 2
         return values

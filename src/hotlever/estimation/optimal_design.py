@@ -72,9 +72,9 @@ class Candidate:
 
     def variance_after(self, covariance: Array, gradient: Array) -> float:
         """Return the variance of a quantity after the measurement (Woodbury's identity)."""
-        moved, seen = self.rows @ covariance @ gradient, self.rows @ covariance @ self.rows.T
-        told = moved @ np.linalg.solve(np.eye(len(seen)) + seen, moved)
-        return float(gradient @ covariance @ gradient - told)
+        covariances, seen = self.rows @ covariance @ gradient, self.rows @ covariance @ self.rows.T
+        reduction = covariances @ np.linalg.solve(np.eye(len(seen)) + seen, covariances)
+        return float(gradient @ covariance @ gradient - reduction)
 
 
 def best_first(
@@ -132,7 +132,7 @@ class NoiseLaw:
     share: float
 
     @classmethod
-    def of(cls, errors: Array, shown: Array) -> NoiseLaw:
+    def of(cls, errors: Array, values: Array) -> NoiseLaw:
         """Return the law of standard errors (n,) of data that show values (n,).
 
         Examples
@@ -141,12 +141,12 @@ class NoiseLaw:
         >>> round(law.constant, 6), round(law.share, 6)
         (0.5, 0.01)
         """
-        columns = np.stack([np.ones(shown.size), shown**2], axis=1) / errors[:, None] ** 2
+        columns = np.stack([np.ones(values.size), values**2], axis=1) / errors[:, None] ** 2
         unit = np.max(columns, axis=0)
-        variances, _ = nnls(columns / np.where(unit > 0, unit, 1.0), np.ones(shown.size))
+        variances, _ = nnls(columns / np.where(unit > 0, unit, 1.0), np.ones(values.size))
         constant, share = np.sqrt(variances / np.where(unit > 0, unit, 1.0)).tolist()
         return cls(constant, share)
 
-    def at(self, shown: Array) -> Array:
+    def at(self, values: Array) -> Array:
         """Return the standard errors of data that show values (n,)."""
-        return np.hypot(self.constant, self.share * shown)
+        return np.hypot(self.constant, self.share * values)

@@ -126,8 +126,8 @@ class FitOptions:
     @property
     def media(self) -> tuple[Medium | None, ...]:
         """What is to be tried: None is what measurement and probe say."""
-        asked = self.medium
-        return get_args(Medium) if asked == UNKNOWN_MEDIUM else (cast("Medium | None", asked),)
+        medium = self.medium
+        return get_args(Medium) if medium == UNKNOWN_MEDIUM else (cast("Medium | None", medium),)
 
     def values(self) -> dict[str, Any]:
         """Return the options as plain values."""

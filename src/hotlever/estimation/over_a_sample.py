@@ -101,12 +101,12 @@ class SurrogateOverSample(CurveSurrogate):
         own = touching
         super().__init__(own.probe, own.names, own.branch, own.by_parameter, own.rows)
         self._away, self._weights = away, weights
-        self._kept = [[self.names.index(name) for name in each.names] for each in away]
+        self._columns = [[self.names.index(name) for name in each.names] for each in away]
 
     def predict(self, parameters: Array) -> tuple[Array, Array]:
         """See `hotlever.estimation.surrogate.Surrogate`."""
-        pairs = zip(self._away, self._kept, strict=True)
-        others = [each.predict(parameters[kept]) for each, kept in pairs]
+        pairs = zip(self._away, self._columns, strict=True)
+        others = [each.predict(parameters[columns]) for each, columns in pairs]
         return self.mixed(super().predict(parameters), others)
 
     def mixed(
@@ -114,18 +114,18 @@ class SurrogateOverSample(CurveSurrogate):
     ) -> tuple[Array, Array]:
         """Return values and slopes at the rows, of those that each lever has at all of them."""
         values, slopes = [touching[0]], [touching[1]]
-        for (each, by_kept), kept in zip(away, self._kept, strict=True):
+        for (each, by_own), columns in zip(away, self._columns, strict=True):
             by_all = np.zeros_like(touching[1])
-            by_all[..., kept] = by_kept
+            by_all[..., columns] = by_own
             values.append(each)
             slopes.append(by_all)
         return _mixed(self._weights, values), _mixed(self._weights, slopes)
 
-    def shown(self, parameters: Array) -> Array:
+    def values_at(self, parameters: Array) -> Array:
         """See `hotlever.estimation.surrogate.Surrogate`."""
-        pairs = zip(self._away, self._kept, strict=True)
-        others = [each.shown(parameters[kept]) for each, kept in pairs]
-        return _mixed(self._weights, [super().shown(parameters), *others])
+        pairs = zip(self._away, self._columns, strict=True)
+        others = [each.values_at(parameters[columns]) for each, columns in pairs]
+        return _mixed(self._weights, [super().values_at(parameters), *others])
 
 
 @dataclass(frozen=True)
@@ -150,24 +150,24 @@ class ExperimentOverSample(ExperimentAtRest):
         """Return that of a lever in contact, at rows with distances of its apex (µm)."""
         positions = Away.of(probe, distance_um)
         own = {field.name: getattr(touching, field.name) for field in fields(touching)}
-        kept = tuple(name for name in touching.names if name not in positions.changes[0])
+        names = tuple(name for name in touching.names if name not in positions.changes[0])
         away = tuple(
-            replace(touching.drawn_anew(each), names=kept) for each in positions.probes(probe)
+            replace(touching.drawn_anew(each), names=names) for each in positions.probes(probe)
         )
         weights = positions.weights(distance_um)
         return cls(**own, positions=positions, away=away, weights=weights)
 
     def measuring(
-        self, bias: Array, shown: Array | None, distance_um: Array | None = None
+        self, bias: Array, measured: Array | None, distance_um: Array | None = None
     ) -> ExperimentAtRest:
         """Return the model at other rows; of the lever in contact where no distance is said."""
         if distance_um is None:
             names = [field.name for field in fields(ExperimentAtRest)]
             own = ExperimentAtRest(**{name: getattr(self, name) for name in names})
-            return own.measuring(bias, shown)
-        away = tuple(each.measuring(bias, shown) for each in self.away)
+            return own.measuring(bias, measured)
+        away = tuple(each.measuring(bias, measured) for each in self.away)
         weights = self.positions.weights(distance_um)
-        return replace(self, bias=bias, shown=shown, away=away, weights=weights)
+        return replace(self, bias=bias, measured=measured, away=away, weights=weights)
 
     def coarse(self) -> Self:
         """See `ExperimentAtRest.coarse`."""

@@ -92,8 +92,8 @@ class Posterior:
         """
         objective, prior = self.objective, self.objective.prior
         if not objective.informed:
-            moved = objective.residuals.of_errors(self._by_residuals.T)
-            return {name: rows.T for name, rows in moved.items()}
+            by_data = objective.residuals.of_errors(self._by_residuals.T)
+            return {name: rows.T for name, rows in by_data.items()}
         influence = self._rates[:, None] * objective.laplace(self.at.slopes, self._point)
         jacobian = objective.of_data(self.at.slopes, self._point)
         by_data = objective.residuals.of_errors(jacobian)
@@ -116,7 +116,7 @@ class Posterior:
         return shares
 
     @cached_property
-    def moved(self) -> dict[str, Moved]:
+    def shifts(self) -> dict[str, Moved]:
         """How far the data moved parameters and scales from their own priors, by name.
 
         They are those of the optimum of the linearised problem. What data hardly tell is moved by
@@ -265,9 +265,9 @@ class CurvedQuantity:
         for way in (-1.0, 1.0):
             point = near.origin
             for size in _SOLVED_AT:
-                moved = way * size * axis
+                target = way * size * axis
                 point = optimize.least_squares(
-                    lambda point, to=moved: self._inverse @ (near.residual(point) - at_rest) - to,
+                    lambda point, to=target: self._inverse @ (near.residual(point) - at_rest) - to,
                     point,
                     lambda point: self._inverse @ near.jacobian(point),
                     (low, high),
@@ -280,4 +280,4 @@ class CurvedQuantity:
 
     def _value(self, point: Array) -> float:
         parameters = self._near.objective.among(self._parameters, point)
-        return float(self._surrogate.shown(parameters)[self._observable, 0])
+        return float(self._surrogate.values_at(parameters)[self._observable, 0])

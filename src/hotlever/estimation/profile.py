@@ -106,7 +106,7 @@ def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile
         for pulled, (number, tip) in zip(penalised, moving.items(), strict=True):
             there, _ = near.of(pulled).minimum()
             value, stderr = posterior.of(tip)
-            away = abs(tip.value(near.shown(there), there) - value)
+            away = abs(tip.value(near.values_at(there), there) - value)
             rise = max(near.squares(there) - least, _LEAST_RISE)
             sides[side, number] = max(away / (stderr * np.sqrt(rise)), _NARROWEST)
     return ErrorProfile(at.values[TIP, rows], *sides)
@@ -127,8 +127,8 @@ def _solved_near(
     near = Subproblem(objective, at)
     for count in range(_MOST_SOLVED + 1):
         there, _ = near.of(penalised).minimum()
-        moved = np.linalg.norm((there - near.origin) / errors)
-        if count and moved < _NEAR * np.linalg.norm((near.origin - optimum) / errors):
+        step_length = np.linalg.norm((there - near.origin) / errors)
+        if count and step_length < _NEAR * np.linalg.norm((near.origin - optimum) / errors):
             return near
         if count < _MOST_SOLVED:
             try:

@@ -133,7 +133,7 @@ class Residuals:
         return own
 
     @property
-    def shown(self) -> Array:
+    def measured(self) -> Array:
         """All that was measured at these rows, fitted or not, (observables, n)."""
         every = [self._measurement.observable(name)[self._used] for name in FITTED]
         return np.stack(every)
@@ -141,7 +141,7 @@ class Residuals:
     @property
     def at_rest(self) -> tuple[Array, Array, Array | None]:
         """The biases of these rows, what was measured there, and how far from a sample."""
-        return self.bias, self.shown, self.distance_um
+        return self.bias, self.measured, self.distance_um
 
     @property
     def size(self) -> int:
@@ -216,7 +216,7 @@ class Residuals:
         covariance.
         """
         each = self._each(values), self._each_by(slopes)
-        return self._common_covariance.told(*each, covariance)
+        return self._common_covariance.estimates(*each, covariance)
 
     def of_errors(self, rows: Array) -> dict[str, Array]:
         """Return how estimates follow independent errors, by observable and by scale, (m, p) each.
@@ -263,7 +263,7 @@ class Residuals:
 
     def rms(self, values: Array) -> dict[str, float]:
         """Return the rms of data minus prediction by column, for every observable with data."""
-        difference = self.shown[: len(values)] - values
+        difference = self.measured[: len(values)] - values
         difference[self.rows] = self.difference(values)
         return {
             column.name: float(np.sqrt(np.nanmean(row**2)))
@@ -287,8 +287,8 @@ class Drift:
             if name in ZEROED:
                 self._columns[row, :, 2 * row] = 1.0
                 self._columns[row, :, 2 * row + 1] = order
-        kept = np.any(self._columns, axis=(0, 1))
-        self._columns = self._columns[:, :, kept]
+        nonzero = np.any(self._columns, axis=(0, 1))
+        self._columns = self._columns[:, :, nonzero]
 
     def line(self, difference: Array, weights: Array) -> Array:
         """Return the lines that fit a difference (data minus prediction) best, shape (k, n)."""
@@ -328,8 +328,8 @@ class Drift:
         return [
             f"{name}: the zero goes from {first:+.3g} to {last:+.3g} {FITTED[name].unit} "
             "along the file"
-            for name, first, last, asked in zip(
+            for name, first, last, is_described in zip(
                 self._names, *line[:, [0, -1]].T, which, strict=True
             )
-            if asked
+            if is_described
         ]

@@ -156,8 +156,8 @@ class Fit(Outcome):
 
     def __repr__(self) -> str:
         values = (f"{name} {fitted}" for name, fitted in self.parameters.items())
-        said = self.doubt or ", ".join(values)
-        return f"<Fit of {self.measurement.path or 'a measurement'}: {said}>"
+        summary = self.doubt or ", ".join(values)
+        return f"<Fit of {self.measurement.path or 'a measurement'}: {summary}>"
 
     @property
     def in_time(self) -> bool:

@@ -89,7 +89,7 @@ class SampledLever:
         By the lever that is solved there; of a reduced one by what the full one's residual says.
         """
         solved = self._experiment.predict(probe, self.at)
-        surrogate = self.at.surrogate.shown(probe.values(self._experiment.names))
+        surrogate = self.at.surrogate.values_at(probe.values(self._experiment.names))
         error = float(np.abs(surrogate - solved.values)[TIP].max())
         return error + self._experiment.fast.tip_error_K(probe, solved.linearised.branch)
 
@@ -146,14 +146,14 @@ def sample_tip(
     """
     objective, at = posterior.objective, posterior.at
     near = Subproblem(objective, at, predictor.others(at), least=_TELLING)
-    density = PosteriorDensity(objective, at, near.shown)
+    density = PosteriorDensity(objective, at, near.values_at)
     chains = sample(
         density.log_probability, density.approximation, samples=samples, progress=progress
     )
     points, rows = chains.points.reshape(-1, near.origin.size), hotter_rows(at)
     # a walker stands still where a proposal is refused
     different, index = np.unique(points, axis=0, return_inverse=True)
-    tips = np.array([near.shown(point)[TIP, rows] for point in different])[index]
+    tips = np.array([near.values_at(point)[TIP, rows] for point in different])[index]
     middle, stderr = np.transpose([posterior.of(Quantity("tip", int(row))) for row in rows])
     low, high = np.percentile(tips, (2.5, 97.5), axis=0)
     hottest = tips[:, -1].reshape(chains.points.shape[:3])
@@ -172,7 +172,7 @@ def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity,
     residuals = objective.residuals
     lever = SampledLever.of_fit(fit, probe, residuals.bias, residuals.distance_um)
     near = Subproblem(objective, lever.at)
-    return PosteriorDensity(objective, lever.at, near.shown, noise), lever
+    return PosteriorDensity(objective, lever.at, near.values_at, noise), lever
 
 
 def sample_posterior(
@@ -350,9 +350,9 @@ def predictive_band(
     chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]
     tips, powers = [], []
     for row in each(list(chosen), progress):
-        shown = named(surrogate.shown(row))
-        tips.append(shown["tip_K"])
-        powers.append(surrogate.circuit(row).power(grid, shown["current_mA"]))
+        columns = named(surrogate.values_at(row))
+        tips.append(columns["tip_K"])
+        powers.append(surrogate.circuit(row).power(grid, columns["current_mA"]))
     power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)
     if np.diff(powers, axis=1).min() < 0:
         # with held supplies there may be several temperatures at one power

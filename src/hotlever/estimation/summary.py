@@ -31,7 +31,7 @@ from hotlever.text import NOT_DETERMINED, aligned, value_with_error
 
 #: A prior is named as leaned on where its data narrow it to no less than this share, and as moved
 #: where they move it by so many of its standard deviations.
-_LEANED_ON, _MOVED = 0.9, 1.0
+_LEANED_ON, _LARGE_SHIFT = 0.9, 1.0
 #: What the numbers of a fit are that does not describe its data.
 NEAREST = (
     "what follows is of the lever that comes nearest, and no estimate: errors are not stated, "
@@ -93,13 +93,13 @@ def _tip_in_time(band: xr.Dataset) -> str:
 def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:
     """Say which priors an answer leans on, and which the data moved far."""
     leaned = [name for name, use in priors.items() if use.left > _LEANED_ON]
-    moved = [
+    shifts = [
         f"{name} by {use.moved:+.1f} σ to {use.posterior_value:.4g}"
         for name, use in priors.items()
-        if abs(use.moved) > _MOVED
+        if abs(use.moved) > _LARGE_SHIFT
     ]
     lines = {
-        "moved by the data beyond what was known before": moved,
+        "moved by the data beyond what was known before": shifts,
         "as known before, since the data do not tell": leaned,
     }
     return [f"{text}: {', '.join(names)}" for text, names in lines.items() if names]
@@ -337,11 +337,11 @@ def _with_error(value: float, stderr: float, scale: float, lower: float, upper: 
     return value_with_error(float(value), float(stderr), float(scale), (lower, upper))
 
 
-def table_text(rows: list[list[str]], said: list[str]) -> str:
+def table_text(rows: list[list[str]], remarks: list[str]) -> str:
     """Return a table as `lever_rows` has it as text, mean and scatter below a line; then words."""
     lines = aligned(rows)
     lines.insert(-_OF_ALL, "-" * max(map(len, lines)))
-    return "\n".join(lines + said)
+    return "\n".join(lines + remarks)
 
 
 def levers_csv(levers: xr.Dataset) -> str:

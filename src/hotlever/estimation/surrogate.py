@@ -46,13 +46,13 @@ class Rows:
     Attributes
     ----------
     bias_V : ndarray, shape (n,)
-    shown : ndarray, shape (observables, n), optional
+    measured : ndarray, shape (observables, n), optional
         What was measured, `hotlever.measurands.OBSERVABLES`; NaN where nothing was. Without it the
         states are those of a slow ramp.
     """
 
     bias_V: Array
-    shown: Array | None = None
+    measured: Array | None = None
 
     def states(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return u of the states that the rows are compared with, and how far these fall short.
@@ -64,7 +64,7 @@ class Rows:
         BranchEndError
             If a slow ramp finds no state at one of the biases.
         """
-        if self.shown is not None:
+        if self.measured is not None:
             return self._nearest(branch, circuit)
         reading = branch.read(circuit, self.bias_V)
         if np.isnan(reading.u).any():
@@ -91,11 +91,11 @@ class Rows:
             The parameters.
         """
         u, short = self.states(branch, circuit)
-        shown = _reaching(branch, u, short)
+        outputs = _reaching(branch, u, short)
         by_state = spline_through(branch.u, by_parameter)(u)
-        of_circuit = np.stack([circuit.bias_by(name, shown[1] / short) for name in names], axis=1)
+        of_circuit = np.stack([circuit.bias_by(name, outputs[1] / short) for name in names], axis=1)
         along = branch.curve(u, 1)
-        if self.shown is not None:
+        if self.measured is not None:
             self._steepen(along, circuit, u)
         slopes = at_fixed_bias(along, circuit, by_state, of_circuit)
         ends = np.flatnonzero(short > 1.0)
@@ -105,8 +105,8 @@ class Rows:
             more = (short[ends] / self.bias_V[ends])[:, None] * bias_by
             slopes[:, ends] = np.moveaxis(by_state[ends], 1, 0)
             slopes[:TIP_RISE, ends] *= short[ends, None]
-            slopes[:TIP_RISE, ends] -= shown[:TIP_RISE, ends, None] * more
-        return observed(circuit, shown), observed_by(circuit, shown, slopes, names)
+            slopes[:TIP_RISE, ends] -= outputs[:TIP_RISE, ends, None] * more
+        return observed(circuit, outputs), observed_by(circuit, outputs, slopes, names)
 
     def _nearest(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return the states nearest to what was measured; see `states`."""
@@ -142,10 +142,10 @@ class Rows:
 
     def _distance(self, values: Array, rows: Index) -> Array:
         """Return how far values (observables, m) are from some rows, as squares of shares."""
-        assert self.shown is not None
-        shown = self.shown[: len(values)]
-        largest = np.nanmax(np.abs(shown), axis=1, keepdims=True, initial=1e-300)
-        return np.asarray(np.nansum(((values - shown[:, rows]) / largest) ** 2, axis=0))
+        assert self.measured is not None
+        measured = self.measured[: len(values)]
+        largest = np.nanmax(np.abs(measured), axis=1, keepdims=True, initial=1e-300)
+        return np.asarray(np.nansum(((values - measured[:, rows]) / largest) ** 2, axis=0))
 
     def _steepen(self, along: Array, circuit: Circuit, u: Array) -> None:
         """Let the bias rise where it hardly does, in derivatives by u (n, 5) of what is shown."""
@@ -157,9 +157,9 @@ class Rows:
 
 def _reaching(branch: Branch, u: Array, short: Array) -> Array:
     """Return V_l, I_h, V_r and the rise of the tip at some u, (4, n), as far as the bias goes."""
-    shown = branch.curve(u).T.copy()
-    shown[:TIP_RISE] *= short
-    return shown
+    outputs = branch.curve(u).T.copy()
+    outputs[:TIP_RISE] *= short
+    return outputs
 
 
 class ContactTemperatures:
@@ -180,17 +180,21 @@ class ContactTemperatures:
         self._origin = probe.values(self._names)
         self._of_base = np.array([float(name == BASE) for name in self._names])
 
-    def shown(self, shown: Array, parameters: Array) -> Array:
+    def added(self, observables: Array, parameters: Array) -> Array:
         """Return the observables of levers, and behind them what contacts show, (all, n)."""
-        return self.differentiated(shown, np.zeros((*shown.shape, parameters.size)), parameters)[0]
+        return self.differentiated(
+            observables, np.zeros((*observables.shape, parameters.size)), parameters
+        )[0]
 
-    def differentiated(self, shown: Array, slopes: Array, parameters: Array) -> tuple[Array, Array]:
+    def differentiated(
+        self, observables: Array, slopes: Array, parameters: Array
+    ) -> tuple[Array, Array]:
         """Return the same and its derivatives, (all, n, p), by those of what levers show."""
         if self._law is None:
-            return shown, slopes
+            return observables, slopes
         ratio = parameters[self._own] / self._origin
         base_K = self._law.base_temperature_K + float(self._of_base @ (self._origin * (ratio - 1)))
-        rise = shown[_TIP] - base_K
+        rise = observables[_TIP] - base_K
         odds, by = self._law.log_odds(rise, self._names)
         powers = np.zeros((*odds.shape, len(self._names)))
         for number, name in enumerate(self._names):
@@ -201,7 +205,7 @@ class ContactTemperatures:
         added = by_tip[..., None] * slopes[_TIP]
         added[..., self._own] += bent[..., None] * powers / (ratio * self._origin)
         added[..., self._own] += (1.0 - by_tip)[..., None] * self._of_base
-        return np.concatenate([shown, base_K + rise * share]), np.concatenate([slopes, added])
+        return np.concatenate([observables, base_K + rise * share]), np.concatenate([slopes, added])
 
 
 @dataclass(frozen=True)
@@ -221,9 +225,9 @@ class LinearSurrogate:
 
     def predict(self, parameters: Array) -> tuple[Array, Array]:
         """See `CurveSurrogate.predict`."""
-        return self.shown(parameters), self.slopes.copy()
+        return self.values_at(parameters), self.slopes.copy()
 
-    def shown(self, parameters: Array) -> Array:
+    def values_at(self, parameters: Array) -> Array:
         """Return the values of `predict` alone."""
         return self.values + self.slopes @ (parameters - self.parameters)
 
@@ -297,13 +301,15 @@ class CurveSurrogate:
         if not self._straight:
             by_parameter = branch.values[:, :, None] * self._rates
         circuit = self.circuit(parameters)
-        shown = self.rows.differentiated(branch, by_parameter / self._unit, circuit, self.names)
-        return self.contact.differentiated(*shown, parameters)
+        prediction = self.rows.differentiated(
+            branch, by_parameter / self._unit, circuit, self.names
+        )
+        return self.contact.differentiated(*prediction, parameters)
 
-    def shown(self, parameters: Array) -> Array:
+    def values_at(self, parameters: Array) -> Array:
         """Return the values of `predict` alone."""
-        shown = self.rows.values(self.branch_at(parameters), self.circuit(parameters))
-        return self.contact.shown(shown, parameters)
+        values = self.rows.values(self.branch_at(parameters), self.circuit(parameters))
+        return self.contact.added(values, parameters)
 
     def circuit(self, parameters: Array) -> Circuit:
         """Return the circuit, with those of the parameters that are its own."""
@@ -332,7 +338,7 @@ class ReducedSurrogate(CurveSurrogate):
     ) -> None:
         super().__init__(local.probe, local.names, local.branch, local.by_parameter, local.rows)
         self._reduced, self._linearised = reduced, linearised
-        self._shown = self._on_few_points(local.probe)
+        self._local_outputs = self._on_few_points(local.probe)
 
     def _on_few_points(self, probe: Probe) -> Array:
         """Return V_l, I_h and V_r of the states of a probe, (k, 3)."""
@@ -351,7 +357,7 @@ class ReducedSurrogate(CurveSurrogate):
             If such a lever has no such states.
         """
         named = zip(self.names, parameters.tolist(), strict=True)
-        few = self._on_few_points(self.probe.replace(dict(named))) / self._shown
+        few = self._on_few_points(self.probe.replace(dict(named))) / self._local_outputs
         ratio = np.ones(self.branch.values.shape)
         ratio[1:, :TIP_RISE] = few
         # without power the ratio is that of a barely warm lever

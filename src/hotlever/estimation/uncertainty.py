@@ -155,7 +155,7 @@ class Uncertainty:
                 "seed": self.posterior.attrs["seed"],
                 "noise": self.posterior.attrs["noise"],
                 "acceptance_fraction": round(self.posterior.acceptance_fraction.item(), 4),
-                "quantities": {name: vars(said) for name, said in self.quantities.items()},
+                "quantities": {name: vars(quantity) for name, quantity in self.quantities.items()},
             }
         if self.band is not None:
             content["posterior"]["band"] = {
