@@ -148,7 +148,7 @@ def derivatives(probe: Probe, refinement: float) -> tuple[np.ndarray, np.ndarray
     similar = SimilarLevers(Lever(probe, MeshOptions(refinement=refinement)))
     solved = similar.linearised(probe, Reach(probe.circuit, 11.0), None, names)
     shown = solved.branch.values[1:, :3, None]
-    return solved.branch.u[1:] ** 2, solved.shown[1:, :3] * probe.values(names) / shown
+    return solved.branch.u[1:] ** 2, solved.output_slopes[1:, :3] * probe.values(names) / shown
 
 
 def hundred_layouts(probe: Probe) -> None:

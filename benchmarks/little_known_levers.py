@@ -257,7 +257,7 @@ def _measured(rng: Generator, true: Probe, branch: Branch) -> tuple[Measurement,
     tip = branch.tip_K(reading.u)
     if not (np.isfinite(tip).all() and tip[-1] >= _COLDEST_END_K):
         raise InputError("a ramp of the bias does not heat the tip so far")
-    current = branch.shown(reading.u)["current_mA"]
+    current = branch.electrical_outputs(reading.u)["current_mA"]
     if digitised:
         share = rng.uniform(*_READING)
         bias = bias + share * bias.max() * rng.standard_normal(rows)

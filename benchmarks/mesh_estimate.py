@@ -57,7 +57,7 @@ def most_bias(lever: Lever) -> float:
     """The largest bias below the fold, or where the lever has 1300 K."""
     branch = lever.branch()
     u = branch.u_at(np.linspace(lever.circuit.base_temperature_K + 1, branch.hottest_K, 200))
-    shown = branch.shown(u)
+    shown = branch.electrical_outputs(u)
     bias = lever.circuit.bias(shown["lever_V"], shown["current_mA"])
     falls = np.flatnonzero(np.diff(bias) < 0)
     return float(bias[falls[0] if falls.size else -1])

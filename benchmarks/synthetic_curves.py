@@ -67,7 +67,7 @@ def current_at(branch: Branch, bias_V: ArrayLike, circuit: Circuit) -> Array:
             f"with a series resistance of {circuit.series_resistance_ohm:g} ohm several states of "
             "the lever belong to one bias"
         )
-    return branch.shown(reading.u)["current_mA"].reshape(bias.shape)
+    return branch.electrical_outputs(reading.u)["current_mA"].reshape(bias.shape)
 
 
 def measurement_of(curve: IVCurve) -> Measurement:

@@ -47,7 +47,7 @@ def branch() -> Branch:
 @pytest.fixture(scope="module")
 def calibrated(branch: Branch) -> Calibration:
     bias = np.linspace(1.0, 15.5, 40)
-    current = branch.shown(branch.read(PROBE.circuit, bias).u)["current_mA"]
+    current = branch.electrical_outputs(branch.read(PROBE.circuit, bias).u)["current_mA"]
     current *= 1.0 + 0.002 * np.random.default_rng(0).standard_normal(bias.size)
     return calibrate(measurement_of(IVCurve.of(bias, current, PROBE.circuit)), probe=PROBE)
 

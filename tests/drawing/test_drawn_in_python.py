@@ -71,7 +71,11 @@ def test_the_reference_probe_shows_what_it_does_as_a_built_in_shape(lever):
     )
     expected = built_in.branch.values[1:, :3]
     np.testing.assert_allclose(mine.branch.values[1:, :3], expected, rtol=1e-11)
-    apart = (mine.shown - built_in.shown)[1:, :3] * REFERENCE.values(names) / expected[..., None]
+    apart = (
+        (mine.output_slopes - built_in.output_slopes)[1:, :3]
+        * REFERENCE.values(names)
+        / expected[..., None]
+    )
     assert np.abs(apart).max() < 2e-5
     # and on a mesh of its own
     u = np.linspace(2.0, 9.0, 8)
@@ -95,7 +99,7 @@ def test_derivatives_have_taylor_order_two(name, similar, start):
     """Of corners that move along curves, borders of any shape, and films that thicken."""
     assert isinstance(POINTED.layout().heater.taper, BorderTaper)
     (value,), rest = POINTED.values((name,)).tolist(), []
-    slopes = start.shown[1:, :2, VARIED.index(name)]
+    slopes = start.output_slopes[1:, :2, VARIED.index(name)]
     for step in (0.02, 0.01):
         way = step * (value or 1.0)
         perturbed_probe = POINTED.replace({name: value + way})

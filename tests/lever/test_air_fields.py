@@ -78,14 +78,14 @@ def test_vtu_and_figure(states, fields, in_air, tmp_path):
     assert np.array_equal(flux, fields.flux(state))
     shares = fields.shares(states)
     layout = in_air.space.mesh.layout
-    made = air_loss(layout, fields.panels, fields.flux(state), shares, "9 V")
-    (map_axes, share_axes), regions = made.axes[:2], len(layout.regions)
+    figure = air_loss(layout, fields.panels, fields.flux(state), shares, "9 V")
+    (map_axes, share_axes), regions = figure.axes[:2], len(layout.regions)
     assert map_axes.get_xlabel() == "x (µm)"
     drawn = share_axes.get_legend().get_texts()
     assert [text.get_text() for text in drawn] == [*shares.region.values, "whole lever"]
     # a line for each region, their sum, and zero
     assert len(share_axes.lines) == regions + 2
-    save_figure(made, tmp_path / "air.png")
+    save_figure(figure, tmp_path / "air.png")
     assert (tmp_path / "air.png").stat().st_size > 10_000
 
 

@@ -56,12 +56,12 @@ def test_a_state_in_contact_needs_no_branch_in_contact(touching):
     free, near = out_of_contact(touching), None
     for bias, radius in ((4.0, 0.1), (4.2, 0.09)):
         probe = touching.probe.with_(**{"tip.apex_radius_um": radius})
-        shown, near = state_in_contact(free, probe, bias, near)
+        row, near = state_in_contact(free, probe, bias, near)
         lever = Lever(probe, COARSE)
         data = sweep_in_contact(lever, [bias], sensitivities=False)
         # the cone of another radius is a little narrower where it meets the lever
         close = {"rel": 1e-3} if radius == 0.1 else {"rel": 2e-2}
-        for name, value in shown.items():
+        for name, value in row.items():
             assert value == pytest.approx(data[name].item(), **close), name
 
 
@@ -133,13 +133,13 @@ def test_where_silicon_melts_what_was_reached_is_given(touching):
 
 
 def test_what_the_current_tells_does_not_depend_on_its_sign(touching):
-    told = {}
+    texts = {}
     for sign in (1.0, -1.0):
         lever = touching.with_probe(touching.probe.with_(thermoelectric=True))
         data = sweep_in_contact(lever, sign * np.array([4.0, 8.0]))
-        told[sign] = what_the_current_tells(data)
-    assert "best at 8 V: to 0.00" in told[1.0]
-    assert "best at -8 V: to 0.00" in told[-1.0]
+        texts[sign] = what_the_current_tells(data)
+    assert "best at 8 V: to 0.00" in texts[1.0]
+    assert "best at -8 V: to 0.00" in texts[-1.0]
 
 
 def test_a_pulse_is_cooler_in_contact(touching):

@@ -31,16 +31,16 @@ def orders(lever, name):
     """Observed orders of what a first-order prediction leaves at fixed tip temperatures."""
     probe, names, similar = lever.probe, (name,), SimilarLevers(lever)
     start = similar.linearised(probe, REACH, None, names)
-    shown = slice(0, 3 if "reader" in lever.space.mesh.terminal_facets else 2)
+    columns = slice(0, 3 if "reader" in lever.space.mesh.terminal_facets else 2)
     (value,), rest = probe.values(names), []
     unit = value or 1.0
     for step in (0.02, 0.01):
-        moved = probe.replace({name: float(value + step * unit)})
-        other = similar.linearised(moved, REACH, start, names).branch
+        perturbed_probe = probe.replace({name: float(value + step * unit)})
+        other = similar.linearised(perturbed_probe, REACH, start, names).branch
         count = start.branch.u.size
-        change = (other.values[:count] - start.branch.values)[1:, shown]
-        rest.append(np.abs(change - step * unit * start.shown[1:, shown, 0]))
-    size = np.abs(start.branch.values[1:, shown])
+        change = (other.values[:count] - start.branch.values)[1:, columns]
+        rest.append(np.abs(change - step * unit * start.output_slopes[1:, columns, 0]))
+    size = np.abs(start.branch.values[1:, columns])
     # what does not bend leaves nothing to measure an order of
     bent = rest[0] > 1e-7 * size
     return np.log2(rest[0][bent] / rest[1][bent]), rest[0] / size
@@ -78,11 +78,13 @@ def test_so_has_that_by_the_gap_to_a_surface(coarse):
     assert np.all(found > 1.8)
     # linear in the inverse gap is nearly what another operator says
     names, other = ("surface_gap_um",), above.probe.with_(surface_gap_um=2.2)
-    moved = SimilarLevers(above).linearised(other, REACH, None, names).branch
+    displaced_branch = SimilarLevers(above).linearised(other, REACH, None, names).branch
     new, u = Lever(other, COARSE).branch_to(6.0), np.linspace(2.0, 9.0, 8)
     start = above.branch_to(6.0).curve(u)[:, :2]
     change = new.curve(u)[:, :2] - start
-    np.testing.assert_allclose(moved.curve(u)[:, :2] - start, change, rtol=0.03, atol=1e-6)
+    np.testing.assert_allclose(
+        displaced_branch.curve(u)[:, :2] - start, change, rtol=0.03, atol=1e-6
+    )
 
 
 def test_so_has_that_by_the_base_temperature_in_vacuum(coarse):
@@ -92,10 +94,10 @@ def test_so_has_that_by_the_base_temperature_in_vacuum(coarse):
 
 def test_a_moved_mesh_shows_what_a_new_one_does(coarse):
     probe = coarse.probe.with_(heater_length_um=4.3, gap_um=3.0, length_um=56.0, thickness_um=0.42)
-    moved = SimilarLevers(coarse).linearised(probe, REACH).branch
+    displaced_branch = SimilarLevers(coarse).linearised(probe, REACH).branch
     new = Lever(probe, COARSE).branch_to(6.0)
     u = np.linspace(2.0, 9.0, 8)
-    np.testing.assert_allclose(moved.curve(u)[:, :3], new.curve(u)[:, :3], rtol=1e-3)
+    np.testing.assert_allclose(displaced_branch.curve(u)[:, :3], new.curve(u)[:, :3], rtol=1e-3)
 
 
 def test_a_mesh_that_would_turn_over_is_refused(coarse):
@@ -123,8 +125,8 @@ def test_derivatives_at_a_fixed_bias(bridged, name):
     start = model.predict(probe)
     for step in (0.02, 0.01):
         (value,) = probe.values(names)
-        moved = model.predict(probe.replace({name: float(value * (1 + step))}), start)
-        change = moved.values - start.values
+        prediction = model.predict(probe.replace({name: float(value * (1 + step))}), start)
+        change = prediction.values - start.values
         rest.append(np.abs(change - step * value * start.slopes[..., 0]) / start.values)
     # between its states a branch's slopes are splines
     assert np.all(rest[0] < 3e-3)
@@ -139,8 +141,8 @@ def test_predictions_nearby_agree_with_a_new_branch(bridged):
     start = model.predict(bridged.probe)
     values = bridged.probe.values(names) * np.array([1.04, 0.96, 1.01, 1.02])
     nearby, slopes = start.surrogate.predict(values)
-    moved = bridged.probe.replace(dict(zip(names, values.tolist(), strict=True)))
-    exact = model.predict(moved)
+    perturbed_probe = bridged.probe.replace(dict(zip(names, values.tolist(), strict=True)))
+    exact = model.predict(perturbed_probe)
     np.testing.assert_allclose(nearby, exact.values, rtol=3e-3)
     assert slopes.shape == exact.slopes.shape == (4, 3, 4)
 

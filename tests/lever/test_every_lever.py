@@ -152,8 +152,8 @@ def test_monitors_show_the_fields_of_the_elements(one, branch):
         "line": {"line_um": [[x, y], other.tolist()], "points": 2},
         "hot": {"region": "heater"},
     }
-    shown = MonitorMap(one.probe.with_monitors(**monitors), equations)
-    columns = shown.columns(shown.values(states).T)
+    monitor_map = MonitorMap(one.probe.with_monitors(**monitors), equations)
+    columns = monitor_map.columns(monitor_map.values(states).T)
     np.testing.assert_allclose(columns["top_K"], branch.base_temperature_K + branch.u[-2:] ** 2)
     expanded = equations.space.expanded(states)
     base, ends = equations.base_temperature_K, equations.terminals.end_rises
@@ -168,8 +168,8 @@ def test_monitors_show_the_fields_of_the_elements(one, branch):
             mean = np.average(each[inside], weights=basis.dx[inside])
             assert columns[f"hot_{unit}"][number] == pytest.approx(mean, rel=1e-9)
     change = np.random.default_rng(2).normal(size=states.shape)
-    moved = shown.values(states + change) - shown.values(states)
-    np.testing.assert_allclose(shown.changes(change), moved, atol=1e-9)
+    difference = monitor_map.values(states + change) - monitor_map.values(states)
+    np.testing.assert_allclose(monitor_map.changes(change), difference, atol=1e-9)
 
 
 def test_the_jacobian_passes_a_taylor_test(branch):
@@ -181,12 +181,12 @@ def test_the_jacobian_passes_a_taylor_test(branch):
 @pytest.mark.parametrize("constraint", [TIP, LEVER], ids=["tip", "lever voltage"])
 def test_linear_systems_are_solved(branch, constraint):
     equations, x = branch.equations, hot(branch)[:, -2:]
-    wanted = np.random.default_rng(0).normal(size=(*x.shape, 3)) * equations.scale[..., None]
-    right = equations.balance_change(x, wanted)
-    right[-1] = constraint.of(equations.space, wanted)
+    expected = np.random.default_rng(0).normal(size=(*x.shape, 3)) * equations.scale[..., None]
+    right = equations.balance_change(x, expected)
+    right[-1] = constraint.of(equations.space, expected)
     found = equations.solve_linear(x, equations.factorised(x, constraint), right, constraint)
     np.testing.assert_allclose(
-        found / equations.scale[..., None], wanted / equations.scale[..., None], atol=1e-4
+        found / equations.scale[..., None], expected / equations.scale[..., None], atol=1e-4
     )
 
 
@@ -220,8 +220,8 @@ def taylor_order(one: One, start: Linearised, name: str) -> float:
     value, remainders = float(one.probe.values([name])[0]), []
     slope = by_parameter(start.branch.equations, hot(start.branch), [name])
     for step in (0.02, 0.01):
-        moved = one.probe.replace({name: value * (1 + step)})
-        other = one.solver.linearised(moved, reach, start).branch
+        perturbed_probe = one.probe.replace({name: value * (1 + step)})
+        other = one.solver.linearised(perturbed_probe, reach, start).branch
         np.testing.assert_allclose(other.u[1 : u.size + 1], u)
         change = (other.values[: u.size + 1] - start.branch.values)[1:, :3].T
         remainders.append(np.abs(change - step * value * slope[:, :3, 0].T))
@@ -243,11 +243,11 @@ def ohm(value: float) -> Circuit:
 def test_a_ramp_takes_states_of_its_biases_and_none_at_zero(one, branch):
     bias = RAMP[one.hottest_V >= RAMP]
     reading = branch.read(NORMAL, bias)
-    shown = branch.shown(reading.u)
+    outputs = branch.electrical_outputs(reading.u)
     assert reading.u[0] == 0.0
     assert reading.jumps == []
     np.testing.assert_allclose(
-        NORMAL.bias(shown["lever_V"], shown["current_mA"]), bias, rtol=1e-12, atol=1e-12
+        NORMAL.bias(outputs["lever_V"], outputs["current_mA"]), bias, rtol=1e-12, atol=1e-12
     )
     assert np.all(np.diff(reading.u) > 0)
 
@@ -262,8 +262,8 @@ def test_with_little_resistance_the_ramp_ends_at_the_fold_or_jumps_there(one, re
     reading = branch.read(circuit, np.array([0.0, 1.0, 2.0, 20.0]))
     assert np.isfinite(reading.u[:3]).all()
     assert np.isnan(reading.u[3])
-    shown = branch.shown(np.linspace(0.0, branch.end_u, 4001))
-    bias = circuit.bias(shown["lever_V"], shown["current_mA"])
+    outputs = branch.electrical_outputs(np.linspace(0.0, branch.end_u, 4001))
+    bias = circuit.bias(outputs["lever_V"], outputs["current_mA"])
     ended = branch_end(branch, reading)
     assert isinstance(ended, BranchEndError)
     assert ended.bias_reached == pytest.approx(bias.max(), abs=1e-5)

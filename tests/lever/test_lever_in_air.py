@@ -46,7 +46,7 @@ def test_sensitivities_have_taylor_order_two(in_air, name):
     value = getattr(start.probe.material, name)
     at = start.sweep(BIAS, sensitivities=True)
     steps = (0.02, 0.01)
-    moved = [
+    perturbed_sweeps = [
         start.with_material(start.probe.material.with_(**{name: value * (1 + step)})).sweep(BIAS)
         for step in steps
     ]
@@ -54,7 +54,7 @@ def test_sensitivities_have_taylor_order_two(in_air, name):
         slope = at.sensitivity.sel(observable=observable, parameter=name)
         rest = [
             np.abs(one[column.name] - at[column.name] - step * value * slope).max().item()
-            for step, one in zip(steps, moved, strict=True)
+            for step, one in zip(steps, perturbed_sweeps, strict=True)
         ]
         # a straight line leaves no remainder to measure an order of
         linear = rest[0] < 1e-6 * np.abs(at[column.name]).max().item()

@@ -47,8 +47,8 @@ def test_a_border_sharper_than_the_triangles_gets_smaller_ones(sharp):
         for lever in (Lever(sharp, space=FullSpace(everywhere)), usual, chosen)
     )
     of_usual, of_chosen = (
-        np.abs(shown.current_mA.values / truth.current_mA.values - 1).max()
-        for shown in (by_usual, by_chosen)
+        np.abs(data.current_mA.values / truth.current_mA.values - 1).max()
+        for data in (by_usual, by_chosen)
     )
     assert of_chosen < 2e-5 < 4e-4 < of_usual
     assert np.abs(by_chosen.tip_K.values - truth.tip_K.values).max() < 0.1
@@ -90,5 +90,5 @@ def test_the_energy_is_the_difference_of_resistances(sharp):
 
 
 def test_given_sizes_are_taken_as_they_are(sharp):
-    given, default = Lever(sharp, MeshOptions()), Lever(sharp)
-    assert given.space.mesh.elements.nelements < default.space.mesh.elements.nelements
+    explicit, default = Lever(sharp, MeshOptions()), Lever(sharp)
+    assert explicit.space.mesh.elements.nelements < default.space.mesh.elements.nelements

@@ -30,11 +30,11 @@ class Cubes:
 
     scale, step_limit = np.ones((1, 1)), np.full((1, 1), 0.5)
 
-    def __init__(self, *wanted: float) -> None:
-        self.wanted, self.factorised_for = np.array([wanted]), []
+    def __init__(self, *cubes: float) -> None:
+        self.cubes, self.factorised_for = np.array([cubes]), []
 
     def residual(self, x, which):
-        return x**3 - self.wanted[:, which]
+        return x**3 - self.cubes[:, which]
 
     def factorised(self, x, which):
         self.factorised_for.append(which.tolist())

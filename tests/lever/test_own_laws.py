@@ -118,8 +118,8 @@ def test_heat_and_thermoelectricity_of_a_metal_follow_its_own_conductivity(how_t
 
 
 def test_its_lever_has_exact_derivatives_by_state_and_by_its_own_parameter(how_to):
-    made = how_to["BlochGrueneisenMetal"]
-    probe = metal_film_probe().with_material("film", made, debye_K=300.0)
+    metal_class = how_to["BlochGrueneisenMetal"]
+    probe = metal_film_probe().with_material("film", metal_class, debye_K=300.0)
     lever = Lever(probe, COARSE)
     branch = lever.branch(600.0)
     orders = remainder_orders(branch.equations, branch.x[:, -1:], seed=1, steps=(0.2, 0.1, 0.05))
@@ -127,8 +127,8 @@ def test_its_lever_has_exact_derivatives_by_state_and_by_its_own_parameter(how_t
     name, (lever_V, mA, *_) = "film.debye_K", branch.values[[4, -2]].T
     bias = lever.circuit.bias(lever_V, mA)
 
-    def tip(made):
-        return made.dataset(made.solve(bias)).tip_K.values
+    def tip(lever):
+        return lever.dataset(lever.solve(bias)).tip_K.values
 
     slope = lever.sweep(bias, sensitivities=True).sensitivity.sel(parameter=name, observable="tip")
     rest = [
@@ -166,7 +166,7 @@ def test_a_parameter_of_its_own_is_one_like_any_other(how_to):
 
 
 def test_a_name_has_one_unit():
-    def made(**others):
+    def another(**others):
         class Another(NSilicon):
             own_length: float = field_of(
                 Parameter("own_length", "l", *others.values(), 1.0, 2.0, "", value=1.0)
@@ -180,8 +180,8 @@ def test_a_name_has_one_unit():
                 Parameter("own_length", "l", "µm", 1.0, 1.0, 2.0, "", value=1.0)
             )
 
-    made(unit="nm", scale=1.0)
-    made(unit="µm", scale=1.0)  # the same class again, as in a notebook
+    another(unit="nm", scale=1.0)
+    another(unit="µm", scale=1.0)  # the same class again, as in a notebook
     elsewhere()
     with pytest.raises(InputError, match=r"own_length is in 1 nm, and elsewhere in 1 µm"):
 
@@ -211,16 +211,16 @@ def test_the_papers_silicon_may_be_of_another_class(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("section", "made", "says"),
+    ("section", "material_class", "says"),
     [
         ("leg", DoubledSilicon, "unknown material 'leg': did you mean 'legs'"),
         ("legs", Dielectric, "found Dielectric, expected a class made of HighDopedSilicon"),
         ("material", OtherMaterial, "unknown material 'material'"),
     ],
 )
-def test_what_cannot_be_the_material_is_refused(section, made, says):
+def test_what_cannot_be_the_material_is_refused(section, material_class, says):
     with pytest.raises(InputError, match=says):
-        Probe.from_file(BORON).with_material(section, made)
+        Probe.from_file(BORON).with_material(section, material_class)
 
 
 # --- files ----------------------------------------------------------------------------------------
@@ -230,13 +230,13 @@ def test_what_cannot_be_the_material_is_refused(section, made, says):
 def test_a_sweep_is_read_where_the_class_is_and_refused_elsewhere(of, probe, tmp_path):
     if of == "material":
         probe = Probe.reference().with_material(of, MinimosMaterial)
-    made = {"material": MinimosMaterial, "legs": DoubledSilicon}[of]
+    material_class = {"material": MinimosMaterial, "legs": DoubledSilicon}[of]
     sweep = Lever(probe, COARSE).sweep([1.0, 2.0])
     write_sweep(sweep, tmp_path / "sweep.nc")
     again = read_sweep(tmp_path / "sweep.nc")
     assert probe_of(again) == probe
-    assert probe_of(again).classes == {of: made}
-    again.attrs["laws"] = again.attrs["laws"].replace(made.__name__, "Elsewhere")
+    assert probe_of(again).classes == {of: material_class}
+    again.attrs["laws"] = again.attrs["laws"].replace(material_class.__name__, "Elsewhere")
     with pytest.raises(InputError, match=rf"'{of}' {REFUSED}: expected Python that has imported"):
         probe_of(again)
     # what needs no material is as ever
@@ -288,8 +288,8 @@ def test_what_has_the_usual_laws_is_read_back():
 def test_nothing_is_kept_of_a_class_whose_code_may_change(monkeypatch, tmp_path):
     probe = Probe.reference().with_material("material", OtherMaterial)
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
-    made = SimpleNamespace(arrays=lambda: {"a": np.zeros(2)})
-    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", lambda *_: made)
+    reduction = SimpleNamespace(arrays=lambda: {"a": np.zeros(2)})
+    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", lambda *_: reduction)
     cached_reduction(Lever(probe, COARSE))
     assert not list(tmp_path.rglob("*.npz"))
     (tmp_path / "a.csv").write_text("V_b (V),I_h (mA)\n1,0.1\n2,0.2\n3,0.3\n")

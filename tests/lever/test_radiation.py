@@ -147,8 +147,8 @@ def test_a_step_in_time_ends_at_rest_and_keeps_the_heat(bright):
     history = simulate(lever, step(5.0), at=[1.0, 3.0, 10.0, 20000.0], tolerance_K=1e-3)
     (rest,) = lever.solve([5.0])
     assert history.tip_K.values[-1] - BASE == pytest.approx(rest.tip_K - BASE, rel=1e-6)
-    kept = history.stored_nJ - float(history.stored_nJ[0]) + history.lost_nJ
-    missing = (history.supplied_nJ - kept).values
+    stored_and_lost = history.stored_nJ - float(history.stored_nJ[0]) + history.lost_nJ
+    missing = (history.supplied_nJ - stored_and_lost).values
     assert np.ptp(missing) < 1e-6 * float(history.supplied_nJ.max())
 
 

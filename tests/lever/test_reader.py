@@ -40,8 +40,8 @@ PROBES = {
     "reader": OVER.with_(**HEATED),
     "tilted": OVER.with_(**HEATED, surface_tilt_deg=0.5, surface_gap_um=1.0),
 }
-SHOWN = ("reader_V", "reader_ohm")
-SHOWN_BY = {"lever_V": 0, "reader_V": 2}
+SIGNALS = ("reader_V", "reader_ohm")
+OUTPUT_INDEX = {"lever_V": 0, "reader_V": 2}
 NOISE = NoiseOptions(hooge=1e-6, vibration_nm=1e-4)
 
 
@@ -54,7 +54,7 @@ def test_the_slope_is_that_of_readings_at_two_distances(over):
     gap, bias = over.probe.surroundings.surface_gap_um, [6.0]
     here = over_surface(over, [gap], bias)
     near, far = (over_surface(over, [gap + way], bias) for way in (-1e-3, 1e-3))
-    by_V, by_ohm = ((far[name].item() - near[name].item()) / 2e-3 for name in SHOWN)
+    by_V, by_ohm = ((far[name].item() - near[name].item()) / 2e-3 for name in SIGNALS)
     assert here.dV_dz_V_per_um.item() == pytest.approx(by_V, rel=1e-4)
     assert here.dlnR_dz_per_um.item() == pytest.approx(by_ohm / here.reader_ohm.item(), rel=1e-4)
 
@@ -91,18 +91,18 @@ def test_the_delay_is_how_the_response_falls_with_the_rate(over):
     (state,) = near.solve([6.0])
     equations, rate = near.equations, 1e-3
     near.space.air.around = None
-    shown = "reader_V" if over.circuit.contacts else "lever_V"
-    found = Response.of(equations, state.x, TIP, shown)
+    output = "reader_V" if over.circuit.contacts else "lever_V"
+    found = Response.of(equations, state.x, TIP, output)
     slope, delay = found.by_parameter("surface_gap_um")
     forced = equations.by_parameter(state.x, ["surface_gap_um"])[..., 0]
     # the heat that is stored meanwhile forces the state again, until nothing changes
     change = found.change(forced)
     for _ in range(4):
         change = found.change(forced + rate * equations.storage_change(state.x, change))
-    answer = equations.observed_change(state.x, change)[SHOWN_BY[shown], 0]
+    answer = equations.observed_change(state.x, change)[OUTPUT_INDEX[output], 0]
     assert answer == pytest.approx(slope / (1.0 + rate * delay), rel=1e-4)
     assert found.change(forced)[:, 0] @ equations.observed_gradient(state.x)[
-        :, 0, SHOWN_BY[shown]
+        :, 0, OUTPUT_INDEX[output]
     ] == pytest.approx(slope, rel=1e-4)
     assert 0.0 < delay < float(slowest_modes(state)[0][0])
 

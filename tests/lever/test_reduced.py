@@ -57,7 +57,9 @@ def test_at_the_few_points_alone_it_is_nearly_as_good(coarse, reduced, seed):
     branch = reduced.branch(full.probe, Reach(full.circuit, BIAS[-1]))
     u = branch.read(full.circuit, BIAS).u
     sweep = full.sweep(BIAS)
-    np.testing.assert_allclose(branch.shown(u)["current_mA"], sweep.current_mA, rtol=1e-3)
+    np.testing.assert_allclose(
+        branch.electrical_outputs(u)["current_mA"], sweep.current_mA, rtol=1e-3
+    )
     np.testing.assert_allclose(branch.base_temperature_K + u**2, sweep.tip_K, rtol=0, atol=0.5)
     assert branch.knee.tip_K == pytest.approx(full.branch_past_knee().knee.tip_K, abs=0.5)
 
@@ -81,8 +83,8 @@ def test_corrected_by_the_full_lever_it_is_exact_to_first_order(coarse, reduced)
     # nothing of this has changed the model that was corrected
     np.testing.assert_array_equal(model.predict(probe).values, first.values)
     near = probe.with_(n_d=material.n_d * 1.01)
-    moved = observables_of(coarse.with_probe(near).sweep(BIAS))
-    away = np.abs(better.predict(near).values - moved) / size
+    exact_nearby = observables_of(coarse.with_probe(near).sweep(BIAS))
+    away = np.abs(better.predict(near).values - exact_nearby) / size
     assert np.nanmax(away) < 0.5 * np.nanmax(before)
 
 

@@ -89,13 +89,15 @@ def test_the_paper_s_silicon_has_ranges_of_its_own():
 
 
 def test_a_batch_reduces_what_can_be_reduced(strip, monkeypatch):
-    made = []
-    monkeypatch.setattr(batch, "cached_reduction", lambda _, progress, names: made.append(names))
+    reduced_names = []
+    monkeypatch.setattr(
+        batch, "cached_reduction", lambda _, progress, names: reduced_names.append(names)
+    )
     data, free = Measurement.of_sweep(strip.sweep(BIAS)), ("film.lorenz_ratio",)
     for options in (FitOptions(), FitOptions(free=free), FitOptions(free=("thickness_um",))):
         work = batch.Work("fit", fit, FitFile, ".json", strip.probe, options)
         assert not batch._not_reduced(work, {"one": data}, None)
-    assert made == [
+    assert reduced_names == [
         set(ParameterDomain.of(strip.probe).names),
         {*ParameterDomain.of(strip.probe).names, *free},
     ]
@@ -104,7 +106,7 @@ def test_a_batch_reduces_what_can_be_reduced(strip, monkeypatch):
 @pytest.mark.slow
 def test_a_batch_of_film_levers_is_fitted(tmp_path, monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
-    paths, told = [], []
+    paths, progress = [], []
     for number, resistivity in enumerate((1.8e-5, 2.2e-5)):
         sweep = Lever(strip_probe().with_(**{"film.resistivity": resistivity})).sweep(BIAS)
         rows = zip(BIAS, sweep.current_mA.values, sweep.tip_K.values, strict=True)
@@ -114,9 +116,9 @@ def test_a_batch_of_film_levers_is_fitted(tmp_path, monkeypatch):
     done = batch.fit_many(
         *(paths, tmp_path / "fits", strip_probe()),
         processes=1,
-        reducing=lambda *steps: told.append(steps),
+        reducing=lambda *steps: progress.append(steps),
     )
     assert not done.failures
-    assert told[-1] == (8, 8)
+    assert progress[-1] == (8, 8)
     found = [one["parameters"]["film.resistivity"]["value"] for one in done.results.values()]
     assert found == pytest.approx([1.8e-5, 2.2e-5], rel=3e-3)

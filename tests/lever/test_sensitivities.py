@@ -35,7 +35,7 @@ def test_sensitivities_have_taylor_order_two(bridged, name):
     start, slopes = solved(bridged, bias), bridged.sweep(bias, sensitivities=True).sensitivity
     value = getattr(bridged.probe.material, name)
     material = bridged.probe.material
-    moved = [
+    perturbed_datasets = [
         solved(bridged.with_material(material.with_(**{name: value * (1 + step)})), bias)
         for step in STEPS
     ]
@@ -44,7 +44,7 @@ def test_sensitivities_have_taylor_order_two(bridged, name):
         rest = np.array(
             [
                 np.abs(one[column.name].values - start[column.name].values - step * value * slope)
-                for step, one in zip(STEPS, moved, strict=True)
+                for step, one in zip(STEPS, perturbed_datasets, strict=True)
             ]
         )
         orders = np.log2(rest[:-1] / rest[1:])

@@ -56,9 +56,11 @@ def test_states_are_those_that_are_solved_at_their_bias(levers, name, held, valu
     lever = levers[name]
     found = hold(lever, held, values)
     data = found.data
-    shown = resistances(data) if held == "resistance" else data.power_mW.values
+    held_values = resistances(data) if held == "resistance" else data.power_mW.values
     assert len(found.states) == data.sizes["bias"] == count
-    assert shown == pytest.approx(data[f"set_{'ohm' if held == 'resistance' else 'mW'}"], rel=1e-9)
+    assert held_values == pytest.approx(
+        data[f"set_{'ohm' if held == 'resistance' else 'mW'}"], rel=1e-9
+    )
     solved = lever.solve(data.bias_V.values)
     assert [state.tip_K for state in solved] == pytest.approx(data.tip_K.values, rel=1e-9)
     assert [state.tip_K for state in found.states] == pytest.approx(data.tip_K.values, rel=1e-12)

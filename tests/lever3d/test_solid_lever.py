@@ -86,9 +86,9 @@ def test_solves_with_the_jacobian_undo_small_changes(in_air, state):
     factors, start = equations.factorised(x), equations.balance(x)
     rest = []
     for h in (0.2, 0.1, 0.05):
-        moved = (equations.balance(x + h * direction) - start) / h
-        moved[-1] = TIP.of(in_air.space, direction)
-        rest.append(np.abs(factors.solve(moved, np.array([0])) - direction).max())
+        residual_change = (equations.balance(x + h * direction) - start) / h
+        residual_change[-1] = TIP.of(in_air.space, direction)
+        rest.append(np.abs(factors.solve(residual_change, np.array([0])) - direction).max())
     orders = np.log2(np.array(rest[:-1]) / rest[1:])
     np.testing.assert_allclose(orders, 1.0, atol=0.1)
 
@@ -97,15 +97,15 @@ def test_the_linear_solver_needs_few_iterations(in_air, state, monkeypatch):
     equations, x = in_air.equations, state.x
     air, applied = in_air.space.air.operator, []
     factors = equations.factorised(x)
-    wanted = np.random.default_rng(1).normal(size=x.shape) * equations.scale
-    right = equations.balance_change(x, wanted)
-    right[-1] = TIP.of(in_air.space, wanted)
+    expected = np.random.default_rng(1).normal(size=x.shape) * equations.scale
+    right = equations.balance_change(x, expected)
+    right[-1] = TIP.of(in_air.space, expected)
     monkeypatch.setattr(
         air, "solve", lambda theta, solve=air.solve: applied.append(0) or solve(theta)
     )
     found = factors.solve(right, np.array([0]))
     assert len(applied) < 20
-    assert np.abs((found - wanted) / equations.scale).max() < 1e-4
+    assert np.abs((found - expected) / equations.scale).max() < 1e-4
 
 
 def test_another_material_is_solved_as_by_a_lever_made_of_it(in_air, state):
@@ -179,8 +179,8 @@ def test_slices_through_the_tip_are_drawn(state):
     slices = temperature_slices(state)
     assert slices.temperature.dims == ("slice", "z", "place")
     assert slices.temperature.max().item() == pytest.approx(state.tip_K, abs=2.0)
-    made = draw(slices)
-    titles = [axes.get_title(loc="center") for axes in made.axes[:4]]
+    figure = draw(slices)
+    titles = [axes.get_title(loc="center") for axes in figure.axes[:4]]
     assert titles == slices.slice.values.tolist()
 
 

@@ -23,7 +23,7 @@ def ramp(coarse: Lever) -> Measurement:
     bias = np.abs(np.linspace(-10.0, 10.0, ROWS)) + 1.0
     branch = coarse.branch()
     u = branch.read(coarse.circuit, bias).u
-    observables = branch.shown(u)
+    observables = branch.electrical_outputs(u)
     tip = coarse.circuit.base_temperature_K + u**2 + rng.normal(0.0, 3.0, ROWS)
     tip[np.arange(ROWS) % 10 > 0] = np.nan
     noise = 1.0 + 1e-3 * rng.normal(size=(2, ROWS))

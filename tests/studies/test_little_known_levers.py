@@ -125,7 +125,7 @@ def test_noise_is_half_a_per_cent_and_a_picture_is_read_by_a_share_of_its_full_s
             continue
         data, tip = lever.measurement, lever.tip_K(lever.measurement.bias_V)
         here = np.isfinite(tip)
-        current = lever.branch.shown(lever.branch.u_at(tip[here]))["current_mA"]
+        current = lever.branch.electrical_outputs(lever.branch.u_at(tip[here]))["current_mA"]
         off = data.current_mA[here] - current
         if lever.digitised:
             assert 3e-4 < np.std(off) / data.current_mA.max() < 9e-3

@@ -179,8 +179,8 @@ class Thomson(MetalFilm):
 
     def thermoelectric(self, T, n, carrier):
         (sigma, by), S, slope = self.electrical_conductivity(T, n), 2e-7 * T, 2e-7
-        moved = np.stack([by["T"] * S + sigma * slope, by["T"] * S**2 + 2 * sigma * S * slope])
-        return np.stack([sigma * S, sigma * S**2]), {"T": moved}
+        by_T = np.stack([by["T"] * S + sigma * slope, by["T"] * S**2 + 2 * sigma * S * slope])
+        return np.stack([sigma * S, sigma * S**2]), {"T": by_T}
 
 
 def with_thomson(volts: float) -> tuple[object, float]:

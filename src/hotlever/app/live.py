@@ -117,7 +117,7 @@ class LiveLever:
     def curves(self) -> dict[str, Any]:
         """I-V curve, temperature by power and the knee, by the tip temperature of the branch."""
         u = np.linspace(0.0, self.branch.end_u, _POINTS)
-        observables = self.branch.shown(u)
+        observables = self.branch.electrical_outputs(u)
         knee = self.branch.knee
         return {
             "lever_V": observables["lever_V"],
@@ -159,7 +159,8 @@ class LiveLever:
             raise branch_end(self.branch, reading)
         report.note(*reading.notes(np.array([bias])))
         observables = {
-            name: float(value[0]) for name, value in self.branch.shown(reading.u).items()
+            name: float(value[0])
+            for name, value in self.branch.electrical_outputs(reading.u).items()
         }
         x = self.branch.equations.space.expanded(self.branch.states(reading.u))
         low, knee = self.branch.base_temperature_K, self.branch.knee

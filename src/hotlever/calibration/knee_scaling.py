@@ -265,7 +265,7 @@ def _similar_branches(probe: Probe, like: Branch) -> list[Branch]:
     reach = Reach(probe.circuit, min(past, _HIGHEST_V))
     solved = SimilarLevers(Lever(probe, COARSE)).linearised(probe, reach, None, names)
     model = solved.branch
-    changes = solved.shown * np.array([_ASIDE * priors[name].absolute for name in names])
+    changes = solved.output_slopes * np.array([_ASIDE * priors[name].absolute for name in names])
     slopes = spline_through(model.u, changes)(model.u, 1)
     moved = zip(np.moveaxis(changes, 2, 0), np.moveaxis(slopes, 2, 0), strict=True)
     return [model, *(shifted(model, *change) for change in moved)]

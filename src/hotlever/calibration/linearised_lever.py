@@ -128,7 +128,9 @@ class LinearisedLever:
         names, fast = tuple(self.names), SimilarLevers(Lever(self.probe, COARSE))
         reach = Reach(self.probe.circuit, MOST_BIAS)
         solved = fast.linearised(self.probe, reach, names=names)
-        return CurveSurrogate(self.probe, names, solved.branch, solved.shown, Rows(np.empty(0)))
+        return CurveSurrogate(
+            self.probe, names, solved.branch, solved.output_slopes, Rows(np.empty(0))
+        )
 
     @cached_property
     def highest_V(self) -> float:

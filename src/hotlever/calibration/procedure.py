@@ -274,7 +274,7 @@ def cold_resistance_spread(probe: Probe, priors: Mapping[str, Prior]) -> float:
     names = tuple(name for name in priors if name in parameters_of(probe))
     branch = lever.linearised(probe, Reach(probe.circuit, 0.0), names=names)
     first = int(branch.branch.solved[0])
-    by = branch.shown[first, :2] / branch.branch.values[first, :2, None]
+    by = branch.output_slopes[first, :2] / branch.branch.values[first, :2, None]
     spreads = np.array([priors[name].absolute for name in names])
     return float(np.linalg.norm((by[0] - by[1]) * spreads))
 

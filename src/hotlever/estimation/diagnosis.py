@@ -198,7 +198,7 @@ class _Curve:
         whole = Reach(probe.circuit, np.inf)
         lever = SimilarLevers(Lever(probe, COARSE)).linearised(probe, whole, names=names)
         rows = Rows(np.zeros(0))
-        surrogate = CurveSurrogate(probe, names, lever.branch, lever.shown, rows)
+        surrogate = CurveSurrogate(probe, names, lever.branch, lever.output_slopes, rows)
         u = np.linspace(float(lever.branch.u[1]), lever.branch.end_u, _POINTS)
         outputs = np.maximum(lever.branch.curve(u)[:, :2], 1e-12)
         powers = surrogate.powers(u)[:, :2]

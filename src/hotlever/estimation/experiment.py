@@ -285,7 +285,7 @@ class ExperimentAtRest:
         linearised = None if near is None else near.linearised
         if linearised is None or linearised.probe != probe:
             linearised = self.fast.linearised(probe, self.reach(probe), linearised, self.names)
-        branch, by_parameter = linearised.branch, linearised.shown
+        branch, by_parameter = linearised.branch, linearised.output_slopes
         if self.correction:
             branch = self.correction.added(branch, probe.values(self.names))
             by_parameter = by_parameter + self.correction.slopes(branch.u)
@@ -311,7 +311,7 @@ class ExperimentAtRest:
         fast, probe = at.linearised.branch, at.probe
         equations = self.full.equations(probe, self.names)
         u, x = self.fast.full_states(fast, equations, self.reach(probe))
-        by_fast, parametrisation = at.linearised.shown_at(u), fast.parametrisation
+        by_fast, parametrisation = at.linearised.output_slopes_at(u), fast.parametrisation
         values = np.zeros(by_fast.shape[:2])
         values[:, :TIP_RISE] = equations.observed(x).T - fast.curve(u)[:, :TIP_RISE]
         values[:, TIP_RISE] = equations.space.tip_rise(x) - fast.rise(u)

@@ -130,7 +130,7 @@ def design_optimum(optimum: Optimum) -> Figure:
             axes.set(ylabel="y (µm)")
             axes.grid(False)
             u = np.linspace(0.0, solved.branch.end_u, 200)
-            shown = solved.branch.shown(u)
+            shown = solved.branch.electrical_outputs(u)
             curves.plot(shown["lever_V"], shown["current_mA"], color=colour, label=name)
             marks = {"working point": (solved.u, "o"), "knee": (solved.branch.knee_u, "^")}
             for label, (at_u, mark) in marks.items():

@@ -214,11 +214,11 @@ class StatesAtPoints:
         """Return states and what the laws say of them."""
         # residual, Jacobian and derivatives are asked for at the same states one by one
         if self._latest is None or not np.array_equal(self._latest[0], x):
-            moved = self.space.fields(x)
-            T = self.base_temperature_K + moved.T
-            T, grad_T = self.terminals.warmed(T, moved.grad_T)
+            fields = self.space.fields(x)
+            T = self.base_temperature_K + fields.T
+            T, grad_T = self.terminals.warmed(T, fields.grad_T)
             properties, by = self.properties(T)
-            at_points = Fields(T, grad_T, moved.grad_V), properties, by["T"]
+            at_points = Fields(T, grad_T, fields.grad_V), properties, by["T"]
             by_rim = self.laws.radiated(self.rim, x, self.terminals.end_rises)
             self._latest = x.copy(), at_points, by_rim
         return self._latest

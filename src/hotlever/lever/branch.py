@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.errors import BranchEndError
-from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations
 from hotlever.lever.newton import NewtonResult
 from hotlever.lever.readings import ByPower, Reading, slow_ramp
 from hotlever.lever.solved_states import (
@@ -38,7 +38,7 @@ from hotlever.types import Array
 #: Steps of Newton's method from the root of a rise to its place.
 _CORRECTIONS = 3
 #: Where a branch's values have the rise of the tip.
-TIP_RISE = len(SHOWN)
+TIP_RISE = len(ELECTRICAL_OUTPUTS)
 
 
 @dataclass(frozen=True)
@@ -155,18 +155,18 @@ class Branch(SolvedStates):
             u = u - np.divide(self.rise(u) - rise, slope, out=np.zeros_like(u), where=slope > 0)
         return np.asarray(u)
 
-    def shown(self, u: ArrayLike) -> dict[str, Array]:
+    def electrical_outputs(self, u: ArrayLike) -> dict[str, Array]:
         """Return what an instrument shows, by name: ``lever_V``, ``current_mA``, ``reader_V``."""
         values = self.curve(np.asarray(u, dtype=float))
-        return {name: values[..., column] for column, name in enumerate(SHOWN)}
+        return {name: values[..., column] for column, name in enumerate(ELECTRICAL_OUTPUTS)}
 
     def lever_voltage(self, tip_K: ArrayLike) -> Array:
         """Return V_l (V) by tip temperature (K); NaN outside the branch."""
-        return self.shown(self.u_at(tip_K))["lever_V"]
+        return self.electrical_outputs(self.u_at(tip_K))["lever_V"]
 
     def current(self, tip_K: ArrayLike) -> Array:
         """Return I_h (mA) by tip temperature (K); NaN outside the branch."""
-        return self.shown(self.u_at(tip_K))["current_mA"]
+        return self.electrical_outputs(self.u_at(tip_K))["current_mA"]
 
     def power(self, tip_K: ArrayLike) -> Array:
         """Return P_l (mW) by tip temperature (K); NaN outside the branch."""

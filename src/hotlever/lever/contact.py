@@ -76,7 +76,7 @@ def state_in_contact(
 
     Returns
     -------
-    shown : dict of str to float
+    row : dict of str to float
         What `sweep_in_contact` has of this bias, but for ``current_by_resistance``.
     state : State
 
@@ -104,14 +104,14 @@ def state_in_contact(
     if after is None:
         (after,) = touching.solve([bias])
     columns = _columns(touching, np.array([after.tip_K]))
-    shown = {name: float(values[0]) for name, values in columns.items()} | {
+    row = {name: float(values[0]) for name, values in columns.items()} | {
         "bias_V": bias,
         "tip_K": after.tip_K,
         "current_mA": after.current_mA,
         "current_change_mA": after.current_mA - before.current_mA,
         "tip_change_K": after.tip_K - before.tip_K,
     }
-    return shown, after
+    return row, after
 
 
 def sweep_in_contact(

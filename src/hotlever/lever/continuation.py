@@ -229,9 +229,11 @@ class ArclengthContinuation(Continuation):
         equations = self._equations
         rest = without_bias(equations)
         along = equations.along(rest, equations.factorised(rest, LEVER), LEVER)
-        shown = equations.observed_change(rest, along)
+        output_slopes = equations.observed_change(rest, along)
         # the bias rises
-        along = along * np.sign(float(equations.circuit.bias(shown[0], shown[1])[0]))
+        along = along * np.sign(
+            float(equations.circuit.bias(output_slopes[0], output_slopes[1])[0])
+        )
         slope = along / np.linalg.norm(in_plane(equations.space, along))
         branch = Branch.of(equations, np.zeros(1), rest, slope)
         if branch.melts:

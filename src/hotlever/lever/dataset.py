@@ -25,7 +25,7 @@ from hotlever.files import read_text
 from hotlever.lever.branch import Branch
 from hotlever.lever.equations import (
     BALANCES,
-    SHOWN,
+    ELECTRICAL_OUTPUTS,
     LeverEquations,
     balance_columns,
     balance_names,
@@ -62,12 +62,12 @@ def dataset_of_states(
 ) -> xr.Dataset:
     """Return what is observed of solved states (size + 1, n) of a probe's lever."""
     base = equations.base_temperature_K
-    shown = dict(zip(SHOWN, equations.observed(x), strict=True))
-    shown["tip_K"] = base + equations.space.tip_rise(x)
-    shown["max_K"] = base + equations.highest_rise(x)
+    outputs = dict(zip(ELECTRICAL_OUTPUTS, equations.observed(x), strict=True))
+    outputs["tip_K"] = base + equations.space.tip_rise(x)
+    outputs["max_K"] = base + equations.highest_rise(x)
     monitors = MonitorMap(probe, equations)
-    shown |= monitors.columns(monitors.values(x).T)
-    return _dataset(probe, equations, shown, balance_columns(equations, x), notes)
+    outputs |= monitors.columns(monitors.values(x).T)
+    return _dataset(probe, equations, outputs, balance_columns(equations, x), notes)
 
 
 def dataset_of_branch(
@@ -81,38 +81,38 @@ def dataset_of_branch(
 
     Sensitivities, (observables, n, p), are of `OBSERVABLES` by what a fit usually varies.
     """
-    equations, shown = branch.equations, branch.shown(u)
-    shown["tip_K"] = branch.tip_K(u)
-    shown["max_K"] = branch.base_temperature_K + branch.highest_rise_at(u)
+    equations, outputs = branch.equations, branch.electrical_outputs(u)
+    outputs["tip_K"] = branch.tip_K(u)
+    outputs["max_K"] = branch.base_temperature_K + branch.highest_rise_at(u)
     monitors = MonitorMap(probe, equations)
     curves = monitors.values(branch.x).T, monitors.changes(branch.slopes).T
-    shown |= monitors.columns(branch.through(*curves)(u))
+    outputs |= monitors.columns(branch.through(*curves)(u))
     balances = branch.through(
         balance_columns(equations, branch.x), balance_slopes(equations, branch.x, branch.slopes)
     )
-    return _dataset(probe, equations, shown, balances(u), notes, sensitivities)
+    return _dataset(probe, equations, outputs, balances(u), notes, sensitivities)
 
 
 def _dataset(
     probe: Probe,
     equations: LeverEquations,
-    shown: Mapping[str, Array],
+    outputs: Mapping[str, Array],
     balances: Array,
     notes: Sequence[str],
     sensitivities: Array | None = None,
 ) -> xr.Dataset:
     """Return what is observed of n states, of which the balances (n, k) are `balance_columns`.
 
-    Shown are what instruments see, the tip, the highest temperature, and monitors.
+    The outputs are what instruments see, the tip, the highest temperature, and monitors.
     """
     made_of = equations.laws.made_of
     names = balance_names(probe.wiring)
-    columns = {**shown, **dict(zip(names, balances.T, strict=True))}
+    columns = {**outputs, **dict(zip(names, balances.T, strict=True))}
     at_terminals = names[len(BALANCES) :]
-    columns["bias_V"] = probe.circuit.bias(shown["lever_V"], shown["current_mA"])
-    columns["power_mW"] = shown["lever_V"] * shown["current_mA"]
+    columns["bias_V"] = probe.circuit.bias(outputs["lever_V"], outputs["current_mA"])
+    columns["power_mW"] = outputs["lever_V"] * outputs["current_mA"]
     for part in ("heater", "leg1", "leg2"):
-        columns[f"{part}_ohm"] = _resistance(columns[f"{part}_mW"], shown["current_mA"])
+        columns[f"{part}_ohm"] = _resistance(columns[f"{part}_mW"], outputs["current_mA"])
     if probe.wiring.held:
         # the same current does not pass all parts
         columns["leg2_ohm"] = np.full_like(columns["leg2_ohm"], np.nan)
@@ -120,9 +120,9 @@ def _dataset(
     # where all of the conductor is the heater there are no legs
     whole = np.where(np.isnan(columns["legs_ohm"]), 0.0, columns["legs_ohm"])
     columns["lever_ohm"] = whole + columns["heater_ohm"]
-    every = dict.fromkeys((*SWEEP_COLUMNS, *at_terminals, *_MORE, *shown))
-    kept = with_bridge(probe.circuit, {name: columns[name] for name in every})
-    variables, coordinates = with_meanings(probe, kept, "bias")
+    every = dict.fromkeys((*SWEEP_COLUMNS, *at_terminals, *_MORE, *outputs))
+    ordered_columns = with_bridge(probe.circuit, {name: columns[name] for name in every})
+    variables, coordinates = with_meanings(probe, ordered_columns, "bias")
     coordinates["bias"] = columns["bias_V"]
     if sensitivities is not None:
         variables["sensitivity"] = (("observable", "bias", "parameter"), sensitivities)

@@ -283,17 +283,19 @@ def taken_up_around(
     }
     path = cache_file("stores", facts)
     names = tuple(AirStores.__dataclass_fields__)
-    kept = stored(path, lambda a: (a["modes"], AirStores(**{name: a[name] for name in names})))
-    if kept is None:
+    cache_entry = stored(
+        path, lambda a: (a["modes"], AirStores(**{name: a[name] for name in names}))
+    )
+    if cache_entry is None:
         modes = conduction_modes(space, _MODES)
         panelled = PanelledAir(layout, surroundings, base_temperature_K, _PANELS)
         sites = panelled.surface.sites
         # the modes are orthonormal over the lever's area
         inside = layout.thickness_um * np.eye(_MODES)
         length = float(np.ptp(layout.corners, axis=0).max())
-        kept = modes, stores_of(panelled, space.rise_at(sites, modes), inside, length)
-        store_arrays(path, {"modes": modes, **vars(kept[1])})
-    modes, stores = kept
+        cache_entry = modes, stores_of(panelled, space.rise_at(sites, modes), inside, length)
+        store_arrays(path, {"modes": modes, **vars(cache_entry[1])})
+    modes, stores = cache_entry
     ends = space.end_test[0]
     at_points = space.weights * space.temperature.at_points(modes)[0]
     mass = space.temperature.tested(

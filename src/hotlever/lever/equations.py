@@ -35,7 +35,7 @@ from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.types import Array, Index
 
 #: What an instrument shows of a state, in the order of `LeverEquations.observed`.
-SHOWN = ("lever_V", "current_mA", "reader_V")
+ELECTRICAL_OUTPUTS = ("lever_V", "current_mA", "reader_V")
 #: What `balance_columns` returns: heat made in heater and legs (mW; NaN without legs), current to
 #: ground (mA), heat through the leg ends, into the air, radiated and into a tip in contact (mW).
 BALANCES = (
@@ -217,7 +217,7 @@ class LeverEquations(StatesAtPoints):
     # --- what is measured ------------------------------------------------------------------------
 
     def observed(self, x: Array) -> Array:
-        """Return V_l (V), I_h (mA) and V_r (V, NaN without a reader), shape (3, n): `SHOWN`."""
+        """Return V_l (V), I_h (mA) and V_r (V, NaN without a reader), shape (3, n)."""
         current = self.balance(x)[-1]
         return np.stack([x[-1], current, self.space.reader_voltage(x)])
 
@@ -238,7 +238,7 @@ class LeverEquations(StatesAtPoints):
         supply = self.space.fields(unit).grad_V
         along = (tangent.charge_flux_T * supply).sum(axis=0)
         flat = np.zeros_like(tangent.charge_flux_T)
-        gradient = np.zeros((*x.shape, len(SHOWN)))
+        gradient = np.zeros((*x.shape, len(ELECTRICAL_OUTPUTS)))
         gradient[-1, :, 0] = 1.0
         if tangent.charge_T is not None:
             flat = tangent.charge_T * supply
@@ -350,9 +350,11 @@ def _balances(equations: LeverEquations, fluxes: Fluxes, leaving: _Leaving) -> A
     space = equations.space
     assert isinstance(space, FullSpace)  # a reduced lever has no ends
     heats = _heat_out(equations, fluxes, leaving)
-    made = space.weights * (leaving.faces - fluxes.heat_source)
+    heat_generation = space.weights * (leaving.faces - fluxes.heat_source)
     charge = space.weighted(fluxes.charge)
-    of_parts = [_made(made, space.parts[part]) for part in ("heater", "leg 1", "leg 2")]
+    of_parts = [
+        _heat_of_part(heat_generation, space.parts[part]) for part in ("heater", "leg 1", "leg 2")
+    ]
     into = {
         name: np.einsum("dp,dpn->n", space.charge_tests[name], charge)
         for name in space.wiring.conducting
@@ -363,7 +365,7 @@ def _balances(equations: LeverEquations, fluxes: Fluxes, leaving: _Leaving) -> A
     return np.stack([*of_parts, ground, *heats, *currents], axis=-1)
 
 
-def _made(heat: Array, points: Index) -> Array:
+def _heat_of_part(heat: Array, points: Index) -> Array:
     """Return the heat made at some points; NaN if the lever has no such part."""
-    made = heat[points].sum(axis=0)
-    return np.asarray(made if points.size else np.full_like(made, np.nan))
+    total = heat[points].sum(axis=0)
+    return np.asarray(total if points.size else np.full_like(total, np.nan))

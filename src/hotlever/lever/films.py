@@ -61,14 +61,14 @@ class PlacedFilm:
 
     def among(self, points: Index) -> PlacedFilm:
         """Return the film at some of the quadrature points, by their number there."""
-        kept = np.isin(self.points, points)
+        mask = np.isin(self.points, points)
         return replace(
             self,
-            points=np.searchsorted(points, self.points[kept]),
-            thickness_um=at_some(self.thickness_um, kept),
-            counted_um=at_some(self.counted_um, kept),
-            faces=at_some(self.faces, kept),
-            distances=self.distances[:, kept],
+            points=np.searchsorted(points, self.points[mask]),
+            thickness_um=at_some(self.thickness_um, mask),
+            counted_um=at_some(self.counted_um, mask),
+            faces=at_some(self.faces, mask),
+            distances=self.distances[:, mask],
         )
 
 

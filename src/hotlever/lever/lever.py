@@ -71,9 +71,9 @@ class Lever(MeshedProbe):
             If a state was not found.
         """
         rise = hottest_K - self.circuit.base_temperature_K
-        return self._followed(lambda branch: branch.values[-1, TIP_RISE] >= rise, progress)
+        return self._branch_until(lambda branch: branch.values[-1, TIP_RISE] >= rise, progress)
 
-    def _followed(self, enough: Enough, progress: Progress | None = None) -> Branch:
+    def _branch_until(self, enough: Enough, progress: Progress | None = None) -> Branch:
         """Return a branch that is long enough, going on from the one at hand."""
         try:
             self._branch = continued(self.equations, enough, self._branch, progress)
@@ -87,12 +87,12 @@ class Lever(MeshedProbe):
         self, bias: float, progress: Progress | None = None, lowest: float | None = None
     ) -> Branch:
         """Return a branch that reaches biases (V), or ends before because silicon melts."""
-        return self._followed(Reach(self.circuit, bias, lowest), progress)
+        return self._branch_until(Reach(self.circuit, bias, lowest), progress)
 
     @one_blas_thread
     def branch_past_knee(self) -> Branch:
         """Return a branch that reaches beyond its knee, or ends below because silicon melts."""
-        return self._followed(lambda branch: np.any(np.diff(branch.values[:-1, 0]) < 0))
+        return self._branch_until(lambda branch: np.any(np.diff(branch.values[:-1, 0]) < 0))
 
     @one_blas_thread
     def solve(self, bias: ArrayLike, progress: Progress | None = None) -> list[State]:
@@ -261,23 +261,23 @@ class State:
         return np.concatenate([self.x, in_air])
 
     @cached_property
-    def _shown(self) -> list[float]:
+    def _electrical_outputs(self) -> list[float]:
         return list(self.lever.equations.observed(self.x)[:, 0].tolist())
 
     @property
     def lever_V(self) -> float:
         """Lever voltage V_l (V)."""
-        return self._shown[0]
+        return self._electrical_outputs[0]
 
     @property
     def current_mA(self) -> float:
         """Heater current I_h (mA)."""
-        return self._shown[1]
+        return self._electrical_outputs[1]
 
     @property
     def reader_V(self) -> float:
         """Reader voltage V_r (V); NaN without a reader."""
-        return self._shown[2]
+        return self._electrical_outputs[2]
 
     @property
     def bias_V(self) -> float:

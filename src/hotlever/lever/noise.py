@@ -27,7 +27,7 @@ import numpy as np
 from scipy.constants import Boltzmann
 
 from hotlever.errors import InputError
-from hotlever.lever.equations import SHOWN, LeverEquations
+from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations
 from hotlever.lever.space import Constraint
 from hotlever.lever.transport import dot
 from hotlever.materials.air import thermal_conductivity_of_air
@@ -98,7 +98,7 @@ class NoiseOptions:
 
 @dataclass(frozen=True)
 class Response:
-    """The response of one of `SHOWN` in the lever's circuit.
+    """The response of one of `ELECTRICAL_OUTPUTS` in the lever's circuit.
 
     Attributes
     ----------
@@ -126,10 +126,10 @@ class Response:
 
     @classmethod
     def of(
-        cls, equations: LeverEquations, x: Array, constraint: Constraint, shown: str
+        cls, equations: LeverEquations, x: Array, constraint: Constraint, output: str
     ) -> Response:
         """Find the response of a state; the constraint is one that selects it on its branch."""
-        circuit, number = equations.circuit, SHOWN.index(shown)
+        circuit, number = equations.circuit, ELECTRICAL_OUTPUTS.index(output)
         factors = equations.factorised(x, constraint)
         by_state = factors.solve(equations.observed_gradient(x), np.arange(1), transposed=True)
         branch = equations.along(x, factors, constraint)
@@ -145,10 +145,10 @@ class Response:
 
         def change(of_balance: Array) -> Array:
             held = np.concatenate([-of_balance[:-1], np.zeros((1, 1))])
-            moved = equations.solve_linear(x, factors, held, constraint)
-            lever_V, current_mA, _ = equations.observed_change(x, moved)[:, 0]
+            state_change = equations.solve_linear(x, factors, held, constraint)
+            lever_V, current_mA, _ = equations.observed_change(x, state_change)[:, 0]
             missing = circuit.bias(lever_V, current_mA + of_balance[-1, 0])
-            return np.asarray(moved - missing * branch)
+            return np.asarray(state_change - missing * branch)
 
         return cls(equations, x, adjoint, float(along[number]), by_power, change)
 

@@ -28,13 +28,13 @@ _BRIDGE = OBSERVABLES["bridge"].name
 _AT_ONCE = 20
 
 
-def observed(circuit: Circuit, shown: Array) -> Array:
+def observed(circuit: Circuit, outputs: Array) -> Array:
     """Return `hotlever.measurands.OBSERVABLES` in the order of that table, (observables, n).
 
     Parameters
     ----------
     circuit : Circuit
-    shown : ndarray, shape (4, n)
+    outputs : ndarray, shape (4, n)
         V_l (V), I_h (mA), V_r (V) and the rise of the tip (K).
 
     Returns
@@ -42,7 +42,7 @@ def observed(circuit: Circuit, shown: Array) -> Array:
     ndarray
         NaN of what probe or circuit do not have.
     """
-    lever_V, current_mA, reader_V, rise_K = shown
+    lever_V, current_mA, reader_V, rise_K = outputs
     values = {
         "current": current_mA,
         "reader": reader_V,
@@ -59,21 +59,21 @@ def with_bridge(circuit: Circuit, columns: Mapping[str, Array]) -> dict[str, Arr
     return {**columns, _BRIDGE: circuit.bridge_voltage(columns["lever_V"], columns["bias_V"])}
 
 
-def observed_by(circuit: Circuit, shown: Array, slopes: Array, names: Sequence[str]) -> Array:
+def observed_by(circuit: Circuit, outputs: Array, slopes: Array, names: Sequence[str]) -> Array:
     """Return how observables change with parameters at a fixed bias, (observables, n, p).
 
     Parameters
     ----------
     circuit : Circuit
-    shown : ndarray, shape (4, n)
+    outputs : ndarray, shape (4, n)
         See `observed`.
     slopes : ndarray, shape (4, n, p)
-        How it changes at this bias, per unit of each parameter; see `at_fixed_bias`.
+        How they change at this bias, per unit of each parameter; see `at_fixed_bias`.
     names : sequence of str
         The parameters, those of the circuit among them.
     """
     lever_V, current_mA, reader_V, rise_K = slopes
-    bias = circuit.bias(shown[0], shown[1])
+    bias = circuit.bias(outputs[0], outputs[1])
     of_divider = np.stack([circuit.bridge_by(name, bias) for name in names], axis=-1)
     values = {
         "current": current_mA,
@@ -85,7 +85,7 @@ def observed_by(circuit: Circuit, shown: Array, slopes: Array, names: Sequence[s
 
 
 def at_fixed_bias(
-    along: Array, circuit: Circuit, shown: Array, of_circuit: Array | float = 0.0
+    along: Array, circuit: Circuit, output_slopes: Array, of_circuit: Array | float = 0.0
 ) -> Array:
     """Return how what a lever shows changes with parameters at a fixed bias.
 
@@ -97,7 +97,7 @@ def at_fixed_bias(
     along : ndarray, shape (n, 4)
         Derivatives by u of what `Branch.curve` has.
     circuit : Circuit
-    shown : ndarray, shape (n, 4, p)
+    output_slopes : ndarray, shape (n, 4, p)
         Derivatives of V_l, I_h, V_r and the rise of the tip, see
         `by_parameter`.
     of_circuit : ndarray, shape (n, p)
@@ -108,9 +108,9 @@ def at_fixed_bias(
     ndarray, shape (4, n, p)
         V, mA, V and K per unit of the parameter.
     """
-    missing = circuit.bias(shown[:, 0], shown[:, 1]) + of_circuit
-    moved = -missing / circuit.bias(along[:, 0], along[:, 1])[:, None]
-    return np.moveaxis(shown + along[:, :, None] * moved[:, None], 1, 0)
+    missing = circuit.bias(output_slopes[:, 0], output_slopes[:, 1]) + of_circuit
+    u_by_parameter = -missing / circuit.bias(along[:, 0], along[:, 1])[:, None]
+    return np.moveaxis(output_slopes + along[:, :, None] * u_by_parameter[:, None], 1, 0)
 
 
 # --- derivatives by parameters --------------------------------------------------------------------
@@ -141,13 +141,13 @@ def by_parameter(
         tip[unknowns, :, 0] = weights[:, None]
         gradient = np.concatenate([gradient, tip], axis=-1)
     adjoint = factors.solve(gradient, np.arange(x.shape[1]), transposed=True)
-    shown = np.zeros((x.shape[1], TIP_RISE + 1, len(names)))
-    shown[:, : gradient.shape[-1]] = np.einsum("sno,snk->nok", adjoint, missing)
-    shown[:, 1] += direct[-1]
-    shown[:, TIP_RISE] += moves * of_tip
+    output_slopes = np.zeros((x.shape[1], TIP_RISE + 1, len(names)))
+    output_slopes[:, : gradient.shape[-1]] = np.einsum("sno,snk->nok", adjoint, missing)
+    output_slopes[:, 1] += direct[-1]
+    output_slopes[:, TIP_RISE] += moves * of_tip
     if equations.space.reader is None:
-        shown[:, 2] = np.nan
-    return shown
+        output_slopes[:, 2] = np.nan
+    return output_slopes
 
 
 def with_changes(
@@ -161,10 +161,10 @@ def with_changes(
     right_hand_side = -direct
     right_hand_side[-1] = -equations.tip_by_parameter(x, names)
     changes = equations.solve_linear(x, factors, right_hand_side)
-    shown = np.zeros((TIP_RISE + 1, *changes.shape[1:]))
-    shown[:TIP_RISE] = equations.observed_change(x, changes)
-    shown[1] += direct[-1]
-    return changes, shown.swapaxes(0, 1)
+    output_slopes = np.zeros((TIP_RISE + 1, *changes.shape[1:]))
+    output_slopes[:TIP_RISE] = equations.observed_change(x, changes)
+    output_slopes[1] += direct[-1]
+    return changes, output_slopes.swapaxes(0, 1)
 
 
 def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence[str]) -> Array:
@@ -172,15 +172,15 @@ def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence
 
     They are at any u of a branch, (observables, n, p); see `observed`.
     """
-    shown = np.zeros((u.size, TIP_RISE + 1, len(names)))
+    output_slopes = np.zeros((u.size, TIP_RISE + 1, len(names)))
     # without power nothing depends on the material
     powered = np.flatnonzero(branch.has_power(u))
     for start in range(0, powered.size, _AT_ONCE):
         some = powered[start : start + _AT_ONCE]
         constraint = branch.parametrisation.constraint(u[some])
         x = branch.states(u[some])
-        shown[some] = by_parameter(branch.equations, x, names, constraint=constraint)
-    slopes = at_fixed_bias(branch.curve(u, 1), circuit, shown)
+        output_slopes[some] = by_parameter(branch.equations, x, names, constraint=constraint)
+    slopes = at_fixed_bias(branch.curve(u, 1), circuit, output_slopes)
     return observed_by(circuit, branch.curve(u).T, slopes, names)
 
 
@@ -202,7 +202,7 @@ class Linearised:
         Of all its states that were solved; None if they were not kept.
     changes : ndarray, shape (size + 1, k, p)
         Derivatives of the states by the parameters; empty if they were not asked for.
-    shown : ndarray, shape (k, 4, p)
+    output_slopes : ndarray, shape (k, 4, p)
         Derivatives of V_l, I_h, V_r and the rise of the tip.
     """
 
@@ -211,7 +211,7 @@ class Linearised:
     branch: Branch
     factors: Factors | None
     changes: Array
-    shown: Array
+    output_slopes: Array
 
     @classmethod
     def of(
@@ -233,17 +233,17 @@ class Linearised:
         if derivatives is None:
             constraint = longer.parametrisation.constraint(longer.u[longer.solved])
             factors = longer.equations.factorised(x, constraint)
-            shown = by_parameter(longer.equations, x, names, factors, constraint)
+            output_slopes = by_parameter(longer.equations, x, names, factors, constraint)
         else:
             if factors is None or longer is not branch:
                 factors = derivatives.factorised(x)
-            changes, shown = with_changes(derivatives, x, names, factors)
+            changes, output_slopes = with_changes(derivatives, x, names, factors)
         if longer.starts_cold:
             # without power nothing depends on the parameters
             cold = int(np.searchsorted(longer.u, 0.0))
-            shown = np.insert(shown, cold, 0.0, axis=0)
+            output_slopes = np.insert(output_slopes, cold, 0.0, axis=0)
             changes = np.insert(changes, cold, 0.0, axis=1) if changes.size else changes
-        return cls(probe, names, longer, factors, changes, shown)
+        return cls(probe, names, longer, factors, changes, output_slopes)
 
     def states(self, probe: Probe) -> Array:
         """Return the states of a similar probe, (size + 1, k), to first order or roughly.
@@ -251,18 +251,18 @@ class Linearised:
         Roughly: with the same temperatures, and potentials in proportion to the lever voltage; the
         same states if there are other supplies.
         """
-        moved, x = probe.values(self.names) - self.probe.values(self.names), self.branch.x
+        steps, x = probe.values(self.names) - self.probe.values(self.names), self.branch.x
         if self.changes.size:
-            return np.asarray(x + self.changes @ moved)
+            return np.asarray(x + self.changes @ steps)
         if not self.branch.starts_cold:
             return x
         factor, solved = np.ones(x.shape[1]), self.branch.solved
-        factor[solved] += self.shown[solved, 0] @ moved / x[-1, solved]
+        factor[solved] += self.output_slopes[solved, 0] @ steps / x[-1, solved]
         return np.where(self.branch.equations.space.is_temperature[:, None], x, factor * x)
 
-    def shown_at(self, u: Array) -> Array:
-        """Return the derivatives of ``shown`` at any u, (n, 4, p).
+    def output_slopes_at(self, u: Array) -> Array:
+        """Return the ``output_slopes`` at any u, (n, 4, p).
 
         Between the states they are within some 1e-3 of the largest.
         """
-        return np.asarray(spline_through(self.branch.u, self.shown, 5)(u))
+        return np.asarray(spline_through(self.branch.u, self.output_slopes, 5)(u))

@@ -105,8 +105,8 @@ class Reader:
         """Return what it shows of a lever over a surface, from a place of its branch."""
         constraint = branch.parametrisation.constraint(np.array([u]))
         state = lever.polished(branch.states(np.array([u])), bias_V, constraint)
-        shown = "reader_V" if self.is_held else "lever_V"
-        response = Response.of(lever.equations, state.x, constraint, shown)
+        output = "reader_V" if self.is_held else "lever_V"
+        response = Response.of(lever.equations, state.x, constraint, output)
         voltage, current = state.lever_V, state.current_mA
         if self.is_held:
             voltage = state.reader_V
@@ -265,12 +265,12 @@ def _over_pressures(
     pressures, parts = np.atleast_1d(np.asarray(pressure_mbar, float)), []
     for number, pressure in enumerate(pressures.tolist()):
 
-        def told(done: int, total: int, before: int = number) -> None:
+        def report_progress(done: int, total: int, before: int = number) -> None:
             if progress is not None:
                 progress(before * total + done, pressures.size * total)
 
         thin = lever.with_probe(lever.probe.with_(pressure_mbar=pressure))
-        part = over_surface(thin, distance_um, bias, noise, progress=told)
+        part = over_surface(thin, distance_um, bias, noise, progress=report_progress)
         parts.append(part.expand_dims(pressure=[pressure]))
     data = xr.concat(parts, "pressure", data_vars="minimal", combine_attrs="drop_conflicts")
     notes = [f"{part.pressure.item():g} mbar: {part.notes}" for part in parts if part.notes]

@@ -39,7 +39,7 @@ _CORRECTIONS, _MET = 6, 1e-10
 _POINTS = 200
 #: An error of a set point (relative), and the share of the tip's rise by which it may move the tip
 #: without a note.
-SET_POINT_ERROR, _MOVED = 1e-3, 0.02
+SET_POINT_ERROR, _TIP_SHARE = 1e-3, 0.02
 
 
 @dataclass(frozen=True)
@@ -146,11 +146,11 @@ def hold(
     """
     if held not in HELD:
         raise unknown_name("quantity to hold", held, HELD)
-    wanted = np.atleast_1d(np.asarray(set_points, dtype=float))
-    if not wanted.size or not (np.isfinite(wanted) & (wanted > 0.0)).all():
+    targets = np.atleast_1d(np.asarray(set_points, dtype=float))
+    if not targets.size or not (np.isfinite(targets) & (targets > 0.0)).all():
         raise InputError(f"held {held}: expected finite set points above 0 {HELD[held].unit}")
     branch, failure = as_far_as_possible(lambda: lever.branch(np.inf, progress))
-    held_states = _Along(lever, branch, HELD[held]).held_at(wanted)
+    held_states = _Along(lever, branch, HELD[held]).held_at(targets)
     if failure is not None:
         held_states.data.attrs["notes"] += f"\nno hotter state was looked for: {failure}"
     return held_states
@@ -168,13 +168,13 @@ class _Along:
         self._start = float(reversals[reversals < branch.end_u].max())
         self._turns = self._within(self._level)
 
-    def held_at(self, wanted: Array) -> HeldStates:
+    def held_at(self, targets: Array) -> HeldStates:
         """Return the states at set points."""
-        roots = [self._roots(value) for value in wanted.tolist()]
-        for value, u in zip(wanted.tolist(), roots, strict=True):
+        roots = [self._roots(value) for value in targets.tolist()]
+        for value, u in zip(targets.tolist(), roots, strict=True):
             if not u.size:
                 raise self._never(value)
-        values = np.repeat(wanted, [u.size for u in roots])
+        values = np.repeat(targets, [u.size for u in roots])
         number = np.concatenate([np.arange(1, u.size + 1) for u in roots])
         u = np.concatenate(roots)
         # few at once: each has a factorised matrix
@@ -214,12 +214,12 @@ class _Along:
             off = np.abs(missed / whole)
             if off.max() < _MET:
                 return u, x
-            moved = self._moved(u, missed, values)
-            x, u = x + (branch.states(moved) - branch.states(u)), moved
+            corrected_u = self._corrected_u(u, missed, values)
+            x, u = x + (branch.states(corrected_u) - branch.states(u)), corrected_u
         # the curve is a little higher at its top than the states are
         raise self._never(float(values[off.argmax()]))
 
-    def _moved(self, u: Array, missed: Array, values: Array) -> Array:
+    def _corrected_u(self, u: Array, missed: Array, values: Array) -> Array:
         """Return the roots of the parabolas with the slope and the bend of the curve, from some u.
 
         Each is on its side of where the quantity turns, or there if there is none.
@@ -265,10 +265,10 @@ class _Along:
     def _notes(self, values: Array, number: Array, slope: Array, tip_K: Array) -> list[str]:
         """Say where a set point tells little of the tip, and why."""
         at, tips = self._extremes()
-        moved = SET_POINT_ERROR * values / np.maximum(np.abs(slope), 1e-300)
+        tip_errors = SET_POINT_ERROR * values / np.maximum(np.abs(slope), 1e-300)
         rise = tip_K - self._branch.base_temperature_K
         unit, notes = self._quantity.unit, []
-        for k in np.flatnonzero(moved > _MOVED * rise).tolist():
+        for k in np.flatnonzero(tip_errors > _TIP_SHARE * rise).tolist():
             near = int(np.abs(tips - tip_K[k]).argmin())
             why = (
                 "the swept supply hardly heats it"
@@ -277,6 +277,6 @@ class _Along:
             )
             notes.append(
                 f"{values[k]:.5g} {unit} tells little of the tip in state {number[k]} "
-                f"({tip_K[k]:.0f} K): {why}; {SET_POINT_ERROR:.1%} of it is {moved[k]:.2g} K"
+                f"({tip_K[k]:.0f} K): {why}; {SET_POINT_ERROR:.1%} of it is {tip_errors[k]:.2g} K"
             )
         return notes

@@ -191,11 +191,11 @@ def _along_rim(space: FullSpace, movement: Movement) -> tuple[Array, Array]:
     mesh, points = space.mesh.elements, space.rim.facet_points
     vertices = mesh.facets[:, points.facets]
     start, end = mesh.p[:, vertices].swapaxes(0, 1)
-    moved, rate = movement.velocity[:, vertices].swapaxes(0, 1)
-    side, stretch = end - start, rate - moved
+    start_velocity, end_velocity = movement.velocity[:, vertices].swapaxes(0, 1)
+    side, stretch = end - start, end_velocity - start_velocity
     square = (side**2).sum(axis=0)
     share = ((points.positions - start) * side).sum(axis=0) / square
-    return (side * stretch).sum(axis=0) / square, moved + share * stretch
+    return (side * stretch).sum(axis=0) / square, start_velocity + share * stretch
 
 
 def _thickening(layout: Layout, movement: Movement, at: Array, velocity: Array) -> Array:
@@ -204,8 +204,8 @@ def _thickening(layout: Layout, movement: Movement, at: Array, velocity: Array) 
     def thickness(way: float) -> float | Array:
         there = tuple((layout.tip + way * movement.tip).tolist())
         thick = layout.thickness_um + way * movement.thickness
-        moved = replace(layout, tip=there, thickness_um=thick, cone=movement.cone(way))
-        return thickness_at(moved, at + way * velocity)
+        displaced_layout = replace(layout, tip=there, thickness_um=thick, cone=movement.cone(way))
+        return thickness_at(displaced_layout, at + way * velocity)
 
     thicker = (thickness(_SMALL_UM) - thickness(-_SMALL_UM)) / (2 * _SMALL_UM)
     return np.broadcast_to(thicker, (at.shape[1], 1))
@@ -216,14 +216,16 @@ def _from_borders(
 ) -> Array:
     """Return how the distances of a film's points from the borders of their regions change."""
     changes = np.zeros_like(film.distances)
-    at, moved = space.elements.positions[:, film.points], velocity[:, film.points]
+    at, film_velocity = space.elements.positions[:, film.points], velocity[:, film.points]
     step = movement.step
     ends = ((movement.before, -step), (movement.after, step))
     for number in np.unique(region[film.points]) if film.distances.size else ():
         here = region[film.points] == number
         distances = film.distances[:, here, 0]
         low, high = (
-            _as_ordered(layout.regions[number].taper, at[:, here] + way * moved[:, here], distances)
+            _as_ordered(
+                layout.regions[number].taper, at[:, here] + way * film_velocity[:, here], distances
+            )
             for layout, way in ends
         )
         changes[: len(low), here, 0] = movement.rate(low, high)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.errors import NewtonError
-from hotlever.lever.equations import SHOWN, LeverEquations, steps_of
+from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations, steps_of
 from hotlever.lever.newton import NewtonOptions, NewtonResult, find_roots
 from hotlever.lever.space import TIP, Constraint, Factors, Space
 from hotlever.piecewise import Piecewise, smooth_curve
@@ -161,8 +161,8 @@ def state_at_bias(
         If the guess is too far from a solution.
     """
 
-    def bias_of(shown: Array) -> Array:
-        return np.asarray(circuit.bias(shown[0], shown[1]))
+    def bias_of(outputs: Array) -> Array:
+        return np.asarray(circuit.bias(outputs[0], outputs[1]))
 
     options = NewtonOptions()
     x, factors, along = guess, None, None
@@ -249,7 +249,7 @@ class SolvedStates:
     def mirrored(self) -> Self:
         """The same with all potentials and currents reversed, followed the other way."""
         sign = np.where(self.equations.space.is_temperature, 1.0, -1.0)[:, None]
-        of_values = np.append(-np.ones(len(SHOWN)), 1.0)
+        of_values = np.append(-np.ones(len(ELECTRICAL_OUTPUTS)), 1.0)
         return type(self)(
             equations=self.equations.mirrored,
             u=-self.u[::-1],

@@ -46,7 +46,7 @@ def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
         flow = -slopes[:, 0] @ potential[elements.dofs[element]]
         return np.asarray(flow / np.linalg.norm(flow))
 
-    def followed(at: Array, sign: float) -> Iterator[Array]:
+    def streamline(at: Array, sign: float) -> Iterator[Array]:
         size, steps = sign * longest, 0
         while abs(size) > longest / 2**_HALVINGS and steps < _MOST_STEPS:
             try:
@@ -65,6 +65,6 @@ def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
     except InputError:
         positions = elements.positions.T[np.repeat(space.conducting, elements.per_element)]
         start = positions[np.argmin(np.linalg.norm(positions - start, axis=1))]
-    points = np.array([*[*followed(start, -1.0)][::-1], start, *followed(start, 1.0)])
+    points = np.array([*[*streamline(start, -1.0)][::-1], start, *streamline(start, 1.0)])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return points, np.concatenate([[0.0], np.cumsum(lengths)])

@@ -84,10 +84,10 @@ def test_a_loop_that_is_not_stable_ends_between_the_limits_of_the_bias(states, l
     time, off = history.time.values, np.abs(history.resistance_ohm.values - 3010.0)
     assert history.bias_V.values.max() == pytest.approx(controller.limit_V, rel=1e-6)
     assert off[time > 5.0].max() > 5.0 * off[time < 1.0].max()
-    assert kept(history) < 1e-6
+    assert imbalance(history) < 1e-6
 
 
-def kept(history):
+def imbalance(history):
     """Energy that is unaccounted for, over what was supplied."""
     rise = history.stored_nJ + history.air_stored_nJ
     missing = history.supplied_nJ - (rise - rise[0]) - history.lost_nJ
@@ -106,7 +106,7 @@ def test_a_step_ends_at_the_state_that_is_held(states, lever):
     assert history.tip_K.values[-1] == pytest.approx(end.tip_K, abs=0.05)
     assert history.tip_K.values.max() < end.tip_K + 5.0
     assert history.set_ohm.values.tolist() == [3000.0] * history.time.size
-    assert kept(history) < 1e-6
+    assert imbalance(history) < 1e-6
 
 
 def test_a_lever_at_its_set_point_stays_there(states):

@@ -26,8 +26,10 @@ def random_probe(rng: np.random.Generator) -> Probe:
         values = probe.values(names) * np.exp(rng.normal(0.0, 0.15, len(names)))
         circuit = {"series_resistance_ohm": float(rng.choice([0.0, 300.0, 5600.0, 2e4]))}
         try:
-            moved = probe.replace(dict(zip(names, values.tolist(), strict=True)))
-            return moved.with_(**circuit, base_temperature_K=float(rng.uniform(250.0, 400.0)))
+            perturbed_probe = probe.replace(dict(zip(names, values.tolist(), strict=True)))
+            return perturbed_probe.with_(
+                **circuit, base_temperature_K=float(rng.uniform(250.0, 400.0))
+            )
         except InputError:
             continue  # its parts would overlap
 
@@ -36,7 +38,7 @@ def random_waveform(rng: np.random.Generator) -> tuple[Waveform, float]:
     """A wave form from nothing to far too much, and how long it is followed (µs)."""
     bias = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3.0, 2.0))
     length = float(10.0 ** rng.uniform(-3.0, 3.0))
-    made = [
+    choices = [
         lambda: (step(bias), length),
         lambda: (pulse(bias, length), 10.0 * length),
         lambda: (pulse(bias, length, 3.0 * length, 4), 12.0 * length),
@@ -44,7 +46,7 @@ def random_waveform(rng: np.random.Generator) -> tuple[Waveform, float]:
         lambda: (sine(0.0, bias, 1e6 / length), 2.0 * length),
         lambda: (switched_off(min(abs(bias), 1.0)), length),
     ]
-    return made[rng.integers(len(made))]()
+    return choices[rng.integers(len(choices))]()
 
 
 @pytest.mark.parametrize(
@@ -54,20 +56,20 @@ def random_waveform(rng: np.random.Generator) -> tuple[Waveform, float]:
 def test_a_history_ends_or_says_when_it_stopped(seed):
     rng = np.random.default_rng(seed)
     probe, (waveform, until) = random_probe(rng), random_waveform(rng)
-    said = ""
+    message = ""
     try:
         data = simulate(Lever(probe, COARSE), waveform, until)
         reached = until
     except HistoryEndError as error:
-        data, reached, said = error.partial, error.time_reached, str(error)
-    if said:
+        data, reached, message = error.partial, error.time_reached, str(error)
+    if message:
         assert 0.0 <= reached < until
-        assert f"after {reached:.6g} µs" in said or f"up to {reached:.6g} µs" in said
+        assert f"after {reached:.6g} µs" in message or f"up to {reached:.6g} µs" in message
     for name in ("tip_K", "current_mA", "lever_V", "stored_nJ", "lost_nJ"):
         assert np.isfinite(data[name]).all()
     if data.sizes["time"]:
         assert data.time.values[-1] == pytest.approx(reached, rel=1e-6, abs=1e-9)
         assert data.max_K.max() < MELTING_POINT + 1.0
-        kept = data.stored_nJ - data.stored_nJ[0] + data.lost_nJ
+        stored_and_lost = data.stored_nJ - data.stored_nJ[0] + data.lost_nJ
         largest = float(np.abs(data.supplied_nJ).max() + np.abs(data.stored_nJ).max())
-        assert np.abs(data.supplied_nJ - kept).max() <= 1e-4 * largest + 1e-12
+        assert np.abs(data.supplied_nJ - stored_and_lost).max() <= 1e-4 * largest + 1e-12

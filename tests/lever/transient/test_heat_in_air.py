@@ -54,7 +54,7 @@ class AllPanels:
             equations.storage_change(many, unit),
         )
         gradient = equations.observed_gradient(x)[:, 0]
-        self.tip, self.shown = space.tip_rise(unit), gradient[:, :2]
+        self.tip, self.output_gradient = space.tip_rise(unit), gradient[:, :2]
         surroundings, layout = lever.probe.surroundings, lever.probe.layout()
         self.air = PanelledAir(layout, surroundings, 293.0, 0.5)
         self.at_sites = csr_matrix(space.rise_at(self.air.surface.sites, unit))
@@ -67,13 +67,13 @@ class AllPanels:
         """The change of the tip's temperature by that of the bias (K/V)."""
         rates = np.asarray(rates, dtype=complex)
         q = np.sqrt(np.append(1e-20, rates / self.alpha))
-        still, *moved = self.air.admittances(q, np.eye(self.at_sites.shape[0]))
+        still, *admittances = self.air.admittances(q, np.eye(self.at_sites.shape[0]))
         found = []
-        for rate, one in zip(rates, moved, strict=True):
+        for rate, one in zip(rates, admittances, strict=True):
             more = self.at_sites.T @ (self.at_sites.T @ (one - still)).T
             more = more - rate / self.alpha * self.inside
             matrix = self.rest + rate * self.moving + self.kappa * more
-            matrix[-1] = circuit.bias(*self.shown.T)
+            matrix[-1] = circuit.bias(*self.output_gradient.T)
             right = np.zeros(len(matrix))
             right[-1] = 1.0
             found.append(self.tip @ np.linalg.solve(matrix, right))

@@ -18,8 +18,8 @@ from of_materials import metal_film_probe, metal_film_sections
 def imbalance(data: xr.Dataset) -> float:
     """Heat that is neither stored nor lost, over all that was supplied."""
     stored = data.stored_nJ + data.air_stored_nJ
-    kept = stored - float(stored[0]) + data.lost_nJ
-    return float(np.abs(data.supplied_nJ - kept).max() / np.abs(data.supplied_nJ).max())
+    stored_and_lost = stored - float(stored[0]) + data.lost_nJ
+    return float(np.abs(data.supplied_nJ - stored_and_lost).max() / np.abs(data.supplied_nJ).max())
 
 
 @pytest.fixture(scope="module")

@@ -39,8 +39,8 @@ def test_a_small_change_decays_or_grows_as_its_mode_says(coarse, bias, source, r
     constants, changes = slowest_modes(state, source)
     assert (constants[0] < 0) == runs_away
     assert (constants[1:] > 0).all()
-    moved = changes[:, [0]] / coarse.space.tip_rise(changes[:, 0])
-    start = state.x + 1e-3 * moved
+    mode = changes[:, [0]] / coarse.space.tip_rise(changes[:, 0])
+    start = state.x + 1e-3 * mode
     circuit = coarse.circuit if source == "bias" else Circuit(series_resistance_ohm=0.0)
     held = bias if source == "bias" else state.lever_V
     problem = TransientProblem(coarse.equations, circuit, lambda t: held)

@@ -47,14 +47,14 @@ def test_they_have_taylor_order_two(coarse, in_air, medium, names):
     slopes, value = base.sensitivity.values, lever.probe.values(names)
     unit = np.where(value == 0.0, 1.0, value)
     share = np.minimum(MOVED_K / np.abs(slopes[2] * unit).max(axis=0), MOST)
-    moved = share * unit * np.random.default_rng(0).choice([-1.0, 1.0], len(names))
+    perturbation = share * unit * np.random.default_rng(0).choice([-1.0, 1.0], len(names))
     rest = []
     for h in (1.0, 0.5):
-        changes = dict(zip(names, (value + h * moved).tolist(), strict=True))
+        changes = dict(zip(names, (value + h * perturbation).tolist(), strict=True))
         other = with_sensitivities(
             lever.with_probe(lever.probe.replace(changes)), wave, stops, names[-1:]
         )
-        missed = values_of(other) - values_of(base) - h * (slopes @ moved)
+        missed = values_of(other) - values_of(base) - h * (slopes @ perturbation)
         rest.append(np.abs(missed).max(axis=1))
     np.testing.assert_allclose(np.log2(rest[0] / rest[1]), 2.0, atol=0.1)
 
@@ -80,7 +80,7 @@ def test_a_larger_heat_capacity_only_stretches_the_time(coarse):
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("options", "message"),
     [
         ({"names": ["heat_capacity_scal"]}, "did you mean 'heat_capacity_scale'"),
         ({"names": ["heater_width_um"]}, "no derivatives in time by heater_width_um"),
@@ -91,10 +91,10 @@ def test_a_larger_heat_capacity_only_stretches_the_time(coarse):
     ],
     ids=str,
 )
-def test_what_has_none_is_refused(coarse, given, said):
-    asked = {"waveform": step(4.0), "at": [1.0], "names": ["n_d"], **given}
-    with pytest.raises(InputError, match=said):
-        with_sensitivities(coarse, **asked)
+def test_what_has_none_is_refused(coarse, options, message):
+    arguments = {"waveform": step(4.0), "at": [1.0], "names": ["n_d"], **options}
+    with pytest.raises(InputError, match=message):
+        with_sensitivities(coarse, **arguments)
 
 
 def test_where_silicon_melts_there_are_none(coarse):

@@ -38,9 +38,9 @@ def test_a_strong_drive_is_as_followed_in_time(coarse):
     history, _ = cyclic_steady_state(
         coarse, sine(3.0, 2.0, 1e6 / period), period, tolerance_K=1e-3, at=times
     )
-    followed = 2.0 * np.abs(np.fft.rfft(history.lever_V.values)) / count
+    amplitudes = 2.0 * np.abs(np.fft.rfft(history.lever_V.values)) / count
     for place, name in enumerate(("first", "second", "third"), start=1):
-        assert found[f"{name}_harmonic_V"].item() == pytest.approx(followed[place], rel=0.02)
+        assert found[f"{name}_harmonic_V"].item() == pytest.approx(amplitudes[place], rel=0.02)
     assert found.mean_tip_K.item() == pytest.approx(history.tip_K.mean().item(), abs=0.1)
 
 

@@ -109,7 +109,7 @@ class ReducedLever:
 
     def _start(self, probe: Probe, reach: Reach) -> tuple[Array, Array]:
         """Return u of the states that suffice, and guesses of them."""
-        count = reach.count(self.surface.shown(probe))
+        count = reach.count(self.surface.electrical_outputs(probe))
         return self.surface.u[1:count], self.surface.states(probe)[:, 1:count]
 
     @one_blas_thread

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.lever.equations import SHOWN
+from hotlever.lever.equations import ELECTRICAL_OUTPUTS
 from hotlever.probe import Probe
 from hotlever.probe.parameters import of_materials, usual_parameters
 from hotlever.probe.priors import default_priors
@@ -186,11 +186,11 @@ class ResponseSurface:
 
     def states(self, probe: Probe) -> Array:
         """Return the states of a probe at the nodes, (size + 1, k), to some ten kelvin."""
-        return self._at(probe)[:, : -len(SHOWN)].T
+        return self._at(probe)[:, : -len(ELECTRICAL_OUTPUTS)].T
 
-    def shown(self, probe: Probe) -> Array:
+    def electrical_outputs(self, probe: Probe) -> Array:
         """Return V_l (V), I_h (mA) and V_r (V) of a probe at the nodes, shape (k, 3)."""
-        return self._at(probe)[:, -len(SHOWN) :]
+        return self._at(probe)[:, -len(ELECTRICAL_OUTPUTS) :]
 
     def _at(self, probe: Probe) -> Array:
         values = np.tensordot(_terms(self.domain.shares(probe))[0], self.coefficients, axes=1)

@@ -48,8 +48,8 @@ def proper_orthogonal_modes(snapshots: Array, most: int | None = None, least: fl
     """
     # the eigenvectors of the Gram matrix: far fewer snapshots than values
     values, combinations = np.linalg.eigh(snapshots @ snapshots.T)
-    kept = np.flatnonzero(values > least**2 * values[-1])[::-1][:most]
-    modes = np.linalg.qr((combinations[:, kept].T @ snapshots).T)[0].T
+    retained_indices = np.flatnonzero(values > least**2 * values[-1])[::-1][:most]
+    modes = np.linalg.qr((combinations[:, retained_indices].T @ snapshots).T)[0].T
     return np.asarray(modes / np.abs(modes).max(axis=1, keepdims=True))
 
 
@@ -81,8 +81,8 @@ def empirical_cubature(
         signs = rng.choice((-1.0, 1.0), len(some))
         np.add.at(sketch, rows, signs[:, None] * some * weights)
     values, vectors = np.linalg.eigh(sketch @ sketch.T)
-    kept = values > (tolerance**2) * values[-1]
-    directions = (vectors[:, kept] / np.sqrt(values[kept])).T @ sketch
+    mask = values > (tolerance**2) * values[-1]
+    directions = (vectors[:, mask] / np.sqrt(values[mask])).T @ sketch
     shares, _ = nnls(directions, directions.sum(axis=1), maxiter=20 * len(directions))
     points = np.flatnonzero(shares)
     return points, shares[points] * weights[points]

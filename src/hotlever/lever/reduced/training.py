@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from hotlever.cache import cache_file, store_arrays, stored
-from hotlever.lever.equations import SHOWN
+from hotlever.lever.equations import ELECTRICAL_OUTPUTS
 from hotlever.lever.lever import Lever
 from hotlever.lever.observables import Linearised
 from hotlever.lever.reduced.lever import ReducedLever
@@ -202,8 +202,8 @@ def _surface(
         here = np.flatnonzero(np.isin(branch.u.round(9), common.round(9)))
         states, changes = space.coordinates(branch.x), space.coordinates(linearised.changes)
         values.append(np.vstack([states, branch.values[:, :3].T])[:, here].T)
-        by_shown = linearised.shown[:, : len(SHOWN)].swapaxes(0, 1)
-        together = np.concatenate([changes, by_shown])
+        electrical_slopes = linearised.output_slopes[:, : len(ELECTRICAL_OUTPUTS)].swapaxes(0, 1)
+        together = np.concatenate([changes, electrical_slopes])
         slopes.append(together[:, here][..., columns].swapaxes(0, 1))
     return ResponseSurface.fitted(
         domain,
@@ -211,7 +211,7 @@ def _surface(
         [linearised.probe for linearised in training],
         np.nan_to_num(np.stack(values)),  # a lever without reader shows no V_r
         np.nan_to_num(np.stack(slopes)),
-        np.append(~space.is_temperature, [True] * len(SHOWN)),
+        np.append(~space.is_temperature, [True] * len(ELECTRICAL_OUTPUTS)),
     )
 
 

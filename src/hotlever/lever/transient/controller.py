@@ -118,7 +118,7 @@ class Controller(Waveform):
         """See `Waveform`."""
         return ControlledProblem(equations, circuit, self)
 
-    def shown(self, circuit: Circuit, columns: Mapping[str, Array], driven: Array) -> Any:
+    def history_columns(self, circuit: Circuit, columns: Mapping[str, Array], driven: Array) -> Any:
         """See `Waveform`: the bias, the resistance and its set point (Ω)."""
         lever_V, current = columns["lever_V"], columns["current_mA"]
         return {
@@ -141,8 +141,8 @@ class Controller(Waveform):
 
     def output(self, measured_kohm: float, integrated_V: float) -> tuple[float, float]:
         """Return the bias (V), and what it would be without limits."""
-        wanted = self.proportional * (self.set_ohm / 1000.0 - measured_kohm) + integrated_V
-        return min(max(wanted, _LOWEST * self.limit_V), self.limit_V), wanted
+        unlimited_bias = self.proportional * (self.set_ohm / 1000.0 - measured_kohm) + integrated_V
+        return min(max(unlimited_bias, _LOWEST * self.limit_V), self.limit_V), unlimited_bias
 
 
 class ControlledProblem:
@@ -176,19 +176,19 @@ class ControlledProblem:
 
     def storage_change(self, x: Array, changes: Array) -> Array:
         """Return how `storage` changes with the unknowns (rows, 1, k), to first order."""
-        moved = self._lever.storage_change(x[:-_OWN], changes[:-_OWN])
-        return np.concatenate([moved, changes[-_OWN:]])
+        stored_change = self._lever.storage_change(x[:-_OWN], changes[:-_OWN])
+        return np.concatenate([stored_change, changes[-_OWN:]])
 
     def residual(self, t: float, x: Array) -> Array:
         """Return the residuals of the lever, the filter and the integral."""
         law, (measured, integrated) = self._controller, x[-_OWN:, 0].tolist()
-        bias, wanted = law.output(measured, integrated)
+        bias, unlimited_bias = law.output(measured, integrated)
         lever_V, current = self._equations.observed(self._lever.parts(x[:-_OWN])[0])[:2, 0]
         rest = self._lever.residual(t, x[:-_OWN])
         rest[self._circuit_row] -= bias
         lag = (measured - lever_V / current) / law.filter_us
         rise = law.integral_per_us * (law.set_ohm / 1000.0 - measured)
-        rise += (bias - wanted) / law.tracking_us
+        rise += (bias - unlimited_bias) / law.tracking_us
         return np.concatenate([rest, [[lag], [-rise]]])
 
     def factorised(self, x: Array, rate: float) -> LinearSolver:
@@ -197,15 +197,15 @@ class ControlledProblem:
         lever, _ = self._lever.parts(x[:-_OWN])
         lever_V, current = self._equations.observed(lever)[:2, 0]
         by_V, by_mA = (self._equations.observed_gradient(lever)[:, 0, k] for k in (0, 1))
-        bias, wanted = law.output(*own)
-        by_wanted = np.array([-law.proportional, 1.0])
-        by_bias = by_wanted if bias == wanted else np.zeros(_OWN)
+        bias, unlimited_bias = law.output(*own)
+        by_unlimited_bias = np.array([-law.proportional, 1.0])
+        by_bias = by_unlimited_bias if bias == unlimited_bias else np.zeros(_OWN)
         resistance = np.zeros((1, len(x) - _OWN))
         resistance[0, : len(lever)] = (by_V - lever_V / current * by_mA) / current
         corner = rate * np.eye(_OWN)
         corner[0, 0] += 1.0 / law.filter_us
         corner[1] += [law.integral_per_us, 0.0]
-        corner[1] -= (by_bias - by_wanted) / law.tracking_us
+        corner[1] -= (by_bias - by_unlimited_bias) / law.tracking_us
         drive = np.zeros((len(x) - _OWN, 1))
         drive[self._circuit_row] = 1.0
         factors = self._lever.factorised(x[:-_OWN], rate)
@@ -243,9 +243,9 @@ class _Bordered:
     ) -> None:
         self._factors, self._measured = factors, measured
         # what the lever does with a bias of 1 V
-        self._moved = factors.solve(drive) * by_bias
+        self._lever_response = factors.solve(drive) * by_bias
         corner = corner.copy()
-        corner[:1] += measured @ self._moved
+        corner[:1] += measured @ self._lever_response
         self._schur = corner
 
     def solve(self, right_hand_side: Array) -> Array:
@@ -255,5 +255,5 @@ class _Bordered:
         below = flat[-_OWN:].copy()
         below[:1] -= self._measured @ above
         own = np.linalg.solve(self._schur, below)
-        solution = np.concatenate([above + self._moved @ own, own])
+        solution = np.concatenate([above + self._lever_response @ own, own])
         return np.asarray(solution.reshape(right_hand_side.shape))

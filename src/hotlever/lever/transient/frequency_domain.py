@@ -231,9 +231,9 @@ def harmonics(
     for of, volts in seen.items():
         for number, name in enumerate(HARMONICS):
             columns |= _polar(f"{name}_{of}harmonic", "V", volts[:, number])
-    shown: dict[str, Any] = {"bias_V": offset_V, "amplitude_V": amplitude_V}
-    shown |= probe_attributes(lever.probe)
-    return labelled(columns, "frequency", {"frequency": frequency}, **shown)
+    attributes: dict[str, Any] = {"bias_V": offset_V, "amplitude_V": amplitude_V}
+    attributes |= probe_attributes(lever.probe)
+    return labelled(columns, "frequency", {"frequency": frequency}, **attributes)
 
 
 class HarmonicBalance:

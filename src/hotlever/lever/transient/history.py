@@ -88,8 +88,8 @@ def time_steps(
 def _expected_rise(lever: Lever, bias: float) -> float:
     """Return the rise of the tip (K) at a bias (V), were the lever not to change with it."""
     first, _ = lever.equations.cold()
-    shown = lever.equations.observed_change(np.zeros_like(first), first)[:, 0]
-    return float((bias / lever.circuit.bias(shown[0], shown[1])) ** 2)
+    output_slopes = lever.equations.observed_change(np.zeros_like(first), first)[:, 0]
+    return float((bias / lever.circuit.bias(output_slopes[0], output_slopes[1])) ** 2)
 
 
 def initial_state(lever: Lever, waveform: Waveform) -> State:
@@ -156,16 +156,16 @@ def integrate(
         If silicon melts or a step fails; ``partial`` holds the dataset up to there, and
         ``time_reached`` is when (µs).
     """
-    asked = None if at is None else checked_times(at)
+    report_times = None if at is None else checked_times(at)
     if until is None:
-        until = waveform.usual_end if asked is None else float(asked[-1])
-    if not 0 < until < np.inf or (asked is not None and asked[-1] > until):
+        until = waveform.usual_end if report_times is None else float(report_times[-1])
+    if not 0 < until < np.inf or (report_times is not None and report_times[-1] > until):
         raise InputError(
             f"found an end at {until:g} µs, expected a finite one after all times asked for"
         )
     if not 1e-4 <= tolerance_K <= 10.0:
         raise InputError(f"found a tolerance of {tolerance_K:g} K, expected 1e-4 to 10 K")
-    recorder, reached, failure = _Recorder(lever, asked, per_step, callback), 0.0, ""
+    recorder, reached, failure = _Recorder(lever, report_times, per_step, callback), 0.0, ""
     try:
         for piece, step in time_steps(lever, waveform, until, tolerance_K, start):
             end = recorder.add(piece, step)
@@ -187,9 +187,14 @@ class _Recorder:
     """Rows of a history: at the times asked for, or where the solver stepped."""
 
     def __init__(
-        self, lever: Lever, asked: Array | None, per_step: int, callback: Callback | None
+        self, lever: Lever, report_times: Array | None, per_step: int, callback: Callback | None
     ) -> None:
-        self._lever, self._asked, self._per_step, self._callback = lever, asked, per_step, callback
+        self._lever, self._report_times, self._per_step, self._callback = (
+            lever,
+            report_times,
+            per_step,
+            callback,
+        )
         self.monitors = MonitorMap(lever.probe, lever.equations)
         base = lever.equations.base_temperature_K
         self._zero = np.array([0.0, 0.0, 0.0, base, base])[:, None]
@@ -202,14 +207,16 @@ class _Recorder:
     def add(self, piece: Piece, step: Step) -> float | None:
         """Add the rows of a step; return when silicon melts, if it does."""
         values, slopes = self._read(step)
-        if not self.time and (self._asked is None or self._asked[0] == 0.0):
+        if not self.time and (self._report_times is None or self._report_times[0] == 0.0):
             self._add(piece, step, values, slopes, 0.0)
         melts = _melts(step, values, slopes, self._lever.equations.laws.limit[0])
         end = step.end if melts is None else melts
-        if self._asked is None:
+        if self._report_times is None:
             inside = np.linspace(step.start, end, self._per_step + 1)[1:]
         else:
-            inside = self._asked[(self._asked > step.start) & (self._asked <= end)]
+            inside = self._report_times[
+                (self._report_times > step.start) & (self._report_times <= end)
+            ]
         for t in inside.tolist():
             self._add(piece, step, values, slopes, t)
         return melts
@@ -229,7 +236,7 @@ class _Recorder:
 
         Behind what is `_REPORTED` come the rows of the monitors.
         """
-        shown, flows, held, at_ends = np.split(step.monitored, _PARTS_MONITORED)
+        outputs, flows, held, at_ends = np.split(step.monitored, _PARTS_MONITORED)
         moving, _, held_by, at_ends_by = np.split(step.monitored_slopes, _PARTS_MONITORED)
         if self._at_ends is None:
             self._at_ends = float(at_ends[0, 0])
@@ -242,7 +249,7 @@ class _Recorder:
         ends, rises, rises_by = np.arange(2), space.rises(x), space.rises(slopes)
         hottest = rises.argmax(axis=0)
         highest, highest_by = rises[None, hottest, ends], rises_by[None, hottest, ends]
-        values = np.concatenate([shown, highest, added[:1], held, left, self.monitors.values(x)])
+        values = np.concatenate([outputs, highest, added[:1], held, left, self.monitors.values(x)])
         values[: len(self._zero)] += self._zero
         by_time = [moving, highest_by, flows[:1], held_by, left_by, self.monitors.changes(slopes)]
         return values, np.concatenate(by_time)
@@ -287,7 +294,7 @@ def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Datase
     columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
     # the reader, where there is none, is NaN throughout
     variables = {"time_us": np.array(recorder.time)}
-    variables |= waveform.shown(lever.circuit, columns, np.array(recorder.bias))
+    variables |= waveform.history_columns(lever.circuit, columns, np.array(recorder.bias))
     more = ("max_K", "supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
     variables |= monitors.columns(values[:, count:])

@@ -94,8 +94,8 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
         for _ in range(_MOST_ROUNDS):
             rate, last = 1.0 / abs(constants[mode]), constants[mode]
             bound = air.bound(rate) if last > 0.0 else air.taken_up(rate) / rate
-            times, moved = _modes(equations, x, factors, count, air.coordinates, bound)
-            constants[mode], changes[:, mode] = times[mode], moved[:, mode]
+            times, modes = _modes(equations, x, factors, count, air.coordinates, bound)
+            constants[mode], changes[:, mode] = times[mode], modes[:, mode]
             if abs(constants[mode] / last - 1.0) < _STEADY:
                 break
     return constants, changes

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.air.stores import HeatInAir
-from hotlever.lever.equations import SHOWN, LeverEquations, heat_held, heat_left
+from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations, heat_held, heat_left
 from hotlever.lever.laws import GAS
 from hotlever.lever.space import LEVER, Factors
 from hotlever.probe import Circuit
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: as it does at rest (mW); the heat in the lever and in the air (nJ), and how much of both is
 #: tested at the leg ends.
 MONITORED = (
-    *(*SHOWN, "tip_rise_K"),
+    *(*ELECTRICAL_OUTPUTS, "tip_rise_K"),
     *("power_mW", "left_mW", "stored_nJ", "air_stored_nJ", "at_ends_nJ"),
 )
 
@@ -57,14 +57,14 @@ class InCircuit:
         last = np.zeros_like(bias_by)
         last[-1] = 1.0
         self._row = bias_by - last
-        self._moved = factors.solve(last, _ONE)
+        self._unit_response = factors.solve(last, _ONE)
 
     def solve(self, right_hand_side: Array) -> Array:
         """Solve for right-hand sides (size + 1, 1) or (size + 1, 1, k)."""
         solution = self._factors.solve(right_hand_side, _ONE)
         columns = solution.reshape(len(solution), -1)
-        share = (self._row.T @ columns) / (1.0 + self._row.T @ self._moved)
-        return np.asarray((columns - self._moved * share).reshape(solution.shape))
+        share = (self._row.T @ columns) / (1.0 + self._row.T @ self._unit_response)
+        return np.asarray((columns - self._unit_response * share).reshape(solution.shape))
 
 
 class WithStores:
@@ -134,16 +134,16 @@ class TransientProblem:
 
     def storage_change(self, x: Array, changes: Array) -> Array:
         """Return how `storage` changes with the unknowns (rows, 1, k), to first order."""
-        (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
-        stored = self.equations.storage_change(lever, moved)
-        held = self._air.tested(self._air.held(moved[:, 0], in_air[:, 0]))
+        (lever, _), (lever_changes, in_air) = self.parts(x), self.parts(changes)
+        stored = self.equations.storage_change(lever, lever_changes)
+        held = self._air.tested(self._air.held(lever_changes[:, 0], in_air[:, 0]))
         return np.concatenate([stored + held[:, None], in_air])
 
     def residual_change(self, x: Array, changes: Array) -> Array:
         """Return how `residual` changes with the unknowns (rows, 1, k), to first order."""
-        (lever, _), (moved, in_air) = self.parts(x), self.parts(changes)
-        residual = self.equations.balance_change_in(self._circuit, lever, moved)
-        lag = self._air.rates * (in_air[:, 0] - self._air.follows(moved[:, 0]))
+        (lever, _), (lever_changes, in_air) = self.parts(x), self.parts(changes)
+        residual = self.equations.balance_change_in(self._circuit, lever, lever_changes)
+        lag = self._air.rates * (in_air[:, 0] - self._air.follows(lever_changes[:, 0]))
         return np.concatenate([residual, lag[:, None]])
 
     def by_parameter(self, x: Array, names: Sequence[str]) -> tuple[Array, Array]:
@@ -182,6 +182,6 @@ class TransientProblem:
         lever, in_air = self.parts(x)
         held, at_ends = heat_held(equations, lever)
         held_by_air, more = self._air.heat(self._air.held(lever, in_air))
-        shown = *equations.observed(lever), space.tip_rise(lever)
+        outputs = *equations.observed(lever), space.tip_rise(lever)
         flows = equations.power(lever), heat_left(equations, lever)
-        return np.stack([*shown, *flows, held, held_by_air, at_ends + more])
+        return np.stack([*outputs, *flows, held, held_by_air, at_ends + more])

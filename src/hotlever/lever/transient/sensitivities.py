@@ -107,15 +107,15 @@ def with_sensitivities(
         first = along.time is None
         along.add(piece, step)
         if first and stops[0] == 0.0:
-            rows.append((piece.bias(0.0), along.shown(step.x[:, :1]), along.slopes_at_start))
+            rows.append((piece.bias(0.0), along.observables(step.x[:, :1]), along.slopes_at_start))
         limit_K, end = lever.equations.laws.limit
         x = step.x[:, 1:]
         if lever.circuit.base_temperature_K + along.hottest(x) > limit_K:
             raise HistoryEndError(f"{end} before {step.end:.6g} µs", step.start, None)
         if step.end in stops:
-            rows.append((piece.bias(step.end), along.shown(x), along.slopes(x)))
-    bias, shown, slopes = zip(*rows, strict=True)
-    values = dict(zip(OBSERVABLES, np.array(shown).T, strict=True))
+            rows.append((piece.bias(step.end), along.observables(x), along.slopes(x)))
+    bias, observables, slopes = zip(*rows, strict=True)
+    values = dict(zip(OBSERVABLES, np.array(observables).T, strict=True))
     table = np.array(slopes).transpose(1, 0, 2)
     return labelled(
         {
@@ -197,7 +197,7 @@ class _Along:
         """Return the highest rise of the temperature (K)."""
         return float(self._lever.space.rises(x[: self._lever.space.size + 1]).max())
 
-    def shown(self, x: Array) -> Array:
+    def observables(self, x: Array) -> Array:
         """Return the observables, (observables,)."""
         return observed(self._lever.circuit, self._of_lever(x))[:, 0]
 
@@ -210,8 +210,8 @@ class _Along:
     def slopes(self, x: Array) -> Array:
         """Return their derivatives by the parameters, (observables, k)."""
         size, equations = self._lever.space.size + 1, self._lever.equations
-        own, moved = x[:size], self._changes[:size]
-        change = equations.observed_change(own, moved)
+        own, own_changes = x[:size], self._changes[:size]
+        change = equations.observed_change(own, own_changes)
         change[1] += equations.by_parameter(own, self._names)[-1]
-        change = np.concatenate([change, self._lever.space.tip_rise(moved)[None]])
+        change = np.concatenate([change, self._lever.space.tip_rise(own_changes)[None]])
         return observed_by(self._lever.circuit, self._of_lever(x), change, self._names)[:, 0]

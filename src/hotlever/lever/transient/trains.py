@@ -128,10 +128,10 @@ def _on_modes(
         return float(away.max() + first[-1] * ratio / (1.0 - ratio))
 
     first = integrated(None)
-    asked = None if at is None else checked_times(at)
+    report_times = None if at is None else checked_times(at)
     for _ in range(_ROUNDS):
         reduced = reduced_in_time(lever, np.hstack(snapshots))
-        train = Train(reduced, waveform, period, end, asked, tolerance_K, **options)
+        train = Train(reduced, waveform, period, end, report_times, tolerance_K, **options)
         late = train.start(train.whole - _PERIODS)
         away = max(
             departure(first, train.start(0)),
@@ -165,7 +165,7 @@ class Train:
     waveform : Waveform
     period, end : float
         µs.
-    asked : ndarray, or None
+    report_times : ndarray, or None
         Times (µs) to report; None for those at which the solver stepped.
     tolerance_K : float
     per_step : int
@@ -194,7 +194,7 @@ class Train:
         waveform: Waveform,
         period: float,
         end: float,
-        asked: Array | None,
+        report_times: Array | None,
         tolerance_K: float,
         per_step: int = 1,
         progress: Progress | None = None,
@@ -208,10 +208,12 @@ class Train:
         self._starts: list[State] = []
         self._columns: list[dict[str, Array]] = []
         self._added = dict.fromkeys(ENERGIES, 0.0)
-        self._asked: list[Array] | None = None
-        if asked is not None:
+        self._report_times: list[Array] | None = None
+        if report_times is not None:
             ends = period * np.arange(1, self.whole + (1 if self._cut_off else 0))
-            self._asked = np.split(asked, np.searchsorted(asked, ends, side="right"))
+            self._report_times = np.split(
+                report_times, np.searchsorted(report_times, ends, side="right")
+            )
         start, last_K = initial_state(lever, waveform), 0.0
 
         def integrated(wave: Waveform, length: float, first: int, last: int) -> Cycle:
@@ -261,26 +263,28 @@ class Train:
 
     def _phases(self, first: int, last: int) -> Array | None:
         """Return the times within a period at which one of some is asked for, and its end."""
-        if self._asked is None:
+        if self._report_times is None:
             return None
-        asked = self._asked[first:last]
-        phases = [self._within(number, times) for number, times in enumerate(asked, first)]
+        report_times = self._report_times[first:last]
+        phases = [self._within(number, times) for number, times in enumerate(report_times, first)]
         return np.unique(np.concatenate([*phases, [self._length(first)]]))
 
     def _add(self, number: int, cycle: Cycle) -> None:
         """Add the rows of a period, and its energies to those before."""
         history, time = cycle.history, cycle.history.time.values
-        if self._asked is None:
+        if self._report_times is None:
             # the first row of a later period is the last one of that before
             rows = np.arange(min(number, 1), time.size)
-            shown = number * self._period + time[rows]
+            row_times = number * self._period + time[rows]
         else:
-            shown = self._asked[number]
-            rows = np.searchsorted(time, self._within(number, shown))
+            row_times = self._report_times[number]
+            rows = np.searchsorted(time, self._within(number, row_times))
         columns = {str(name): values.values[rows] for name, values in history.data_vars.items()}
-        columns["time_us"] = shown
+        columns["time_us"] = row_times
         for name, before in self._added.items():
             columns[name] = before + columns[name]
             self._added[name] = before + float(history[name].values[-1])
         self._columns.append(columns)
-        self.states += [(t, cycle.states[row]) for t, row in zip(shown.tolist(), rows, strict=True)]
+        self.states += [
+            (t, cycle.states[row]) for t, row in zip(row_times.tolist(), rows, strict=True)
+        ]

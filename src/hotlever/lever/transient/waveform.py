@@ -95,7 +95,7 @@ class Waveform(ABC):
         """Return what is stepped in time while one of the pieces lasts."""
         return TransientProblem(equations, circuit, piece.bias)
 
-    def shown(
+    def history_columns(
         self, circuit: Circuit, columns: Mapping[str, Array], driven: Array
     ) -> dict[str, Array]:
         """Return what a history shows of it, by its columns and the values of the pieces."""
@@ -273,14 +273,14 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
             )
         columns.append(table.values(column, inside, what))
     times, volts = columns
-    for wrong, meant in (
+    for wrong, requirement in (
         (~np.isfinite(times + volts), "a time and a bias"),
         (np.abs(volts) > MOST_BIAS, f"a bias of at most {MOST_BIAS:g} V"),
         (times < 0.0, "a time from 0 on, where a wave form begins"),
         (np.diff(times, prepend=0.0) < 0, "a time not before the last"),
     ):
         if wrong.any():
-            raise InputError(f"{table.where(int(wrong.argmax()))}: expected {meant}")
+            raise InputError(f"{table.where(int(wrong.argmax()))}: expected {requirement}")
     if times[-1] > LONGEST:
         raise InputError(f"{path}: lasts until {times[-1]:g} µs, expected at most {LONGEST:g} µs")
     name = os.path.basename(os.fspath(path))
