@@ -61,9 +61,9 @@ def test_doping_known_to_a_factor_is_calibrated_and_written_with_its_distributio
     assert (use.value, use.spread / use.value) == pytest.approx((1.9e17, np.log(3.0)))
     off = abs(np.log(use.posterior_value / 5.75e17))
     assert off < 3.0 * use.posterior_spread / use.posterior_value
-    assert use.moved == pytest.approx(1.0, abs=0.3)
-    if use.moved > 1.0:
-        assert f"n_d by {use.moved:+.1f} σ" in out
+    assert use.shift == pytest.approx(1.0, abs=0.3)
+    if use.shift > 1.0:
+        assert f"n_d by {use.shift:+.1f} σ" in out
     table = read_calibration(tmp_path / "cal.json").table
     error = np.abs(table.tip_K - true.tip_temperature(table.power_mW))
     assert float((error / table.tip_stderr_K).max()) < 3.0

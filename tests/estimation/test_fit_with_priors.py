@@ -237,10 +237,10 @@ def test_doping_known_by_orders_of_magnitude_is_found_and_said_by_its_factor(dat
     use = result.priors["n_d"]
     assert use.distribution == "log-normal"
     assert use.spread / use.value == pytest.approx(np.log(3.0))
-    assert use.moved == pytest.approx(np.log(value / 1.733e17) / np.log(3.0), rel=1e-12)
+    assert use.shift == pytest.approx(np.log(value / 1.733e17) / np.log(3.0), rel=1e-12)
     assert result.priors["base_temperature_K"].distribution == "normal"
-    away = f"n_d by {use.moved:+.1f} σ"
-    assert (away in fit_text(result)) == (abs(use.moved) > 1.0)
+    away = f"n_d by {use.shift:+.1f} σ"
+    assert (away in fit_text(result)) == (abs(use.shift) > 1.0)
     assert result.content()["priors"]["n_d"]["distribution"] == "log-normal"
 
 

@@ -153,7 +153,7 @@ def test_the_apex_joins_the_calibration_with_its_error_by_source(calibration, to
     low, high = (stated.estimate_K + way * 1.96 * stated.budget.u for way in (-1.0, 1.0))
     assert stated.limits_K == pytest.approx((low, high), rel=1e-3)
     use = calibration.priors[INTERFACE]
-    assert use.left < 0.1
+    assert use.spread_ratio < 0.1
     assert "apex (K)" in calibration_text(calibration)
     path_rows = calibration.table_csv().splitlines()
     assert path_rows[0].endswith("apex_K,apex_stderr_K,surface_K,surface_stderr_K")

@@ -134,15 +134,15 @@ def test_what_data_made_of_a_factor_is_counted_in_logarithms():
     use = to_a_factor.used(9e17, 9e16)
     assert use.distribution == "log-normal"
     assert use.spread / use.value == pytest.approx(LOG_3)
-    assert use.moved == pytest.approx(to_a_factor.deviation(9e17)) == pytest.approx(2.0)
-    assert use.left == pytest.approx(0.1 / LOG_3)
+    assert use.shift == pytest.approx(to_a_factor.deviation(9e17)) == pytest.approx(2.0)
+    assert use.spread_ratio == pytest.approx(0.1 / LOG_3)
     assert use.stated == "1e+17 ×/ 3"
     assert Prior(4e17, 0.05).used(4.2e17, 1e16).stated == "4e+17 ± 2e+16"
     base = in_its_unit.used(295.0, 0.5)
-    assert (base.distribution, base.moved, base.left) == ("normal", 2.0, 0.5)
+    assert (base.distribution, base.shift, base.spread_ratio) == ("normal", 2.0, 0.5)
     assert base.stated == "293 ± 1"
     # of a parameter that ended at zero there is no logarithm
-    assert Prior(1e-6, 0.5).used(0.0, 1e-7).moved == pytest.approx(-2.0)
+    assert Prior(1e-6, 0.5).used(0.0, 1e-7).shift == pytest.approx(-2.0)
 
 
 def test_everything_that_a_prior_may_have_is_a_parameter():

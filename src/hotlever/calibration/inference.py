@@ -281,7 +281,7 @@ def _misfit(estimate: Estimate, priors: Mapping[str, PriorUse]) -> str:
             f"data are {abs(moved[name].pull):.1f} σ from it"
         )
     # as many are free to be away as the data tell of
-    told = sum(each.told for each in moved.values())
+    told = sum(each.contraction for each in moved.values())
     if told > 0 and chdtrc(told, sum(each.size**2 for each in moved.values())) < _UNLIKELY:
         most = sorted(moved, key=lambda name: -abs(moved[name].size))[:3]
         away = ", ".join(f"{name} by {moved[name].size:+.1f} σ" for name in most)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from hotlever.measurement import Measurement
 from hotlever.measurement.data import noise_about_neighbours
-from hotlever.probe.priors import SCALES, Moved, Prior
+from hotlever.probe.priors import SCALES, Prior, PriorShift
 from hotlever.spieser2017 import RAMAN_ERROR_SHARE
 from hotlever.types import Array
 
@@ -374,7 +374,9 @@ class CommonCovariance:
         common_leverage = np.einsum("ij,jk,ik->i", self._pattern, self._left, self._pattern)
         return np.asarray(common_leverage + np.einsum("ij,jk,ik->i", own, covariance, own))
 
-    def estimates(self, differences: Array, slopes: Array, covariance: Array) -> dict[str, Moved]:
+    def estimates(
+        self, differences: Array, slopes: Array, covariance: Array
+    ) -> dict[str, PriorShift]:
         """Return the errors as the data tell them, by name.
 
         By weighted differences (N,) as if data had no errors in common, and their slopes (N, p) by
@@ -382,5 +384,5 @@ class CommonCovariance:
         """
         by = self.sizes(slopes)
         left = np.sqrt(np.diag(self._left + by @ covariance @ by.T))
-        shifts = map(Moved, self.sizes(differences).tolist(), left.tolist())
+        shifts = map(PriorShift, self.sizes(differences).tolist(), left.tolist())
         return dict(zip((error.name for error in self._errors), shifts, strict=True))

@@ -23,7 +23,7 @@ from scipy.interpolate import PchipInterpolator
 from hotlever.estimation.experiment import Prediction
 from hotlever.estimation.objective import Objective, Quantity, Subproblem, inverse_or_nan
 from hotlever.estimation.surrogate import Surrogate
-from hotlever.probe.priors import Moved
+from hotlever.probe.priors import PriorShift
 from hotlever.types import Array
 
 #: A datum that alone decides a parameter says nothing of its own noise.
@@ -116,7 +116,7 @@ class Posterior:
         return shares
 
     @cached_property
-    def shifts(self) -> dict[str, Moved]:
+    def shifts(self) -> dict[str, PriorShift]:
         """How far the data moved parameters and scales from their own priors, by name.
 
         They are those of the optimum of the linearised problem. What data hardly tell is moved by
@@ -132,7 +132,7 @@ class Posterior:
         away = objective.from_priors(point) + by @ step
         left = standard_errors(by, laplace).tolist()
         rows = zip(prior.sources, away.tolist(), left, strict=True)
-        return {name: Moved(size, rest) for name, size, rest in rows if name != "fit"} | scales
+        return {name: PriorShift(size, rest) for name, size, rest in rows if name != "fit"} | scales
 
     @property
     def slopes(self) -> Array:

@@ -18,7 +18,7 @@ from hotlever.estimation.noise import CommonCovariance, CommonError, DataErrors
 from hotlever.estimation.options import Weights
 from hotlever.measurands import FITTED
 from hotlever.measurement import Measurement
-from hotlever.probe.priors import Moved
+from hotlever.probe.priors import PriorShift
 from hotlever.types import Array
 
 #: Observables that have a zero.
@@ -209,7 +209,7 @@ class Residuals:
         pattern = np.nan_to_num((self.errors.weights[..., None] * self._common)[self.present])
         return CommonCovariance(self.common, pattern)
 
-    def in_common(self, values: Array, slopes: Array, covariance: Array) -> dict[str, Moved]:
+    def in_common(self, values: Array, slopes: Array, covariance: Array) -> dict[str, PriorShift]:
         """Return the errors that data have in common as the data tell them.
 
         The slopes (observables, n, p) are those by parameters of which the fit leaves this

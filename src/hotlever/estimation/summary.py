@@ -92,11 +92,11 @@ def _tip_in_time(band: xr.Dataset) -> str:
 
 def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:
     """Say which priors an answer leans on, and which the data moved far."""
-    leaned = [name for name, use in priors.items() if use.left > _LEANED_ON]
+    leaned = [name for name, use in priors.items() if use.spread_ratio > _LEANED_ON]
     shifts = [
-        f"{name} by {use.moved:+.1f} σ to {use.posterior_value:.4g}"
+        f"{name} by {use.shift:+.1f} σ to {use.posterior_value:.4g}"
         for name, use in priors.items()
-        if abs(use.moved) > _LARGE_SHIFT
+        if abs(use.shift) > _LARGE_SHIFT
     ]
     lines = {
         "moved by the data beyond what was known before": shifts,

@@ -38,7 +38,7 @@ SCALES = {
     "raman_scale": "tip",
 }
 #: The share of a prior's variance below which nothing is told of it.
-_LEAST_TOLD = 1e-3
+_LEAST_CONTRACTION = 1e-3
 #: Relative spreads that mean something.
 _LEAST, _MOST, _LARGEST_SHARE = 1e-6, 10.0, 0.5
 #: The standard deviation of a logarithm from which on it is said as a factor: up and down are as
@@ -116,7 +116,7 @@ class PriorUse:
     Examples
     --------
     >>> use = Prior(1e17, math.log(3.0)).used(3e17, 3e16)
-    >>> use.stated, round(use.moved, 6), round(use.left, 3)
+    >>> use.stated, round(use.shift, 6), round(use.spread_ratio, 3)
     ('1e+17 ×/ 3', 1.0, 0.091)
     """
 
@@ -131,14 +131,14 @@ class PriorUse:
         return self.distribution == "log-normal" and self.value > 0 and self.posterior_value > 0
 
     @property
-    def moved(self) -> float:
+    def shift(self) -> float:
         """How far the data moved it, in standard deviations of the prior."""
         if self._by_logarithm:
             return math.log(self.posterior_value / self.value) * self.value / self.spread
         return (self.posterior_value - self.value) / self.spread
 
     @property
-    def left(self) -> float:
+    def spread_ratio(self) -> float:
         """The share of the prior's standard deviation that the data leave."""
         share = self.posterior_spread / self.spread
         return share * self.value / self.posterior_value if self._by_logarithm else share
@@ -151,23 +151,23 @@ class PriorUse:
         return f"{self.value:.4g} ± {self.spread:.2g}"
 
 
-class Moved(NamedTuple):
+class PriorShift(NamedTuple):
     """How far data moved a parameter from its prior, in standard deviations of the prior.
 
     Attributes
     ----------
     size : float
-    left : float
-        Standard deviation that data and priors leave.
+    spread_ratio : float
+        Standard deviation that data and priors leave, over the prior's.
     """
 
     size: float
-    left: float
+    spread_ratio: float
 
     @property
-    def told(self) -> float:
+    def contraction(self) -> float:
         """Share of the prior's variance that the data take away."""
-        return 1.0 - self.left**2
+        return 1.0 - self.spread_ratio**2
 
     @property
     def pull(self) -> float:
@@ -175,7 +175,7 @@ class Moved(NamedTuple):
 
         Without it the sum of squares would be lower by the square of this.
         """
-        return self.size / float(np.sqrt(max(self.told, _LEAST_TOLD)))
+        return self.size / float(np.sqrt(max(self.contraction, _LEAST_CONTRACTION)))
 
 
 def published_material() -> dict[str, Prior]:

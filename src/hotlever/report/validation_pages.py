@@ -229,7 +229,7 @@ def _real_curve(page: Page, calibrations: Sequence[Calibration]) -> None:
         [
             [name, use.stated, value_with_error(use.posterior_value, use.posterior_spread)]
             for name, use in calibration.priors.items()
-            if use.left < _LEARNED
+            if use.spread_ratio < _LEARNED
         ],
         "What the curve tells of the lever: parameters whose spread it lessens by a fifth or more. "
         "All others stay what was assumed.",
