@@ -28,7 +28,7 @@ from typing import Any
 
 from hotlever import plotting
 
-__version__ = "1.1.0"
+__version__ = "2.0.0"
 
 #: What the package offers at its top, by the module it lives in. Loaded when first used, so that
 #: the command line starts fast.

@@ -148,7 +148,7 @@ class Probe(ProbeParts):
 
         The `section` is its name, or ``material`` for the silicon of that section. The
         `material_class` is derived from its kind, see `hotlever.materials.kind.Kind`, or from
-        `hotlever.materials.Material`; the `values` are in its section in place of what it held.
+        `hotlever.materials.Material`; the ``values`` are in its section in place of what it held.
 
         Raises
         ------
