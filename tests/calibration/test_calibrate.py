@@ -51,13 +51,13 @@ def test_the_table_gives_the_true_temperature(calibrated, reference):
 
 
 def test_the_bias_for_a_temperature_is_that_of_the_lever(calibrated, lever, reference):
-    wanted = np.array([400.0, 700.0, 1000.0])
-    exact = reference.bias(wanted, lever.circuit)
-    np.testing.assert_allclose(lever.sweep(exact).tip_K, wanted, atol=0.05)
-    np.testing.assert_allclose(calibrated.bias_for(wanted), exact, atol=0.1)
+    target_K = np.array([400.0, 700.0, 1000.0])
+    exact = reference.bias(target_K, lever.circuit)
+    np.testing.assert_allclose(lever.sweep(exact).tip_K, target_K, atol=0.05)
+    np.testing.assert_allclose(calibrated.bias_for(target_K), exact, atol=0.1)
     other = Circuit(series_resistance_ohm=3000.0)
     np.testing.assert_allclose(
-        calibrated.bias_for(wanted, other), reference.bias(wanted, other), atol=0.1
+        calibrated.bias_for(target_K, other), reference.bias(target_K, other), atol=0.1
     )
     power = calibrated.table.power_mW.values[[20, 80]]
     np.testing.assert_allclose(
@@ -168,17 +168,17 @@ def test_rows_even_in_temperature_are_the_lever_s(calibrated):
 
 def test_a_knee_outside_is_estimated_with_a_larger_error(reference, calibrated):
     law = calibrated.power_law
-    shown, beyond = (
+    within, beyond = (
         calibrate(
             measurement_of(measured_curve(reference, np.random.default_rng(2), to_V=to_V)), law=law
         )
         for to_V in (11.0, 7.6)
     )
-    assert shown.knee.measured
+    assert within.knee.measured
     assert not beyond.knee.measured
     assert any("estimated from the points below it" in note for note in beyond.notes)
     stderr = beyond.knee.power_mW_stderr
-    assert stderr > 2 * shown.knee.power_mW_stderr
+    assert stderr > 2 * within.knee.power_mW_stderr
     assert abs(beyond.knee.power_mW - reference.knee.power_mW) < 3 * stderr
     content = beyond.content()
     assert content["knee"]["lever_V"] is None

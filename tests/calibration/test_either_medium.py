@@ -84,10 +84,10 @@ def answers(of: dict[str, tuple[str, float] | Exception]) -> Any:
     """Answer as told: a reason against it, and how unlikely it is."""
 
     def answered(medium: str) -> tuple[Any, Any]:
-        told = of[medium]
-        if isinstance(told, Exception):
-            raise told
-        reason, deviance = told
+        answer = of[medium]
+        if isinstance(answer, Exception):
+            raise answer
+        reason, deviance = answer
         estimate = SimpleNamespace(
             posterior=SimpleNamespace(deviance=deviance),
             residuals=SimpleNamespace(rms=lambda _: {"current_mA": 0.00123}),
@@ -145,17 +145,17 @@ def test_what_cannot_be_solved_is_said():
 def test_the_medium_that_is_asked_for_wins_over_what_the_file_says(cold, calibrated_in):
     """Once a calibration in air of what a file calls vacuum was one in vacuum, without a word."""
     assert cold.medium is None
-    asked = calibrate(replace(cold, medium="vacuum"), medium="air")
-    assert asked.medium == "air"
-    np.testing.assert_array_equal(asked.table.tip_K, calibrated_in["air"].table.tip_K)
-    said = "medium: air, as asked, although the data file says vacuum"
-    assert [note for note in asked.notes if "medium" in note] == [said]
+    in_air = calibrate(replace(cold, medium="vacuum"), medium="air")
+    assert in_air.medium == "air"
+    np.testing.assert_array_equal(in_air.table.tip_K, calibrated_in["air"].table.tip_K)
+    expected_note = "medium: air, as asked, although the data file says vacuum"
+    assert [note for note in in_air.notes if "medium" in note] == [expected_note]
 
 
 def test_only_data_may_be_of_an_unknown_medium(run, cold):
-    code, _, said = run("sweep", "--medium", "unknown")
+    code, _, err = run("sweep", "--medium", "unknown")
     assert code == 2
-    assert "--medium unknown: expected vacuum or air" in said
+    assert "--medium unknown: expected vacuum or air" in err
     with pytest.raises(InputError, match="unknown medium 'unknow'"):
         fit(cold, medium="unknow")
 
@@ -164,10 +164,12 @@ def test_a_left_out_datum_is_no_gain():
     """Of two levers, one that leaves a datum out is no likelier than one just so far from it."""
     bias = np.linspace(1.0, 10.0, 20)
     current, nothing = 0.1 * bias, np.full(20, np.nan)
-    shown = current.copy()
-    shown[7] += 0.1
+    outlying_current = current.copy()
+    outlying_current[7] += 0.1
     errors = np.full(20, 0.01)
-    measured = Measurement(bias, shown, nothing, nothing, nothing, current_error_mA=errors)
+    measured = Measurement(
+        bias, outlying_current, nothing, nothing, nothing, current_error_mA=errors
+    )
     residuals = Residuals(measured, ["current"], "errors")
     values = np.stack([current, nothing, nothing])
     plain = residuals.errors.normalisation

@@ -27,15 +27,15 @@ COMMAND = ("calibrate", "a.csv", "b.csv", "none.csv", "--power-law", "law.json")
 @pytest.fixture(scope="module")
 def texts(coarse):
     """Data of levers whose doping differs."""
-    made = []
+    contents = []
     for n_d in (5.5e17, 5.75e17, 6e17):
         sweep = coarse.with_material(coarse.probe.material.with_(n_d=n_d)).sweep(
             np.linspace(0.5, 10.0, 40)
         )
         rows = zip(sweep.bias_V.values, sweep.current_mA.values, strict=True)
         lines = [f"{bias:.4f},{current:.6f}" for bias, current in rows]
-        made.append("\n".join(["V_b (V),I_h (mA)", *lines, ""]))
-    return made
+        contents.append("\n".join(["V_b (V),I_h (mA)", *lines, ""]))
+    return contents
 
 
 @pytest.fixture(scope="module")
@@ -90,8 +90,8 @@ def test_levers_are_compared_where_all_were_measured(calibrations):
     assert np.isnan(tips.tip_K.sel(lever="c").values[-1])
     assert np.isfinite(tips.tip_K.mean("lever").values).all()
     beyond = compare_calibrations(levers, Setting("bias_V", 9.0))
-    said = calibration_statements(beyond)
-    assert any("c: 9 V is out of its range, 0.5 to" in text for text in said)
+    statements = calibration_statements(beyond)
+    assert any("c: 9 V is out of its range, 0.5 to" in text for text in statements)
     assert beyond.counts.sel(quantity="tip_K").values.tolist() == [True, True, False]
 
 

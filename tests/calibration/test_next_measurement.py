@@ -193,5 +193,5 @@ def test_no_spectra_are_proposed_of_a_heater_without_silicon():
     film = Probe.from_file(EXAMPLES / "palladium-on-nitride.toml")
     plan = plan_next(probe=film, count=3, at_K=400.0)
     assert set(plan.proposals.what.values.tolist()) == {"bias"}
-    asked = plan_next(probe=film, count=3, at_K=400.0, allowed={"spectra": None})
-    assert set(asked.proposals.what.values.tolist()) == {"spectra"}
+    spectra_plan = plan_next(probe=film, count=3, at_K=400.0, allowed={"spectra": None})
+    assert set(spectra_plan.proposals.what.values.tolist()) == {"spectra"}

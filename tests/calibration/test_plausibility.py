@@ -42,7 +42,9 @@ def solved_once():
         yield
 
 
-def shown(curve: IVCurve, rows: slice = slice(None), **changed: np.ndarray) -> Measurement:
+def altered_measurement(
+    curve: IVCurve, rows: slice = slice(None), **changed: np.ndarray
+) -> Measurement:
     """Return some rows of a curve as a measurement, with other values in some columns."""
     data = replace(measurement_of(curve), **changed)
     some = {name: values[rows] for name, values in vars(data).items() if np.ndim(values)}
@@ -72,7 +74,7 @@ def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
     curve, bias, current, probe, message
 ):
     volts, mA = curve.bias_V, curve.current_mA
-    wrong = shown(curve, bias_V=bias(volts, mA), current_mA=current(volts, mA))
+    wrong = altered_measurement(curve, bias_V=bias(volts, mA), current_mA=current(volts, mA))
     with pytest.raises(InputError, match=message):
         calibrate(wrong, probe=Probe.reference().with_(**probe))
 
@@ -104,16 +106,18 @@ def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
 )  # fmt: skip
 def test_the_likeliest_cause_is_found_by_the_model(curve, current, probe, question):
     wrong = current(curve.current_mA, np.linspace(0.0, 1.0, curve.bias_V.size))
-    causes = Diagnosis(shown(curve, current_mA=wrong), Probe.reference().with_(**probe))
+    causes = Diagnosis(
+        altered_measurement(curve, current_mA=wrong), Probe.reference().with_(**probe)
+    )
     assert re.search(question, causes.likeliest())
 
 
 def test_good_data_have_no_cause(curve):
-    assert Diagnosis(shown(curve), Probe.reference()).likeliest() == ""
+    assert Diagnosis(altered_measurement(curve), Probe.reference()).likeliest() == ""
 
 
 def test_a_fit_that_is_another_lever_s_is_said_to_be(curve):
-    assert Diagnosis(shown(curve), Probe.reference()).named(fitted=True) == (
+    assert Diagnosis(altered_measurement(curve), Probe.reference()).named(fitted=True) == (
         "is it the fit of another lever?"
     )
 
@@ -122,7 +126,7 @@ def test_a_fit_that_is_another_lever_s_is_said_to_be(curve):
 def test_a_hot_plate_that_was_not_stated_is_noticed():
     """No parameter by itself is far from its prior, but no base is so warm."""
     warm = Lever(Probe.reference().with_(base_temperature_K=353.0)).branch()
-    wrong = shown(measured_curve(warm, np.random.default_rng(0)))
+    wrong = altered_measurement(measured_curve(warm, np.random.default_rng(0)))
     calibration = calibrate(wrong, probe=Probe.reference())
     assert "would have to be another" in calibration.reason
     assert "is the base temperature rather about 353 K?" in calibration.reason
@@ -132,7 +136,7 @@ def test_temperatures_in_degrees_celsius_are_refused(curve):
     tips = np.full(curve.bias_V.size, np.nan)
     tips[[5, 20]] = 80.0, 400.0
     with pytest.raises(InputError, match=r"T_tip is 80 K at .* is it in °C, or another column"):
-        calibrate(shown(curve, tip_K=tips))
+        calibrate(altered_measurement(curve, tip_K=tips))
 
 
 @pytest.mark.parametrize(
@@ -145,12 +149,12 @@ def test_temperatures_in_degrees_celsius_are_refused(curve):
 )
 def test_what_the_data_lack_is_remarked(curve, reference, rows, step, remark):
     current = np.round(curve.current_mA / step) * step if step else curve.current_mA
-    data = shown(curve, rows, current_mA=current)
+    data = altered_measurement(curve, rows, current_mA=current)
     tips = reference.tip_temperature(curve.power_mW[rows])
     remarks = what_data_lack(data, curve.circuit, tips)
     assert [text for text in remarks if remark in text]
 
 
 def test_a_calibration_notes_what_its_data_lack(curve):
-    notes = calibrate(shown(curve, slice(20, 24))).notes
+    notes = calibrate(altered_measurement(curve, slice(20, 24))).notes
     assert [text for text in notes if "4 rows with a current: few" in text]

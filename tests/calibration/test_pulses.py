@@ -102,7 +102,7 @@ def test_the_rule_knows_no_pulse(measured):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("5", "--pulse"),
         ("5us,", "--pulse"),
@@ -110,8 +110,8 @@ def test_the_rule_knows_no_pulse(measured):
         ("-1us", ""),
     ],
 )
-def test_a_wrong_timing_is_one_line(run, text, said):
+def test_a_wrong_timing_is_one_line(run, text, message):
     status, _, err = run("calibrate", "src/hotlever/examples/lever-a.csv", "--pulse", text)
     assert status == 2
-    assert said in err
+    assert message in err
     assert len(err.splitlines()) == 1

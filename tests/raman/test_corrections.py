@@ -72,7 +72,7 @@ def test_a_hot_plate_spectrum_left_out_is_not_calibrated_from(run, examples, tmp
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (f"{HEAD}tip_40.txt,516,,,\n", "unknown spectrum 'tip_40.txt': did you mean 'tip_04.txt'?"),
         ("file,strat\ntip_04.txt,516\n", "line 1: unknown column 'strat': did you mean"),
@@ -86,20 +86,20 @@ def test_a_hot_plate_spectrum_left_out_is_not_calibrated_from(run, examples, tmp
         (f"{HEAD}tip_04.txt,,,,no\n", "leaves out every spectrum"),
     ],
 )
-def test_what_cannot_be_is_a_line(run, examples, tmp_path, text, said):
+def test_what_cannot_be_is_a_line(run, examples, tmp_path, text, message):
     table = tmp_path / "by-hand.csv"
     table.write_text(text)
     status, out, err = run("raman", examples / "tip" / "tip_04.txt", "--corrections", table)
     assert (status, out) == (2, "")
-    assert said in err
+    assert message in err
     assert len(err.splitlines()) == 1
 
 
 def test_a_table_that_is_written_is_read(tmp_path):
-    said = {
+    corrections = {
         "tip/a, b.txt": Correction(start=516.25, low=490.0),
         'map.txt[X=1 "Y"=2]': Correction(use=False),
     }
     table = tmp_path / "by-hand.csv"
-    table.write_text(corrections_text(said))
-    assert read_corrections(table) == said
+    table.write_text(corrections_text(corrections))
+    assert read_corrections(table) == corrections

@@ -33,7 +33,7 @@ def test_derivatives_of_the_line_are_exact(centre, fwhm, fano, sigma):
     _, slopes = lineshape.line(X, centre, fwhm, fano, sigma)
     step = 1e-5
 
-    def moved(sign):
+    def perturbed_lines(sign):
         h = sign * step
         grow = np.exp(h)
         return (
@@ -43,7 +43,7 @@ def test_derivatives_of_the_line_are_exact(centre, fwhm, fano, sigma):
             lineshape.line(X, centre, fwhm, fano, sigma * grow)[0],
         )
 
-    for exact, plus, minus in zip(slopes, moved(1), moved(-1), strict=True):
+    for exact, plus, minus in zip(slopes, perturbed_lines(1), perturbed_lines(-1), strict=True):
         np.testing.assert_allclose(exact, (plus - minus) / (2 * step), atol=2e-7)
 
 

@@ -103,19 +103,19 @@ def test_a_table_of_spectra_is_a_dataset_with_units_and_what_the_csv_holds(
     x = np.arange(440.0, 600.0, 0.5)
     noise = np.random.default_rng(0).poisson(100.0, x.size).astype(float)
     lines = measure([*read_spectra([examples / "tip"]), Spectrum(x, noise, "none.txt")])
-    made = read_lines(lines, Thermometer(found))
-    assert made.sizes == {"spectrum": 5}
-    assert {name: made[name].attrs["units"] for name in DIGITS} == {
+    dataset = read_lines(lines, Thermometer(found))
+    assert dataset.sizes == {"spectrum": 5}
+    assert {name: dataset[name].attrs["units"] for name in DIGITS} == {
         name: "K" if name.endswith("_K") else "cm-1" for name in DIGITS
     }
-    rows = table(to_csv(made))
+    rows = table(to_csv(dataset))
     for name, digits in DIGITS.items():
         cells = [float(row[name.replace("_per_cm", "_cm-1")] or "nan") for row in rows]
-        np.testing.assert_allclose(cells, made[name], atol=0.51 * 10.0**-digits)
-    assert [row["file"] for row in rows] == made.file.values.tolist()
-    assert [row["flags"] for row in rows] == made.flags.values.tolist()
-    assert made.flags.values[-1] == "no-line"
-    assert np.isnan(made.temperature_K.values[-1])
+        np.testing.assert_allclose(cells, dataset[name], atol=0.51 * 10.0**-digits)
+    assert [row["file"] for row in rows] == dataset.file.values.tolist()
+    assert [row["flags"] for row in rows] == dataset.flags.values.tolist()
+    assert dataset.flags.values[-1] == "no-line"
+    assert np.isnan(dataset.temperature_K.values[-1])
 
 
 def test_single_spectrum_and_lineless_spectrum(run, tmp_path):

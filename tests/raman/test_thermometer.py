@@ -135,8 +135,8 @@ def test_reference_of_the_day_replaces_the_calibrations(hot_plate):
     spectra = read_spectra([hot_plate])
     found, lines = calibrate_from(spectra)
     room = lines[0].peak
-    moved = [Spectrum(s.x + 1.5, s.y, s.name) for s in spectra]
-    shifted = measure(moved)
+    shifted_spectra = [Spectrum(s.x + 1.5, s.y, s.name) for s in spectra]
+    shifted = measure(shifted_spectra)
     thermometer = Thermometer(found).with_reference([(shifted[0].peak, 295.0)])
     reading = thermometer.read([shifted[20].peak.centre], [shifted[20].peak.centre_stderr])
     assert reading.temperature[0] == pytest.approx(795.0, abs=4 * reading.error[0])

@@ -220,8 +220,8 @@ class Calibration(Outcome):
     def __repr__(self) -> str:
         hottest = self.table.isel(bias=int(np.nanargmax(self.table.tip_K)))
         tip = value_with_error(hottest.tip_K.item(), hottest.tip_stderr_K.item())
-        said = self.doubt or f"{tip} K at {hottest.bias_V.item():.4g} V in {self.medium}"
-        return f"<Calibration of {self.measurement.path or 'a measurement'}: {said}>"
+        summary = self.doubt or f"{tip} K at {hottest.bias_V.item():.4g} V in {self.medium}"
+        return f"<Calibration of {self.measurement.path or 'a measurement'}: {summary}>"
 
     def file(self, request: dict[str, JsonValue] | None = None) -> CalibrationFile:
         """Return what the calibration file holds."""

@@ -131,8 +131,8 @@ def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Pri
     """
     if priors is not None and not priors:
         return {}
-    asked = priors_of({**fit.options.priors, **(priors or {})}, fit.probe, "priors")
-    before = default_priors(fit.probe, published_material()) | asked
+    stated = priors_of({**fit.options.priors, **(priors or {})}, fit.probe, "priors")
+    before = default_priors(fit.probe, published_material()) | stated
     return {name: prior for name, prior in before.items() if name not in fit.options.fixed}
 
 
@@ -270,21 +270,21 @@ def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -
 
 def _misfit(estimate: Estimate, priors: Mapping[str, PriorUse]) -> str:
     """Return why data are not described by what was fitted to them; empty if they are."""
-    of_data, moved = (estimate.residuals, estimate.prediction.values), estimate.posterior.shifts
+    of_data, shifts = (estimate.residuals, estimate.prediction.values), estimate.posterior.shifts
     if reason := lack_of_fit_text(*of_data) or run_of_outliers(*of_data):
         return reason
-    name = max(moved, key=lambda name: abs(moved[name].pull), default="")
-    if name and abs(moved[name].pull) > UNLIKELY_PULL:
+    name = max(shifts, key=lambda name: abs(shifts[name].pull), default="")
+    if name and abs(shifts[name].pull) > UNLIKELY_PULL:
         use = priors[name]
         return (
             f"{name}, known as {use.stated}, would have to be another; the "
-            f"data are {abs(moved[name].pull):.1f} σ from it"
+            f"data are {abs(shifts[name].pull):.1f} σ from it"
         )
     # as many are free to be away as the data tell of
-    told = sum(each.contraction for each in moved.values())
-    if told > 0 and chdtrc(told, sum(each.size**2 for each in moved.values())) < _UNLIKELY:
-        most = sorted(moved, key=lambda name: -abs(moved[name].size))[:3]
-        away = ", ".join(f"{name} by {moved[name].size:+.1f} σ" for name in most)
+    dof = sum(each.contraction for each in shifts.values())
+    if dof > 0 and chdtrc(dof, sum(each.size**2 for each in shifts.values())) < _UNLIKELY:
+        most = sorted(shifts, key=lambda name: -abs(shifts[name].size))[:3]
+        away = ", ".join(f"{name} by {shifts[name].size:+.1f} σ" for name in most)
         return f"what was known beforehand would have to be wrong by too much together, {away}"
     return ""
 

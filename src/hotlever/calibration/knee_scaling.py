@@ -267,8 +267,8 @@ def _similar_branches(probe: Probe, like: Branch) -> list[Branch]:
     model = solved.branch
     changes = solved.output_slopes * np.array([_ASIDE * priors[name].absolute for name in names])
     slopes = spline_through(model.u, changes)(model.u, 1)
-    moved = zip(np.moveaxis(changes, 2, 0), np.moveaxis(slopes, 2, 0), strict=True)
-    return [model, *(shifted(model, *change) for change in moved)]
+    perturbations = zip(np.moveaxis(changes, 2, 0), np.moveaxis(slopes, 2, 0), strict=True)
+    return [model, *(shifted(model, *change) for change in perturbations)]
 
 
 def _error_of_other_levers(similar: list[Branch], ratio: Array) -> Array:
@@ -277,5 +277,7 @@ def _error_of_other_levers(similar: list[Branch], ratio: Array) -> Array:
     ends = [branch.by_power.highest_mW for branch in similar]
     # where one of them has melted they differ as they do before
     power = np.outer(knees, np.minimum(ratio, np.min(np.divide(ends, knees))))
-    tip, *moved = (branch.tip_temperature(row) for branch, row in zip(similar, power, strict=True))
-    return np.linalg.norm(np.array(moved) - tip, axis=0) / _ASIDE
+    tip, *perturbed_tips = (
+        branch.tip_temperature(row) for branch, row in zip(similar, power, strict=True)
+    )
+    return np.linalg.norm(np.array(perturbed_tips) - tip, axis=0) / _ASIDE

@@ -93,7 +93,7 @@ def calibrate_many(
     like = probe or Probe.reference()
     # what it is for each lever, whatever its file says of circuit and medium
     options = FitOptions(priors=known_beforehand(like, priors), medium=medium)  # type: ignore[arg-type]
-    asked = {
+    request = {
         "power_law": None if law is None else law.model_dump(),
         "pulse": None if pulse is None else asdict(pulse),
         "samples": samples,
@@ -109,7 +109,7 @@ def calibrate_many(
         samples=samples,
         budget_of=budget_of,
     )
-    work = Work("calibration", calibration, CalibrationFile, CALIBRATION, like, options, asked)
+    work = Work("calibration", calibration, CalibrationFile, CALIBRATION, like, options, request)
     return estimate_many(paths, folder, work, **how)
 
 
@@ -258,12 +258,12 @@ def calibration_rows(levers: xr.Dataset) -> list[list[str]]:
     """
     finite = levers.value.notnull().any("lever")
     in_air = (levers.value.sel(quantity="k") > 1.0).any()
-    shown = [
+    quantities = [
         name
         for name in levers.quantity.values[finite.values]
         if name not in LAW and (name != "k" or in_air)
     ]
-    return lever_rows(levers.sel(quantity=shown))
+    return lever_rows(levers.sel(quantity=quantities))
 
 
 def law_rows(levers: xr.Dataset) -> list[list[str]]:

@@ -167,11 +167,11 @@ class LinearisedLever:
 
         The scale of a thermometer moves what it shows, not the tip.
         """
-        values, slopes = self.shown(Rows(bias))
+        values, slopes = self.predict(Rows(bias))
         slopes[TIP, :, len(self.names) :] = 0.0
         return values[TIP], slopes[TIP]
 
-    def shown(self, rows: Rows) -> tuple[Array, Array]:
+    def predict(self, rows: Rows) -> tuple[Array, Array]:
         """Return what rows show (observables, n), and derivatives by the unknowns (…, n, q)."""
         surrogate = self.surrogate.reading(rows)
         values, slopes = surrogate.predict(self.probe.values(self.names))
@@ -185,8 +185,8 @@ class LinearisedLever:
 
     def _size(self, observable: str, values: Array) -> Array:
         """Return what a scale is one of, of values (observables, n): of the tip, its rise."""
-        shown = values[list(FITTED).index(observable)]
-        return shown - self.probe.circuit.base_temperature_K * (observable == "tip")
+        observable_values = values[list(FITTED).index(observable)]
+        return observable_values - self.probe.circuit.base_temperature_K * (observable == "tip")
 
     def highest_tip(self, bias: Array, covariance: Array, deviations: float) -> Array:
         """Return how hot (K) the tip may be at some biases (V); infinite if it may melt.
@@ -215,17 +215,17 @@ class LinearisedLever:
 
         def up(gradient: Array) -> Array:
             """Return the parameters that are so far up a gradient."""
-            moved = covariance @ gradient
-            return self.parameters(moved * (length / max(float(np.sqrt(gradient @ moved)), 1e-300)))
+            step = covariance @ gradient
+            return self.parameters(step * (length / max(float(np.sqrt(gradient @ step)), 1e-300)))
 
         try:
             first = up(gradient)
             values, slopes = surrogate.predict(first)
             rates = self._coordinates.rates(self._coordinates.point(first))
-            shown = surrogate.values_at(up(slopes[TIP, 0] * rates))
+            refined_values = surrogate.values_at(up(slopes[TIP, 0] * rates))
         except ComputationError:
             return np.inf
-        return max(float(values[TIP, 0]), float(shown[TIP, 0]))
+        return max(float(values[TIP, 0]), float(refined_values[TIP, 0]))
 
     def parameters(self, away: Array) -> Array:
         """Return the parameters (p,) of a lever so far away in their coordinates, (p,)."""
@@ -258,7 +258,7 @@ class LinearisedLever:
         )
         if self.measurement is None:
             return information
-        _, slopes = self.shown(Rows(self.measurement.bias_V, self._measured))
+        _, slopes = self.predict(Rows(self.measurement.bias_V, self._measured))
         for name, weights in self.weights.items():
             counts = weights > 0
             of_data = slopes[list(FITTED).index(name), counts]

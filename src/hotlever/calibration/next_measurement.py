@@ -210,15 +210,15 @@ def plan_next(
         "stderr_now_K": np.full(rows.size, stderr[0]),
         "stderr_then_K": stderr[1:],
     }
-    shown = sorted({n for n in (*SHOWN_AFTER, len(chosen)) if n <= len(chosen)})
-    along = np.array([np.hypot(after[n].stderr(by_unknowns), stays[:-1]) for n in shown])
+    counts = sorted({n for n in (*SHOWN_AFTER, len(chosen)) if n <= len(chosen)})
+    along = np.array([np.hypot(after[n].stderr(by_unknowns), stays[:-1]) for n in counts])
     errors = {"tip_K": tip_K, "tip_limit_K": highest_K}
     return Plan(
         labelled(columns, "proposal", {"proposal": np.arange(1, rows.size + 1)}),
         labelled(
             {**errors, "tip_stderr_K": (("added", "bias"), along)},
             "bias",
-            {"bias": bias, "added": shown},
+            {"bias": bias, "added": counts},
         ),
         at_K,
         stay_below_K,
@@ -304,8 +304,8 @@ def _allowed(
 ) -> dict[str, int | None]:
     """Return what may be measured; by default what was, and what every such lever shows."""
     if allowed is None:
-        shown = {*lever.weights, *(["tip"] if lever.probe.heater_silicon else [])}
-        return {kind: None for kind, of_kind in KINDS.items() if {*of_kind} <= shown}
+        observables = {*lever.weights, *(["tip"] if lever.probe.heater_silicon else [])}
+        return {kind: None for kind, of_kind in KINDS.items() if {*of_kind} <= observables}
     for kind in allowed:
         if kind == "pulse":
             raise InputError(
@@ -327,7 +327,7 @@ def _candidates(
     noise: Mapping[str, float],
 ) -> list[Candidate]:
     """Return what could be measured: of each kind one at each bias, kind after kind."""
-    values, slopes = lever.shown(Rows(bias))
+    values, slopes = lever.predict(Rows(bias))
     electrical = [name for name in ("current", "bridge") if name in lever.weights] or ["current"]
     candidates = []
     for kind in kinds:

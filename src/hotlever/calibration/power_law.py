@@ -98,11 +98,11 @@ class PowerLaw(Record):
                 f"{base_temperature_K:g} K (no power) or more"
             )
         top = float(self._cold_rise(np.asarray(self.threshold_mW)))
-        wanted = np.minimum(rise, top)
+        target_rise = np.minimum(rise, top)
         cold = elementwise.find_root(
-            lambda power, wanted: self._cold_rise(power) - wanted,
+            lambda power, target_rise: self._cold_rise(power) - target_rise,
             (np.zeros_like(rise), np.full_like(rise, self.threshold_mW)),
-            args=(wanted,),
+            args=(target_rise,),
         ).x
         hot = np.maximum(rise / self.hot_K_per_mW, self.threshold_mW)
         return np.where(rise <= top, cold, hot)
@@ -253,8 +253,8 @@ def fit_power_law(
     >>> round(fit.law.exponent, 3), round(fit.law.hot_K_per_mW, 3)
     (3.1, 213.0)
     """
-    given = power_mW, tip_K, 1.0 if tip_error_K is None else tip_error_K
-    rows = np.stack(np.broadcast_arrays(*(np.asarray(column, dtype=float) for column in given)))
+    columns = power_mW, tip_K, 1.0 if tip_error_K is None else tip_error_K
+    rows = np.stack(np.broadcast_arrays(*(np.asarray(column, dtype=float) for column in columns)))
     rows = rows[:, np.isfinite(rows).all(axis=0) & (rows[0] > 0) & (rows[2] > 0)]
     power, tip, error = rows[:, np.argsort(rows[0], kind="stable")]
     if power.size < (fewest := _FEWEST_COLD + _FEWEST_HOT):

@@ -130,13 +130,13 @@ def calibrate(
     notes = note_on_averages(whole, measured)
     check_budget_of(budget_of, origin.contact is not None)
     if law is not None or (medium == "vacuum" and measured.medium == "air"):
-        asked = {
+        lacks = {
             "has no posterior": samples > 0,
             "has no uncertainty budget": at_V is not None or budget_of != "tip",
             "says nothing about a pulse": pulse is not None,
         }
-        for lack, wanted in asked.items():
-            if wanted:
+        for lack, is_requested in lacks.items():
+            if is_requested:
                 raise InputError(
                     f"the paper's rule {lack}; expected a probe or a fit, in the medium of the data"
                 )
@@ -256,13 +256,13 @@ def check_plausible(
     spread = cold_resistance_spread(cold, priors) if alone else 0.0
     if cold_kohm > series and abs(np.log((cold_kohm - series) / lever)) < UNLIKELY_PULL * spread:
         return
-    shown = "V_b / I_h" if alone else "the change of V_b over that of I_h"
+    quantity = "V_b / I_h" if alone else "the change of V_b over that of I_h"
     cause = causes.likeliest()
     if not cause and cold_kohm > _OPEN * (lever + series):
         cause = "hardly any current flows, as if a terminal was open or the meter at another one"
     cause = cause or "no single cause that is known explains it"
     raise InputError(
-        f"{where}: {shown} is {cold_kohm:.4g} kΩ at low bias, expected about "
+        f"{where}: {quantity} is {cold_kohm:.4g} kΩ at low bias, expected about "
         f"{lever + series:.4g} kΩ ({series:g} kΩ in series and {lever:.3g} kΩ of the lever): "
         f"{cause}"
     )

@@ -187,11 +187,11 @@ def pulse_calibration(
     bias = measured_range(estimate)
     pulses = _Pulses(estimate, bias, timing, progress)
     directions = estimate.posterior.principal_steps(_LEAST_VARIANCE)
-    kept: Index = np.arange(len(directions))
+    axes: Index = np.arange(len(directions))
     corrections, changes = [], []
     for row in _SOME:
         change = np.zeros((len(directions) + 1, len(MOMENTS)))
-        for axis in kept:
+        for axis in axes:
             change[axis] = pulses.along(row, directions[axis])
         change[-1] = pulses.change(row, pulses.coarse, slower=1.0 + HEAT_CAPACITY_SPREAD)
         corrections.append(pulses.change(row, pulses.fine))
@@ -200,7 +200,7 @@ def pulse_calibration(
             # the directions that hold nearly all of the variance
             shares = (change[:-1] ** 2 / (change[:-1] ** 2).sum(axis=0)).max(axis=1)
             order = np.argsort(shares)
-            kept = np.sort(order[np.cumsum(shares[order]) > _LEFT_OUT])
+            axes = np.sort(order[np.cumsum(shares[order]) > _LEFT_OUT])
     heights = pulses.heights
     # over V² they hardly change when cold
     by_square = CubicSpline(heights, np.log(pulses.rises / heights[:, None] ** 2))

@@ -174,19 +174,19 @@ def _budget_rows(calibration: Calibration) -> list[list[str]]:
     """
     table, tip = calibration.heating, calibration.heating.tip_K.values
     tells = ("V_b (V)", "bias_V") if calibration.power_law is None else ("P_l (mW)", "power_mW")
-    shown = np.array([kelvins for kelvins in _SHOWN if tip[0] <= kelvins <= tip[-1]])
-    if shown.size < _FEW:  # a cold lever, or a short range
-        shown = np.linspace(tip[0], tip[-1], _FEW + 1)[1:].round(1)
+    temperatures = np.array([kelvins for kelvins in _SHOWN if tip[0] <= kelvins <= tip[-1]])
+    if temperatures.size < _FEW:  # a cold lever, or a short range
+        temperatures = np.linspace(tip[0], tip[-1], _FEW + 1)[1:].round(1)
     columns = [("T_tip (K)", "tip_K", 0), (*tells, 3), ("± (K)", "tip_stderr_K", 1)]
-    return _rows(table, columns, shown)
+    return _rows(table, columns, temperatures)
 
 
 def _apex_rows(calibration: Calibration) -> list[list[str]]:
     """Return temperatures at the contact for some of the tip, with the apex's error by source."""
-    shown = [float(row[0]) for row in _budget_rows(calibration)[1:]]
+    temperatures = [float(row[0]) for row in _budget_rows(calibration)[1:]]
     columns = [("T_tip (K)", "tip_K", 0), ("apex (K)", "apex_K", 0), ("± (K)", "apex_stderr_K", 1)]
     columns += [("surface (K)", "surface_K", 0), ("± (K)", "surface_stderr_K", 1)]
-    return _rows(calibration.heating, columns, np.array(shown), BUDGETS[1])
+    return _rows(calibration.heating, columns, np.array(temperatures), BUDGETS[1])
 
 
 def _pulse_rows(pulse: PulseCalibration) -> list[list[str]]:

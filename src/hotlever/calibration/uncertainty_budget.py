@@ -173,20 +173,20 @@ def budget_of_estimate(
     # a ramp of levers like it may not have jumped yet, where it is known that this one has
     surrogate = predicted.surrogate.reading(Rows(predicted.surrogate.rows.bias_V, predicted.values))
     slopes = predicted.slopes[observable, 0, objective.columns]
-    moved = {name: slopes @ by for name, by in estimate.posterior.influences.items()}
+    contributions = {name: slopes @ by for name, by in estimate.posterior.influences.items()}
     u = residuals.noise(estimate.prediction.values).tolist()
     leverage = objective.leverage(estimate.prediction.slopes, objective.point(estimate.probe))
     dof = residuals.errors.degrees_of_freedom(leverage).tolist()
     rows = []
     for name, size, free in zip(residuals.observables, u, dof, strict=True):
-        sensitivity = float(np.linalg.norm(moved.pop(name))) / size
+        sensitivity = float(np.linalg.norm(contributions.pop(name))) / size
         kind: Literal["A", "B"] = "A" if np.isfinite(free) else "B"
         noise, unit = f"noise of {name}", FITTED[name].unit
         rows.append(InputQuantity(noise, 0.0, unit, size, kind, "normal", sensitivity, free))
     units = {name: each.unit for name, each in parameters_of(estimate.probe, anywhere=True).items()}
     units |= dict.fromkeys(SCALES, "1")
-    by_fit = moved.pop(_FIT, None)
-    for name, by in moved.items():
+    by_fit = contributions.pop(_FIT, None)
+    for name, by in contributions.items():
         use = priors[name]
         sensitivity = by.item() / use.spread
         rows.append(
@@ -203,14 +203,14 @@ def budget_of_estimate(
         rows += of_fit
     budget = Budget(tuple(rows), correlation)
     value, other = float(predicted.values[observable, 0]), float(np.linalg.norm([*model.values()]))
-    made = TemperatureBudget(budget, bias_V, value, limits_of(row, of), of)
+    temperature_budget = TemperatureBudget(budget, bias_V, value, limits_of(row, of), of)
     if not budget.u > 0.0:
-        return made
+        return temperature_budget
     free = dict(zip(residuals.observables, dof, strict=True))
     try:
         curved = CurvedQuantity(estimate.posterior, surrogate, observable)
     except (ComputationError, np.linalg.LinAlgError):
-        return replace(made, monte_carlo=_NO_INTERVAL)
+        return replace(temperature_budget, monte_carlo=_NO_INTERVAL)
     errors = _Errors(curved, estimate.posterior.influences, free)
 
     def draw(count: int) -> Array:
@@ -221,8 +221,8 @@ def budget_of_estimate(
     ended = predicted.values[: len(OBSERVABLES)].copy()
     ended[TIP] = surrogate.branch.hottest_K
     hottest = surrogate.contact.added(ended, estimate.probe.values(objective.names))[observable, 0]
-    beyond = max(interval.high, made.interval_K[1]) > hottest
-    return replace(made, monte_carlo=_NO_INTERVAL if beyond else interval)
+    beyond = max(interval.high, temperature_budget.interval_K[1]) > hottest
+    return replace(temperature_budget, monte_carlo=_NO_INTERVAL if beyond else interval)
 
 
 def _rows_of_fit(
@@ -260,8 +260,12 @@ class _Errors:
         self, curved: CurvedQuantity, influences: Mapping[str, Array], dof: Mapping[str, float]
     ) -> None:
         self.random = np.random.default_rng(0)
-        moved = {name: curved.axes_of(influences[name]) for name in dof if np.isfinite(dof[name])}
-        shares = [(moves @ moves.T, dof[name]) for name, moves in moved.items()]
+        projections = {
+            name: curved.axes_of(influences[name]) for name in dof if np.isfinite(dof[name])
+        }
+        shares = [
+            (projection @ projection.T, dof[name]) for name, projection in projections.items()
+        ]
         axes = np.eye(len(next(iter(influences.values()))))
         rest = axes - sum(share for share, _ in shares)
         self._roots = [(_root(share), free) for share, free in [*shares, (rest, np.inf)]]
@@ -343,7 +347,15 @@ class BudgetFields(Section):
         """Return the budget of a row of a table, if there is one."""
         if self.gum is None:
             return None
-        row, told, of = table.sel(bias=self.gum_bias_V), self.gum_monte_carlo, self.gum_of or "tip"
-        interval = None if told is None else CoverageInterval(told.trials, told.low_K, told.high_K)
+        row, monte_carlo, of = (
+            table.sel(bias=self.gum_bias_V),
+            self.gum_monte_carlo,
+            self.gum_of or "tip",
+        )
+        interval = (
+            None
+            if monte_carlo is None
+            else CoverageInterval(monte_carlo.trials, monte_carlo.low_K, monte_carlo.high_K)
+        )
         budget, value = Budget(tuple(self.gum), self.gum_correlation), row[f"{of}_K"].item()
         return TemperatureBudget(budget, row.bias_V.item(), value, limits_of(row, of), of, interval)

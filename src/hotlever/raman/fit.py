@@ -140,7 +140,7 @@ def _fit(x: Array, y: Array, options: PeakOptions) -> Peak | None:
     if started is None:
         return None
     problem, start = started
-    use = problem.shown & ~_likely_spikes(x, y, float(np.percentile(y, 20)), options.start)
+    use = problem.unclipped & ~_likely_spikes(x, y, float(np.percentile(y, 20)), options.start)
     variance = np.maximum(noise.robust_sigma(y - np.median(y), np.abs(y)) ** 2, 1e-300)
     plain = _refine(problem, start, use, variance, passes=2)
     # beside a clipped line's flanks a band cannot be told from the hidden shape
@@ -228,7 +228,7 @@ def _refine(
         strict, lenient = noise.SPIKE_LINE_TOLERANCE
         misfit = Solution(problem, p, value, variance, use).misfit
         tolerance = lenient if misfit > _SMALL_MISFIT else strict
-        use = problem.shown & ~noise.spikes(y, value, part, used, tolerance)
+        use = problem.unclipped & ~noise.spikes(y, value, part, used, tolerance)
         # a line seen by one or two samples must not be thrown out as a cosmic ray
         if np.count_nonzero(use) < MIN_SAMPLES:
             use = used
@@ -326,7 +326,7 @@ def _peak(solution: Solution) -> Peak | None:
     if At.BAND_HEIGHT in problem.free:
         band = Band(low_band[1], width_of(low_band[2]), low_band[0])
         band_gap = centre - band.centre - (0.5 * band.fwhm + width)
-    spikes, misfit = x[problem.shown & ~solution.use].tolist(), solution.misfit
+    spikes, misfit = x[problem.unclipped & ~solution.use].tolist(), solution.misfit
     flags = {
         "cosmic-ray": bool(spikes),
         "saturated": clipped is not None,

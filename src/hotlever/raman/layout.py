@@ -324,7 +324,7 @@ def _kind(name: str) -> int:
     """Place in `_WANTED` of what a column is named as, `_UNNAMED` if in none, or `_OTHER`."""
     if _UNWANTED.search(name) and not _WANTED[0].search(name):
         return _OTHER
-    kind = next((i for i, wanted in enumerate(_WANTED) if wanted.search(name)), _UNNAMED)
+    kind = next((i for i, pattern in enumerate(_WANTED) if pattern.search(name)), _UNNAMED)
     quantity = _OTHER_QUANTITY.search(name) and temperature_in_name(name) is None
     return _OTHER if kind == _UNNAMED and quantity else kind
 

@@ -138,12 +138,12 @@ class Problem:
     clipped: slice | None = None
 
     @property
-    def shown(self) -> Mask:
+    def unclipped(self) -> Mask:
         """Samples that no clipped top hides."""
-        shown = np.ones(self.x.size, dtype=bool)
+        mask = np.ones(self.x.size, dtype=bool)
         if self.clipped is not None:
-            shown[max(self.clipped.start - 1, 0) : self.clipped.stop + 1] = False
-        return shown
+            mask[max(self.clipped.start - 1, 0) : self.clipped.stop + 1] = False
+        return mask
 
     def evaluate(self, p: Array) -> tuple[Array, Array, Array]:
         """Model (n,), its Jacobian (n, free), and the line's part (n,)."""

@@ -126,10 +126,10 @@ def _jcamp(raw: bytes, jcamp: Any) -> list[Spectrum]:
         raise ValueError("more NPOINTS than the file can hold")
     if any(_REPEATED_TWICE.search(part) for part in _XYDATA.findall(text)):
         raise ValueError("a repeat count without a value")
-    said = io.StringIO()
-    with redirect_stdout(said):
+    output = io.StringIO()
+    with redirect_stdout(output):
         data = jcamp.read(io.BytesIO(raw))
-    if "Y-Check failed" in said.getvalue():
+    if "Y-Check failed" in output.getvalue():
         raise ValueError("its lines do not follow each other as their own checks say")
     spectra = []
     for block in data.get("children") or [data]:

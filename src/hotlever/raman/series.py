@@ -171,11 +171,11 @@ def calibrate_from(
     """
     options = options or PeakOptions()
     corrections = corrections or {}
-    kept = [spectrum for spectrum in spectra if of_spectrum(spectrum, corrections).use]
-    if not kept:
+    retained_spectra = [spectrum for spectrum in spectra if of_spectrum(spectrum, corrections).use]
+    if not retained_spectra:
         raise InputError(f"{source}: every spectrum is left out, expected some to calibrate with")
-    stated = [_temperature(spectrum, temperatures or {}) for spectrum in kept]
-    lines = measure(kept, options, progress, corrections)
+    stated = [_temperature(spectrum, temperatures or {}) for spectrum in retained_spectra]
+    lines = measure(retained_spectra, options, progress, corrections)
     points = []
     for line, temperature in zip(lines, stated, strict=True):
         name, peak = line.spectrum.name, line.peak
