@@ -29,7 +29,7 @@ STORED = Path(__file__).parents[1] / "stored" / "1.0.0"
 
 
 @pytest.fixture(scope="module")
-def made(coarse):
+def figure_by_name(coarse):
     sweep = coarse.sweep(np.linspace(1, 11, 9))
     states = coarse.solve([7.2, 8.3])
     profiles = {
@@ -69,8 +69,8 @@ def texts(figure):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_axis_carries_a_unit(made, name):
-    for axes in made[name].axes:
+def test_every_axis_carries_a_unit(figure_by_name, name):
+    for axes in figure_by_name[name].axes:
         labels = [axes.get_xlabel(), axes.get_ylabel()]
         # the correlation matrix carries symbols instead
         assert any(labels) or (name == "correlation" and axes.get_xticklabels())
@@ -79,23 +79,23 @@ def test_every_axis_carries_a_unit(made, name):
 
 
 @pytest.mark.parametrize(("name", "suffix"), list(zip(NAMES, cycle(FIGURE_TYPES), strict=False)))
-def test_figures_are_written_in_every_type(made, name, suffix, tmp_path):
+def test_figures_are_written_in_every_type(figure_by_name, name, suffix, tmp_path):
     path = tmp_path / f"{name}{suffix}"
-    save_figure(made[name], path)
+    save_figure(figure_by_name[name], path)
     assert path.stat().st_size > 5000
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_probe_drawing_marks_all_named_parts(made):
-    text = texts(made["probe"])
+def test_probe_drawing_marks_all_named_parts(figure_by_name):
+    text = texts(figure_by_name["probe"])
     for word in ("supply", "ground", "reader", "heater", "tip", "high-doped"):
         assert word in text
 
 
-def test_maps_name_probe_and_medium_and_mark_the_hottest_place(made, coarse):
+def test_maps_name_probe_and_medium_and_mark_the_hottest_place(figure_by_name, coarse):
     for name in ("maps", "map"):
-        assert "three-leg lever in vacuum, bias 8.3 V, tip at 899 K" in texts(made[name])
-    assert "hottest, 899 K" in texts(made["map"])
+        assert "three-leg lever in vacuum, bias 8.3 V, tip at 899 K" in texts(figure_by_name[name])
+    assert "hottest, 899 K" in texts(figure_by_name["map"])
 
 
 def test_each_frame_of_a_film_is_its_state(coarse):
@@ -115,11 +115,11 @@ def test_each_frame_of_a_film_is_its_state(coarse):
         figures.pulse_film(history, [])
 
 
-def test_iv_curve_names_the_knee(made):
-    assert "knee" in texts(made["iv"])
+def test_iv_curve_names_the_knee(figure_by_name):
+    assert "knee" in texts(figure_by_name["iv"])
 
 
-def test_every_dataset_draws_itself(made, coarse, tmp_path):
+def test_every_dataset_draws_itself(figure_by_name, coarse, tmp_path):
     sweep = coarse.sweep([2.0, 8.0])
     write_sweep(sweep, tmp_path / "a.nc")
     (state,) = coarse.solve([4.0])
@@ -142,19 +142,19 @@ def test_every_dataset_draws_itself(made, coarse, tmp_path):
         labelled({"k": ((), 1.0)}).hotlever.plot()
 
 
-def test_unknown_figure_types_are_refused(made, tmp_path):
+def test_unknown_figure_types_are_refused(figure_by_name, tmp_path):
     with pytest.raises(InputError, match=r"unknown figure type '.bmp'"):
-        save_figure(made["iv"], tmp_path / "a.bmp")
+        save_figure(figure_by_name["iv"], tmp_path / "a.bmp")
     with pytest.raises(InputError, match="does not exist"):
-        save_figure(made["iv"], tmp_path / "no" / "a.png")
+        save_figure(figure_by_name["iv"], tmp_path / "no" / "a.png")
 
 
-def test_page_is_self_contained(made, tmp_path):
+def test_page_is_self_contained(figure_by_name, tmp_path):
     page = Page("Title", "Summary & more")
     page.heading("Section")
     page.text("1 < 2")
     page.table(("a", "b"), [("1", "2")], "caption")
-    page.figure("iv", made["iv"], "what it shows")
+    page.figure("iv", figure_by_name["iv"], "what it shows")
     written = page.write(tmp_path / "new" / "folder")
     html = written.read_text(encoding="utf-8")
     assert "1 &lt; 2" in html
@@ -168,8 +168,8 @@ def test_every_source_of_an_error_is_drawn_however_many_there_are():
     table = calibration.table
     others = table.assign_coords(source=[f"other {name}" for name in table.source.values])
     many = xr.concat([table, others], "source", data_vars="minimal", coords="minimal")
-    made = figures.calibration_curves(replace(calibration, table=many))
-    lines = made.axes[-1].get_lines()
+    figure = figures.calibration_curves(replace(calibration, table=many))
+    lines = figure.axes[-1].get_lines()
     assert [line.get_label() for line in lines] == [*many.source.values, "together"]
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == len(lines) > 10
 

@@ -39,24 +39,26 @@ def test_a_fit_s_page_tells_what_was_found_and_how_sure_it_is(result):
 @pytest.fixture
 def judged(monkeypatch):
     """Levers that need not be solved: each of the page's is one of those made up."""
-    asked = []
+    requests = []
 
     def judge(number, departures):
         other = "mobility" in departures
-        asked.append((number, other))
+        requests.append((number, other))
         return made_up.judged_levers(other).isel(lever=number % 3).assign_coords(lever=number)
 
     monkeypatch.setattr(inference, "judge", judge)
-    return asked
+    return requests
 
 
 @pytest.mark.parametrize(("quick", "count"), [(False, 12), (True, 2)])
 def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, quick, count):
-    told = []
-    page = Findings(coarse, quick=quick, progress=lambda done, total: told.append((done, total)))
+    progress = []
+    page = Findings(
+        coarse, quick=quick, progress=lambda done, total: progress.append((done, total))
+    )
     inference.levers_section(page)
     assert judged == [(n, law) for law in (False, True) for n in range(count)]
-    assert told[-1] == (2 * count, 2 * count)
+    assert progress[-1] == (2 * count, 2 * count)
     why, same_law, other_law = (one["text"] for one in page.blocks if one["kind"] == "text")
     assert f"{count} levers" in why
     assert "With the mobility of Eq. 8" in same_law

@@ -65,10 +65,10 @@ def test_shift_and_direction_are_judged_apart(verdicts):
 
 
 def test_the_figure_has_both_polarities_and_both_heats():
-    made = figures.thermoelectric_shift(made_up_shift([4.0, 8.0]), made_up_shift([4.0], 50.0))
-    place, moved = made.axes
+    figure = figures.thermoelectric_shift(made_up_shift([4.0, 8.0]), made_up_shift([4.0], 50.0))
+    place, displacement = figure.axes
     assert len(place.lines) == 4
-    assert [line.get_ydata()[0] for line in moved.lines][:4] == [-100.0, -90.0, -10.0, 50.0]
+    assert [line.get_ydata()[0] for line in displacement.lines][:4] == [-100.0, -90.0, -10.0, 50.0]
 
 
 @pytest.mark.slow

@@ -14,8 +14,8 @@ def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path, monkey
     # few pulses and frequencies are as many pages
     monkeypatch.setattr(transient_pages, "_COUNT", 2)
     monkeypatch.setattr(transient_pages, "_FREQUENCIES", np.geomspace(10.0, 1e7, 7))
-    told = []
-    page = transient_page(Lever(Probe.reference(), COARSE), lambda *steps: told.append(steps))
+    progress = []
+    page = transient_page(Lever(Probe.reference(), COARSE), lambda *steps: progress.append(steps))
     written = page.write(tmp_path)
     text = written.read_text(encoding="utf-8")
     for heading in ("A step", "A train of pulses", "Time constants", "Small signals", "Harmonics"):
@@ -27,7 +27,7 @@ def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path, monkey
     assert all(float(row[-1]) > float(row[1]) for row in step)
     # at a constant bias the knee is slow, at a constant voltage it is not
     assert float(constants[-1][2]) > 2.0 * float(constants[-1][3])
-    assert told[-1] == (5, 5)
+    assert progress[-1] == (5, 5)
 
 
 def test_the_command_takes_no_wave_form_beside_it(run, tmp_path):

@@ -26,17 +26,17 @@ from hotlever.studies.raman_check import paper_check
 
 @pytest.mark.usefixtures("coarse_meshes")
 def test_a_lever_that_is_as_the_model_carries_nothing():
-    moved, missed = carried_by(Probe.reference(), "nothing")
-    assert moved == 0.0
+    shift_K, missed = carried_by(Probe.reference(), "nothing")
+    assert shift_K == 0.0
     assert missed == pytest.approx(0.0, abs=0.05)
 
 
 @pytest.mark.usefixtures("coarse_meshes")
 def test_a_thermoelectric_lever_is_measured_by_its_other_polarity():
-    moved, missed = carried_by(Probe.reference(), AWAY)
+    shift_K, missed = carried_by(Probe.reference(), AWAY)
     lever = Lever(Probe.reference().with_(thermoelectric=True), COARSE)
     there = lever.branch_to(0.0, lowest=-11.0).mirrored.knee
-    assert moved == pytest.approx(
+    assert shift_K == pytest.approx(
         there.tip_K - Lever(Probe.reference(), COARSE).knee().tip_K.item()
     )
     assert 0.0 < abs(missed) < 3.0

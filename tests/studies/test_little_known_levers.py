@@ -175,21 +175,21 @@ def answered(some, monkeypatch):
         )
         describes_data, reason = True, ""
 
-    asked = {}
+    arguments = {}
 
     def calibrated(data, probe):
-        asked.update(data=data, probe=probe)
+        arguments.update(data=data, probe=probe)
         return Answer
 
     monkeypatch.setattr(little_known_levers, "calibrate", calibrated)
     monkeypatch.setattr(little_known_levers, "little_known_lever", lambda *_: lever)
-    return Answer, asked, lever
+    return Answer, arguments, lever
 
 
 def test_an_answer_is_compared_with_the_truth_by_the_error_of_that_side(answered):
-    answer, asked, lever = answered
+    answer, arguments, lever = answered
     record = judge_little_known(0, "vacuum")
-    assert asked == {"data": lever.measurement, "probe": lever.nominal}
+    assert arguments == {"data": lever.measurement, "probe": lever.nominal}
     assert record["outcome"] == "described"
     count = np.isfinite(lever.tip_K(lever.measurement.bias_V)).sum()
     assert record["off_K"] == pytest.approx([10.0] * count)

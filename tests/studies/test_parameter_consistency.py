@@ -34,13 +34,13 @@ def test_errors_are_those_that_calibrations_are_judged_by():
 
 
 def test_without_noise_and_errors_twins_have_the_parameters_that_they_were_made_of(noiseless):
-    told = []
+    progress = []
     probe = Probe.reference().with_(c_kappa=0.66, n_d=5e17)
     geometries = {"short": {"length_um": 45.0}, "other heater": {"heater_width_um": 2.0}}
     study = consistency_study(
-        probe, geometries, ("none",), progress=lambda done, total: told.append((done, total))
+        probe, geometries, ("none",), progress=lambda done, total: progress.append((done, total))
     )
-    assert told[-1] == (2, 2)
+    assert progress[-1] == (2, 2)
     free = study.value.sel(error="none", doping=FREE)
     np.testing.assert_allclose(free, np.broadcast_to(study.true_value, free.shape), rtol=2e-3)
     assert (study.value.sel(doping=HELD, parameter="n_d") == NOMINAL_DOPING).all()

@@ -75,10 +75,10 @@ def test_outliers_are_far_off_few_and_in_a_third_of_the_levers(solved_once):
     for number in range(300):
         with_, without = (data_of(number, more).current_mA for more in (["outliers"], []))
         off = np.abs(with_ / without - 1.0) / study.NOISE
-        moved = off[off > 1e-9]
-        assert moved.size <= 2
-        assert np.all((moved > 9.9) & (moved < 50.1))
-        some += moved.size > 0
+        outliers = off[off > 1e-9]
+        assert outliers.size <= 2
+        assert np.all((outliers > 9.9) & (outliers < 50.1))
+        some += outliers.size > 0
     assert 80 <= some <= 120
 
 

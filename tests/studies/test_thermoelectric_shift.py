@@ -57,10 +57,12 @@ def test_a_heater_that_is_no_strip_is_refused():
 
 
 def test_the_study_does_not_depend_on_what_the_probe_asks_for(coarse, n_type):
-    asked = Lever(Probe.reference().with_(thermoelectric=True), COARSE, space=coarse.space)
-    again = shift_by_heat(asked, BIAS[:1])
+    thermoelectric_lever = Lever(
+        Probe.reference().with_(thermoelectric=True), COARSE, space=coarse.space
+    )
+    again = shift_by_heat(thermoelectric_lever, BIAS[:1])
     np.testing.assert_allclose(again.moved_nm[:, 0], n_type.moved_nm[:, 0], rtol=1e-6)
     # and the whole is that of the lever solved with it
-    (state,) = asked.solve(BIAS[:1])
-    rise = state.tip_K - asked.circuit.base_temperature_K
+    (state,) = thermoelectric_lever.solve(BIAS[:1])
+    rise = state.tip_K - thermoelectric_lever.circuit.base_temperature_K
     assert again.centre_rise_K.sel(polarity=1).item() == pytest.approx(rise, abs=0.05)

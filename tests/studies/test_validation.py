@@ -38,16 +38,16 @@ def published():
 
 @pytest.fixture
 def case_of(tmp_path):
-    def made(text):
+    def read_case(text):
         path = tmp_path / "case.toml"
         path.write_text(text, encoding="utf-8")
         return Case.from_file(path)
 
-    return made
+    return read_case
 
 
 def stored(case):
-    return Prediction.as_stored(case.prediction, case.asked.is_share)
+    return Prediction.as_stored(case.prediction, case.definition.is_share)
 
 
 def test_every_case_is_complete(published):
@@ -145,7 +145,7 @@ def test_a_case_of_a_user_is_predicted_and_judged(run, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         (HEAD.format(quantity="knee_temprature"), "unknown quantity 'knee_temprature'"),
         (HEAD.format(quantity="layer_conductivty"), "did you mean 'layer_conductivity'"),
@@ -158,10 +158,10 @@ def test_a_case_of_a_user_is_predicted_and_judged(run, tmp_path):
         ('quantity = "air_coefficient"\n', "group is missing"),
     ],
 )
-def test_what_is_wrong_with_a_case_is_said_in_a_line(case_of, text, told):
+def test_what_is_wrong_with_a_case_is_said_in_a_line(case_of, text, message):
     with pytest.raises(InputError) as error:
         case_of(text)
-    assert told in str(error.value)
+    assert message in str(error.value)
     assert "\n" not in str(error.value)
 
 

@@ -131,13 +131,13 @@ def _every_quantity(data: xr.Dataset) -> Figure:
     columns = min(len(drawn), 3)
     rows = -(-len(drawn) // columns)
     size = 3.2 * columns, 2.4 * rows
-    with figure(*size, rows, columns, squeeze=False, letters=True) as (made, grid):
+    with figure(*size, rows, columns, squeeze=False, letters=True) as (fig, grid):
         for axes, (name, values) in zip(grid.ravel(), drawn.items(), strict=False):
             _panel(axes, name, values)
         for axes in grid.ravel()[len(drawn) :]:
             axes.remove()
-        entitle(made, data)
-    return made
+        entitle(fig, data)
+    return fig
 
 
 def _panel(axes: Axes, name: str, values: xr.DataArray) -> None:

@@ -58,9 +58,9 @@ def calibration_curves(calibration: Calibration) -> Figure:
     table, knee, described = calibration.table, calibration.knee, calibration.describes_data
     power = table.power_mW
     measured = calibration.measurement.dataset(calibration.probe.circuit)
-    with figure(8.0, 6.0, 2, 2, letters=True) as (made, grid):
+    with figure(8.0, 6.0, 2, 2, letters=True) as (fig, grid):
         by_power, by_bias, iv, budget = grid.ravel()
-        entitle(made, more=calibration.probe.title, is_described=bool(described))
+        entitle(fig, more=calibration.probe.title, is_described=bool(described))
         name = "calibration and 95 % band" if described else "the nearest lever"
         if described and "apex_K" in table:
             name = "tip and 95 % band"
@@ -102,7 +102,7 @@ def calibration_curves(calibration: Calibration) -> Figure:
             _budget(budget, table)
         else:
             _difference(budget, calibration, measured)
-    return made
+    return fig
 
 
 def calibrated_levers(calibrations: Mapping[str, Calibration], levers: xr.Dataset) -> Figure:
@@ -118,7 +118,7 @@ def calibrated_levers(calibrations: Mapping[str, Calibration], levers: xr.Datase
     along, count = levers.attrs["along"], levers.sizes["lever"]
     tips, many = tips_along(calibrations, along), count > len(LINES)
     named: Any = {"rotation": 45, "ha": "right", "parse_math": False, "fontsize": 7}
-    with figure(8.0, 7.6, 3, 2, letters=True) as (made, grid):
+    with figure(8.0, 7.6, 3, 2, letters=True) as (fig, grid):
         curves, differences, *by_lever = grid.ravel()
         for tip, (line, colour) in zip(tips.tip_K, cycle(LINES), strict=False):
             style: Any = {"color": colour, "ls": line, "lw": 0.8 if many else 1.2}
@@ -134,7 +134,7 @@ def calibrated_levers(calibrations: Mapping[str, Calibration], levers: xr.Datase
             axes.axvline(levers[along].values[0], color="0.6", lw=0.8, ls=":")
             axes.set(xlabel=axis_label(along))
         if not many:
-            made.legend(*curves.get_legend_handles_labels(), loc="outside lower center", ncols=6)
+            fig.legend(*curves.get_legend_handles_labels(), loc="outside lower center", ncols=6)
         for name, axes in zip(_COMPARED, by_lever, strict=True):
             values_by_lever(axes, levers.sel(quantity=name))
             axes.set(ylabel=levers.heading.sel(quantity=name).item(), xlim=(0.5, count + 0.5))
@@ -142,7 +142,7 @@ def calibrated_levers(calibrations: Mapping[str, Calibration], levers: xr.Datase
                 axes.set(xlabel="lever")
             else:
                 axes.set_xticks(np.arange(1, count + 1), levers.lever.values, **named)
-    return made
+    return fig
 
 
 def judged_calibrations(judged: xr.Dataset) -> Figure:
@@ -156,7 +156,7 @@ def judged_calibrations(judged: xr.Dataset) -> Figure:
     largest, other = abs(judged.off_K).max("row"), judged.other_law.values
     ratio = (judged.off_K.sel(way=ESTIMATE) / judged.stated_K).transpose("lever", "row")
     laws = [law for law in (False, True) if law in other]
-    with figure(8.0, 3.8, 1, 2, letters=True) as (made, (by_way, by_bias)):
+    with figure(8.0, 3.8, 1, 2, letters=True) as (fig, (by_way, by_bias)):
         beside: Any = {"transform": by_way.get_yaxis_transform(), "va": "center", "fontsize": 8}
         for row, (way, colour) in enumerate(zip(WAYS, _BY_WAY, strict=True)):
             for law in laws:
@@ -189,7 +189,7 @@ def judged_calibrations(judged: xr.Dataset) -> Figure:
         by_bias.set_xticks([0, 1], ["400 K", "hottest"])
         for axes in (by_way, by_bias):
             axes.legend(loc="lower left", bbox_to_anchor=(0.1, 1.0), ncols=2, borderpad=0.1)
-    return made
+    return fig
 
 
 def _pulse(axes: Axes, pulse: PulseCalibration) -> None:
@@ -232,23 +232,23 @@ def planned_measurements(plan: Plan) -> Figure:
     The proposed measurements are marked, with how often each is proposed, and the limit.
     """
     errors, proposals = plan.errors, plan.proposals
-    shown = np.isfinite(errors.tip_limit_K.values)
+    finite = np.isfinite(errors.tip_limit_K.values)
     kinds = proposals.what.values.tolist()
     counts = Counter(zip(kinds, proposals.bias_V.values.tolist(), strict=True))
-    with figure(8.0, 3.8, 1, 2, letters=True) as (made, (by_tip, by_bias)):
-        entitle(made, more=plan.lever)
+    with figure(8.0, 3.8, 1, 2, letters=True) as (fig, (by_tip, by_bias)):
+        entitle(fig, more=plan.lever)
         for added, colour in zip(errors.added.values.tolist(), cycle(_BY_ADDED), strict=False):
             label = f"after {added} more" if added else "now"
             stderr = errors.tip_stderr_K.sel(added=added)
-            by_tip.plot(errors.tip_K[shown], stderr[shown], color=colour, label=label)
+            by_tip.plot(errors.tip_K[finite], stderr[finite], color=colour, label=label)
         last = errors.tip_stderr_K.isel(added=-1)
         by_tip.axvline(plan.at_K, color="0.6", lw=0.9, ls=":")
         above: Any = {"xycoords": by_tip.get_xaxis_transform(), "color": "0.4", "fontsize": 7}
         by_tip.annotate(f"{plan.at_K:.0f} K, where it counts", (plan.at_K, 1.0), **above)
-        by_bias.plot(errors.bias[shown], errors.tip_K[shown], color=BLACK, label="expected")
+        by_bias.plot(errors.bias[finite], errors.tip_K[finite], color=BLACK, label="expected")
         limit: Any = {"color": VERMILION, "label": f"no hotter, by {SURE:.0%}"}
-        by_bias.plot(errors.bias[shown], errors.tip_limit_K[shown], "--", **limit)
-        by_bias.axvspan(plan.safe_V, float(errors.bias[shown].max()), color="0.92", lw=0)
+        by_bias.plot(errors.bias[finite], errors.tip_limit_K[finite], "--", **limit)
+        by_bias.axvspan(plan.safe_V, float(errors.bias[finite].max()), color="0.92", lw=0)
         if plan.stay_below_K is not None:
             by_bias.axhline(plan.stay_below_K, color=VERMILION, lw=0.9)
             text = f" limit {plan.stay_below_K:.0f} K"
@@ -267,4 +267,4 @@ def planned_measurements(plan: Plan) -> Figure:
         by_bias.set(xlabel=axis_label("bias_V"), ylabel=axis_label("tip_K"))
         for axes in (by_tip, by_bias):
             axes.legend(loc="upper left")
-    return made
+    return fig

@@ -35,7 +35,7 @@ _EACH, _MORE = 0.24, 0.9
 def disc_between_planes(loss: xr.Dataset) -> Figure:
     """Draw the loss of a disc between two planes over their distance (paper's Fig. 8)."""
     distance = loss.distance.values
-    with figure(4.4, 3.2) as (made, axes):
+    with figure(4.4, 3.2) as (fig, axes):
         axes.plot(distance, loss.loss, color=BLUE, label="exact")
         axes.plot(distance, loss.near, "--", color=ORANGE, label="near planes, 2π r/h")
         axes.plot(distance, loss.far, ":", color=VERMILION, label="free space, 8")
@@ -45,7 +45,7 @@ def disc_between_planes(loss: xr.Dataset) -> Figure:
         axes.set(xscale="log", yscale="log", ylim=(3.0, 1.2 * float(loss.loss.max())))
         axes.set(xlabel="distance of the planes over radius, h/r", ylabel="heat loss / (κ r ΔT)")
         axes.legend()
-    return made
+    return fig
 
 
 def scale_factor(curves: Mapping[str, xr.DataArray], published: float) -> Figure:
@@ -59,7 +59,7 @@ def scale_factor(curves: Mapping[str, xr.DataArray], published: float) -> Figure
         The paper's single k.
     """
     many = len(curves) > 1
-    with figure(6.4 if many else 4.4, 3.4) as (made, axes):
+    with figure(6.4 if many else 4.4, 3.4) as (fig, axes):
         for (name, k), (line, colour) in zip(curves.items(), cycle(LINES), strict=False):
             axes.plot(k.tip_K, k, line, color=colour, label=name)
         axes.axhline(published, color="0.5", ls=":", label=f"paper, {published}")
@@ -68,7 +68,7 @@ def scale_factor(curves: Mapping[str, xr.DataArray], published: float) -> Figure
             beside(axes)
         else:
             axes.legend(loc="upper left")
-    return made
+    return fig
 
 
 def linear_branches(study: xr.Dataset, regression: Regression, spread_K: float) -> Figure:
@@ -83,7 +83,7 @@ def linear_branches(study: xr.Dataset, regression: Regression, spread_K: float) 
     spread_K : float
         How closely the paper's law is said to hold.
     """
-    with figure(7.6, 3.6, 1, 2, letters=True) as (made, (off, slope)):
+    with figure(7.6, 3.6, 1, 2, letters=True) as (fig, (off, slope)):
         _by_kind(off, study, study.knee_K, study.straight_K, fill=True)
         _by_kind(off, study, study.knee_K, study.proportional_K, fill=False)
         off.axhline(spread_K, color="0.5", ls=":")
@@ -111,7 +111,7 @@ def linear_branches(study: xr.Dataset, regression: Regression, spread_K: float) 
                 name = f"{shape}, {dopant}-type"
                 slope.plot([], [], ls="none", marker=mark, color=colour, label=name)
         slope.legend(loc="upper left")
-    return made
+    return fig
 
 
 def _by_kind(axes: Axes, study: xr.Dataset, x: Any, y: Any, *, fill: bool) -> None:
@@ -138,7 +138,7 @@ def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: floa
     symbols = [parameter_label(name)[0].partition(" (")[0] for name in study.parameter.values]
     position = np.arange(len(symbols))
     shape: Any = {"sharey": True, "squeeze": False}
-    with figure(8.4, 3.6, 1, study.sizes["doping"], letters=True, **shape) as (made, [panels]):
+    with figure(8.4, 3.6, 1, study.sizes["doping"], letters=True, **shape) as (fig, [panels]):
         for axes, doping in zip(panels, study.doping.values, strict=True):
             columns = [
                 (str(name), ours.sel(error=name, doping=doping)) for name in study.error.values
@@ -147,15 +147,15 @@ def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: floa
             colours = [*COLOURS[: len(columns) - 1], BLACK]
             beside_each = np.linspace(-0.3, 0.3, len(columns))
             for (name, values), colour, aside in zip(columns, colours, beside_each, strict=True):
-                at, shown = position + aside, values.where(values > 0)
-                axes.plot(at, shown, "_" if colour == BLACK else "o", color=colour, label=name)
+                at, positive = position + aside, values.where(values > 0)
+                axes.plot(at, positive, "_" if colour == BLACK else "o", color=colour, label=name)
             axes.axhline(100 * claimed, color=ORANGE, ls=":")
             axes.set_xticks(position, symbols)
             axes.set_title(str(doping), loc="center")
             axes.set_ylim(0.0, None)
         panels[0].set(ylabel="largest distance from the mean (%)")
         beside(panels[-1])
-    return made
+    return fig
 
 
 def radiated_shares(levers: Mapping[str, xr.Dataset]) -> Figure:
@@ -166,7 +166,7 @@ def radiated_shares(levers: Mapping[str, xr.Dataset]) -> Figure:
     levers : mapping of str to xarray.Dataset
         See `hotlever.studies.radiation.radiated_heat`.
     """
-    with figure(7.6, 3.4, 1, 2, letters=True) as (made, (share, fall)):
+    with figure(7.6, 3.4, 1, 2, letters=True) as (fig, (share, fall)):
         for name, data in levers.items():
             share.plot(data.tip, 100.0 * data.radiated_mW / data.power_mW, label=name)
             fall.plot(data.tip, data.cooler_K, label=name)
@@ -176,7 +176,7 @@ def radiated_shares(levers: Mapping[str, xr.Dataset]) -> Figure:
             axes.set(xlabel=axis_label("tip_K"), yscale="log")
         share.set_ylim(top=10.0 * share.get_ylim()[1])  # for the legend
         share.legend(loc="upper left")
-    return made
+    return fig
 
 
 def knee_discrepancy(studies: Mapping[str, xr.Dataset]) -> Figure:
@@ -190,7 +190,7 @@ def knee_discrepancy(studies: Mapping[str, xr.Dataset]) -> Figure:
     first = next(iter(studies.values()))
     names = [*map(str, first.suspect.values), "what remains"]
     rows, height = np.arange(len(names)), 0.8 / len(studies)
-    with figure(7.4, 0.42 * len(names) + 1.0) as (made, axes):
+    with figure(7.4, 0.42 * len(names) + 1.0) as (fig, axes):
         for number, (medium, study) in enumerate(studies.items()):
             lengths = np.append(study.shift_K.values, study.left_K)
             error = np.where(rows == rows[-1], study.total_stderr_K, np.nan)
@@ -203,7 +203,7 @@ def knee_discrepancy(studies: Mapping[str, xr.Dataset]) -> Figure:
         axes.invert_yaxis()
         axes.set_xlabel("knee as read less that of the fitted model (K)")
         axes.legend(loc="center right")
-    return made
+    return fig
 
 
 def thermoelectric_shift(shift: xr.Dataset, other: xr.Dataset | None = None) -> Figure:
@@ -217,7 +217,7 @@ def thermoelectric_shift(shift: xr.Dataset, other: xr.Dataset | None = None) -> 
         The same of a lever with carriers of the other sign.
     """
     by_heat = shift.share_nm.sum("side").sel(polarity=1)
-    with figure(7.6, 3.4, 1, 2, letters=True) as (made, (position, moved)):
+    with figure(7.6, 3.4, 1, 2, letters=True) as (fig, (position, displacement)):
         without = "without thermoelectricity"
         position.plot(shift.bias, shift.plain_um, ":", color=BLACK, label=without)
         for polarity, mark, colour in ((1, "o-", BLUE), (-1, "s-", ORANGE)):
@@ -228,17 +228,19 @@ def thermoelectric_shift(shift: xr.Dataset, other: xr.Dataset | None = None) -> 
         position.set(xlabel="size of the bias (V)", ylabel="hot spot: supply ←   (µm)   → ground")
         position.legend()
         whole = shift.moved_nm.sel(polarity=1)
-        moved.plot(shift.bias, whole, "o-", color=BLUE, label="all")
+        displacement.plot(shift.bias, whole, "o-", color=BLUE, label="all")
         for heat, colour in (("Peltier", VERMILION), ("Thomson", GREEN)):
             values = by_heat.sel(heat=heat)
-            moved.plot(shift.bias, values, "--", color=colour, label=f"{heat} heat")
+            displacement.plot(shift.bias, values, "--", color=colour, label=f"{heat} heat")
         if other is not None:
             values = other.moved_nm.sel(polarity=1)
-            moved.plot(other.bias, values, "^-", color=PURPLE, label="all, with boron")
-        moved.axhline(0.0, color=BLACK, lw=0.6)
-        moved.set(xlabel="bias (V)", ylabel=axis_label("moved_nm").replace(" in the", "\nin the"))
-        moved.legend()
-    return made
+            displacement.plot(other.bias, values, "^-", color=PURPLE, label="all, with boron")
+        displacement.axhline(0.0, color=BLACK, lw=0.6)
+        displacement.set(
+            xlabel="bias (V)", ylabel=axis_label("moved_nm").replace(" in the", "\nin the")
+        )
+        displacement.legend()
+    return fig
 
 
 def predicted_and_published(cases: xr.Dataset) -> Figure:
@@ -250,7 +252,7 @@ def predicted_and_published(cases: xr.Dataset) -> Figure:
         From `hotlever.studies.validation.prediction.comparison`.
     """
     cases = cases.sortby("group")
-    with figure(7.4, _EACH * cases.sizes["case"] + _MORE) as (made, axes):
+    with figure(7.4, _EACH * cases.sizes["case"] + _MORE) as (fig, axes):
         rows = np.arange(cases.sizes["case"])[::-1]
         low, high, middle = (
             (cases[name] / cases.predicted).values for name in ("low_95", "high_95", "published")
@@ -271,15 +273,15 @@ def predicted_and_published(cases: xr.Dataset) -> Figure:
         axes.set_xticks([], minor=True)
         axes.set_yticks(rows, cases.case.values)
         axes.grid(False, axis="y")
-        made.legend(loc="outside upper center", ncols=3)
-    return made
+        fig.legend(loc="outside upper center", ncols=3)
+    return fig
 
 
 def residuals_of_current(bias_V: Array, residuals_uA: Array, error_uA: float) -> Figure:
     """Draw measured less calibrated currents (µA) and the error of reading them off."""
-    with figure(7.4, 2.4) as (made, axes):
+    with figure(7.4, 2.4) as (fig, axes):
         axes.axhspan(-error_uA, error_uA, color="0.9")
         axes.axhline(0.0, color="0.5", lw=0.6)
         axes.plot(bias_V, residuals_uA, "o", color=BLACK, ms=4)
         axes.set(xlabel="V$_b$ (V)", ylabel="residual of I$_h$ (µA)")
-    return made
+    return fig

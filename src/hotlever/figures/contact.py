@@ -42,12 +42,12 @@ def contact_overview(data: xr.Dataset, probe: Probe) -> Figure:
     along = "time_us" if "time" in data.sizes else "bias_V"
     (dimension,) = data.apex_K.dims
     mark = f"{marker(data, str(dimension))}-"
-    with figure(9.6, 5.2) as (made, axes):
+    with figure(9.6, 5.2) as (fig, axes):
         axes.remove()
-        grid = made.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
+        grid = fig.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
         hottest = data.isel({dimension: int(np.argmax(data.tip_K.values))})
-        _draw(made.add_subplot(grid[:, 0]), hottest, probe)
-        temperature, heat, current = (made.add_subplot(grid[row, 1]) for row in range(3))
+        _draw(fig.add_subplot(grid[:, 0]), hottest, probe)
+        temperature, heat, current = (fig.add_subplot(grid[row, 1]) for row in range(3))
         curve(temperature, data, along, "tip_K", mark, color=VERMILION, label="tip at the lever")
         curve(temperature, data, along, "apex_K", mark, color=PURPLE, label="apex")
         temperature.set(ylabel="temperature (K)")
@@ -62,8 +62,8 @@ def contact_overview(data: xr.Dataset, probe: Probe) -> Figure:
         for above in (temperature, heat):
             above.set(xlabel="")
             above.tick_params(labelbottom=False)
-        entitle(made, data)
-    return made
+        entitle(fig, data)
+    return fig
 
 
 def _draw(axes: Axes, state: xr.Dataset, probe: Probe) -> None:
@@ -140,7 +140,7 @@ def reader_overview(data: xr.Dataset) -> Figure:
     best = data.isel(data.resolution_nm_per_rtHz.argmin(...))
     of_best = data.sel({name: best[name].item() for name in others})
     mark = f"{marker(data, along)}-"
-    with figure(8.2, 5.6, 2, 2, letters=True) as (made, ((voltage, slope), (noise, resolution))):
+    with figure(8.2, 5.6, 2, 2, letters=True) as (fig, ((voltage, slope), (noise, resolution))):
         for curve, colour in zip(curves, COLOURS, strict=False):
             label = ", ".join(_LABELS[name].format(curve[name].item()) for name in others)
             style = {"color": colour, "label": label}
@@ -166,5 +166,5 @@ def reader_overview(data: xr.Dataset) -> Figure:
         for axes in (slope, noise, resolution):
             for which in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
                 which(_Plain(minor_thresholds=(2, 0.5)))
-        entitle(made, data, more=f"read at the terminal {data.attrs['read_at']}")
-    return made
+        entitle(fig, data, more=f"read at the terminal {data.attrs['read_at']}")
+    return fig

@@ -41,9 +41,9 @@ def design_study(data: xr.Dataset) -> Figure:
         "cold_ohm": "cold resistance (Ω)",
     }
     del labels["cold_ohm" if last == "k" else "k"]
-    made = (_map if len(data.dims) == 2 else _curves)(data, labels)
-    entitle(made, data)
-    return made
+    fig = (_map if len(data.dims) == 2 else _curves)(data, labels)
+    entitle(fig, data)
+    return fig
 
 
 def _map(data: xr.Dataset, labels: dict[str, str]) -> Figure:
@@ -55,39 +55,39 @@ def _map(data: xr.Dataset, labels: dict[str, str]) -> Figure:
         for name, value in zip((across, up), base, strict=True)
     )
     star: Any = {"color": VERMILION, "ms": 11, "mec": "white", "ls": "", "label": "the design"}
-    with figure(8.4, 6.4, 2, 2, sharex=True, sharey=True, letters=True) as (made, grid):
+    with figure(8.4, 6.4, 2, 2, sharex=True, sharey=True, letters=True) as (fig, grid):
         for axes, (name, label) in zip(grid.ravel(), labels.items(), strict=True):
-            _contours(made, axes, data[name].transpose(up, across), label)
+            _contours(fig, axes, data[name].transpose(up, across), label)
             if inside:
                 axes.plot(*base, "*", **star)
             axes.grid(False)
         marks = [Patch(fc="white", ec="0.6", hatch="////", label="no such lever, or no such value")]
-        made.legend(handles=[*grid[0, 0].lines, *marks], loc="outside upper center", ncols=2)
+        fig.legend(handles=[*grid[0, 0].lines, *marks], loc="outside upper center", ncols=2)
         for axes in grid[1]:
             axes.set(xlabel=label_of(across))
         for axes in grid[:, 0]:
             axes.set(ylabel=label_of(up))
-    return made
+    return fig
 
 
-def _contours(made: Figure, axes: Axes, values: xr.DataArray, label: str) -> None:
+def _contours(fig: Figure, axes: Axes, values: xr.DataArray, label: str) -> None:
     up, across = (values[name].values for name in values.dims)
     is_known = np.isfinite(values.values)
     hatched: Any = {"hatch": "////", "cmap": ListedColormap(["white"]), "edgecolor": "0.6"}
     missing = np.ma.masked_where(is_known, np.zeros(is_known.shape))
     axes.pcolor(across, up, missing, shading="nearest", lw=0.0, **hatched)
     if np.ptp(values.values[is_known]) > 0.0:
-        shown: Any = {"levels": _LEVELS}
-        filled = axes.contourf(across, up, values.values, **shown)
-        lines = axes.contour(across, up, values.values, colors="white", linewidths=0.7, **shown)
+        levels: Any = {"levels": _LEVELS}
+        filled = axes.contourf(across, up, values.values, **levels)
+        lines = axes.contour(across, up, values.values, colors="white", linewidths=0.7, **levels)
         axes.clabel(lines, fontsize=7)
-        made.colorbar(filled, ax=axes, label=label)
+        fig.colorbar(filled, ax=axes, label=label)
 
 
 def _curves(data: xr.Dataset, labels: dict[str, str]) -> Figure:
     (name,) = data.knee_K.dims
     along = data[name]
-    with figure(8.0, 5.6, 2, 2, sharex=True, letters=True) as (made, grid):
+    with figure(8.0, 5.6, 2, 2, sharex=True, letters=True) as (fig, grid):
         temperature, power, volts, loss = grid.ravel()
         temperature.plot(along, data.knee_K, "o-", color=VERMILION, label="knee")
         temperature.plot(along, data.inversion_K, "--", color=ORANGE, label="inversion T$_i$")
@@ -109,14 +109,14 @@ def _curves(data: xr.Dataset, labels: dict[str, str]) -> Figure:
             axes.axvline(along.attrs["base_value"], color="0.6", lw=0.8, ls=":")
         for axes in grid[1]:
             axes.set(xlabel=label_of(str(name)))
-    return made
+    return fig
 
 
 def design_optimum(optimum: Optimum) -> Figure:
     """Draw the best design within bounds beside the one it began with, and their I-V curves."""
     designs = {"start": (optimum.start, BLUE), "best": (optimum.best, VERMILION)}
-    with figure(9.0, 4.6, 2, 2, width_ratios=(1.1, 1.0)) as (made, grid):
-        curves = made.add_subplot(grid[0, 0].get_gridspec()[:, 1])
+    with figure(9.0, 4.6, 2, 2, width_ratios=(1.1, 1.0)) as (fig, grid):
+        curves = fig.add_subplot(grid[0, 0].get_gridspec()[:, 1])
         for axes in grid[:, 1]:
             axes.remove()
         handles: dict[str, Patch] = {}
@@ -130,8 +130,8 @@ def design_optimum(optimum: Optimum) -> Figure:
             axes.set(ylabel="y (µm)")
             axes.grid(False)
             u = np.linspace(0.0, solved.branch.end_u, 200)
-            shown = solved.branch.electrical_outputs(u)
-            curves.plot(shown["lever_V"], shown["current_mA"], color=colour, label=name)
+            outputs = solved.branch.electrical_outputs(u)
+            curves.plot(outputs["lever_V"], outputs["current_mA"], color=colour, label=name)
             marks = {"working point": (solved.u, "o"), "knee": (solved.branch.knee_u, "^")}
             for label, (at_u, mark) in marks.items():
                 if at_u is not None:
@@ -142,8 +142,8 @@ def design_optimum(optimum: Optimum) -> Figure:
         grid[1, 0].set(xlabel="x (µm)")
         curves.set(xlabel=axis_label("lever_V"), ylabel=axis_label("current_mA"), ylim=(0.0, None))
         curves.legend()
-        made.legend(handles=list(handles.values()), loc="outside lower center", ncols=4)
+        fig.legend(handles=list(handles.values()), loc="outside lower center", ncols=4)
         limits = "; ".join(optimum.limits) or "no bound"
         title = f"at {optimum.point}, limited by {limits}"
-        made.suptitle(title, x=0.01, ha="left", wrap=True, parse_math=False)
-    return made
+        fig.suptitle(title, x=0.01, ha="left", wrap=True, parse_math=False)
+    return fig

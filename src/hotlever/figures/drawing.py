@@ -32,7 +32,7 @@ _MARGIN, _NAME = 0.04, 0.33
 
 def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = None) -> Figure:
     """Draw a probe from above, with heater, reader, terminals and tip marked, or its mesh too."""
-    with figure(7.0, 3.4) as (made, axes):
+    with figure(7.0, 3.4) as (fig, axes):
         handles: dict[str, Patch | Line2D] = {**filled_regions(axes, layout)}
         if mesh is not None:
             x, y = mesh.elements.p
@@ -61,9 +61,9 @@ def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = N
         (left, below), (right, above) = low - room[0], high + room[1]
         axes.set(**_PLANE, xlim=(left, right), ylim=(below, above))
         if title:
-            made.suptitle(fill(title, _TITLE), x=0.01, ha="left", fontsize=9, parse_math=False)
-        made.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
-    return made
+            fig.suptitle(fill(title, _TITLE), x=0.01, ha="left", fontsize=9, parse_math=False)
+        fig.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
+    return fig
 
 
 def filled_regions(axes: Axes, layout: Layout) -> dict[str, Patch]:
@@ -131,7 +131,7 @@ def outlines_drawing(
     """
     rings = {name: [np.array(ring) for ring in group] for name, group in outlines.items() if group}
     extents = {name: np.ptp(np.concatenate(group), axis=0).prod() for name, group in rings.items()}
-    with figure(7.0, 4.2) as (made, axes):
+    with figure(7.0, 4.2) as (fig, axes):
         for number, name in enumerate(sorted(rings, key=lambda name: -extents[name])):
             colour = "0.6" if number == 0 else COLOURS[(number - 1) % len(COLOURS)]
             areas = [ring for ring in rings[name] if len(ring) > 2]
@@ -152,5 +152,5 @@ def outlines_drawing(
         (left, below), (right, above) = points.min(axis=0) - margin, points.max(axis=0) + margin
         axes.set(**_PLANE, xlim=(left, right), ylim=(below, above))
         axes.set_title(fill(fault, _TITLE) if fault else title, color=VERMILION if fault else BLACK)
-        made.legend(loc="outside lower center", ncols=4)
-    return made
+        fig.legend(loc="outside lower center", ncols=4)
+    return fig

@@ -75,7 +75,7 @@ def data_and_model(
         and (data[column.name].notnull().any() or (in_time and name == "tip"))
     }
     size, heights = (3.4 if in_time else 2.8) * len(panels), (1.8, 1.0)
-    with figure(size, 4.6, 2, len(panels), sharex=True, height_ratios=heights) as (made, grid):
+    with figure(size, 4.6, 2, len(panels), sharex=True, height_ratios=heights) as (fig, grid):
         for (upper, lower), (name, column) in zip(grid.T, panels.items(), strict=True):
             seen = column in measured and measured[column].notnull().any()
             complete = model.dropna(along, subset=[column])
@@ -99,12 +99,12 @@ def data_and_model(
             lower.set(xlabel=axis_label(along))
         if in_time and settled(measured):
             grid[0, 0].set_xscale("log")
-        entitle(made, model, is_described=band is None or _stated(band))
+        entitle(fig, model, is_described=band is None or _stated(band))
         panel_letters(grid[0])
         # the tip has a band of its own
         for axes in {grid[0, 0], grid[0, 0 if band is None else list(panels).index("tip")]}:
             axes.legend(loc="best")
-    return made
+    return fig
 
 
 def _differences(axes: Axes, measured: xr.Dataset, model: xr.Dataset, name: str) -> None:
@@ -137,7 +137,7 @@ def _stated(band: xr.Dataset) -> bool:
 def correlation_matrix(names: Sequence[str], correlation: Array, lever: str = "") -> Figure:
     """Draw the correlation of fitted parameters (paper's Fig. 4 d-f), titled by the lever."""
     count = len(names)
-    with figure(1.2 + 0.52 * count, 0.6 + 0.52 * count) as (made, axes):
+    with figure(1.2 + 0.52 * count, 0.6 + 0.52 * count) as (fig, axes):
         image = axes.imshow(correlation, cmap="PuOr", vmin=-1, vmax=1)
         symbols = [parameter_named(name).symbol for name in names]
         # names of dimensions are long
@@ -148,9 +148,9 @@ def correlation_matrix(names: Sequence[str], correlation: Array, lever: str = ""
             colour = "white" if abs(value) > 0.7 else "black"
             style: Any = {"ha": "center", "va": "center", "fontsize": 7.5}
             axes.text(column, row, f"{round(value, 2) + 0.0:.2f}", color=colour, **style)
-        made.colorbar(image, label="correlation (1)", shrink=0.9)
-        entitle(made, more=lever)
-    return made
+        fig.colorbar(image, label="correlation (1)", shrink=0.9)
+        entitle(fig, more=lever)
+    return fig
 
 
 def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
@@ -181,8 +181,8 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     ratios = (1.8, 1.0) if stated else (1.0,)
     shape: Any = {"sharex": "col", "height_ratios": ratios, "squeeze": False}
     size = 3.7 * len(panels), 5.0 if stated else 3.6
-    with figure(*size, len(ratios), len(panels), letters=True, **shape) as (made, grid):
-        entitle(made, band, is_described=stated)
+    with figure(*size, len(ratios), len(panels), letters=True, **shape) as (fig, grid):
+        entitle(fig, band, is_described=stated)
         for (upper, *lower), (name, rows, label) in zip(grid.T, panels, strict=True):
             x = band[name].values
             upper.plot(x, rows[2], color=BLUE, label=middle_name)
@@ -199,7 +199,7 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
             upper.set(ylabel="tip temperature (K)")
             [upper, *lower][-1].set(xlabel=label, xlim=from_zero(x))
         grid[0, 0].legend(loc="upper left")
-    return made
+    return fig
 
 
 def _band(axes: Axes, x: Array, rows: Array, zero: Array | float) -> None:
@@ -220,16 +220,16 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
     columns = min(3, len(profiles))
     rows = math.ceil(len(profiles) / columns)
     width, height = 2.9 * columns + 0.3, 2.6 * rows + 0.4
-    with figure(width, height, rows, columns, squeeze=False) as (made, grid):
+    with figure(width, height, rows, columns, squeeze=False) as (fig, grid):
         panels = grid.ravel()[: len(profiles)]
         for axes, profile in zip(panels, profiles, strict=True):
             _profile(axes, profile)
         for axes in grid.ravel()[len(profiles) :]:
             axes.remove()
         panel_letters(panels)
-        entitle(made, *profiles)
+        entitle(fig, *profiles)
         grid[0, 0].legend(loc="upper center", frameon=True, facecolor="white", edgecolor="none")
-    return made
+    return fig
 
 
 def _profile(axes: Axes, profile: xr.Dataset) -> None:
@@ -265,11 +265,11 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
         Value of each quantity to mark.
     """
     names = posterior.quantity.values.tolist()
-    shown = {name: parameter_label(name) for name in names}
-    values = {name: posterior[name].values.ravel() / shown[name][1] for name in names}
-    marks = {name: value / shown[name][1] for name, value in (optimum or {}).items()}
+    labels = {name: parameter_label(name) for name in names}
+    values = {name: posterior[name].values.ravel() / labels[name][1] for name in names}
+    marks = {name: value / labels[name][1] for name, value in (optimum or {}).items()}
     size = 1.3 * len(names) + 0.8
-    with figure(size, size, len(names), len(names), squeeze=False) as (made, grid):
+    with figure(size, size, len(names), len(names), squeeze=False) as (fig, grid):
         for (row, column), axes in np.ndenumerate(grid):
             down, across = names[row], names[column]
             if column > row:
@@ -291,16 +291,16 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
                 if row != column:
                     axes.axhline(marks[down], color=VERMILION, lw=0.8)
             if bottom:
-                axes.set_xlabel(shown[across][0])
+                axes.set_xlabel(labels[across][0])
             if left:
-                axes.set_ylabel(shown[down][0])
-        made.align_labels()
-        entitle(made, posterior)
+                axes.set_ylabel(labels[down][0])
+        fig.align_labels()
+        entitle(fig, posterior)
         handles = [Patch(color=_DARK, label="68 %"), Patch(color=_LIGHT, label="95 %")]
         if marks:
             handles.append(Patch(color=VERMILION, label="optimum of the fit"))
-        made.legend(handles=handles, loc="upper right", fontsize=10)
-    return made
+        fig.legend(handles=handles, loc="upper right", fontsize=10)
+    return fig
 
 
 def _histogram(axes: Axes, values: Array) -> None:
@@ -343,7 +343,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
     determined = (np.isfinite(levers.stderr) & levers.counts).any("lever")
     free = levers.quantity.values[determined.values].tolist()
     height, shape = 1.2 * len(free) + (0.8 if many else 1.2), {"sharex": True, "squeeze": False}
-    with figure(7.4, height, len(free), 1, letters=True, **shape) as (made, grid):
+    with figure(7.4, height, len(free), 1, letters=True, **shape) as (fig, grid):
         column = grid[:, 0]
         for name, axes in zip(free, column, strict=True):
             quantity = levers.sel(quantity=name)
@@ -357,7 +357,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
             named: Any = {"rotation": 45, "ha": "right", "parse_math": False}
             column[-1].set_xticks(np.arange(1, count + 1), levers.lever.values, **named)
             column[-1].set_xlim(0.5, count + 0.5)
-        made.align_ylabels()
+        fig.align_ylabels()
         handles, labels = column[0].get_legend_handles_labels()
-        made.legend(handles, labels, loc="outside upper center", ncols=len(labels))
-    return made
+        fig.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return fig

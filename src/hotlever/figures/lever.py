@@ -39,7 +39,7 @@ def material_curves(curves: Mapping[str, tuple[Array, Array, Array | None]]) -> 
     curves : mapping of str to tuple
         From `hotlever.materials.catalogue.curves`.
     """
-    with figure(7.4, 4.6, 1, 2) as (made, (left, right)):
+    with figure(7.4, 4.6, 1, 2) as (fig, (left, right)):
         materials = zip(curves.items(), cycle(LINES), strict=False)
         for (name, (T, kappa, rho)), (line, colour) in materials:
             left.semilogy(T, kappa, line, color=colour, label=name)
@@ -47,13 +47,13 @@ def material_curves(curves: Mapping[str, tuple[Array, Array, Array | None]]) -> 
                 right.semilogy(T, rho, line, color=colour)
         left.set(xlabel="temperature (K)", ylabel="thermal conductivity (W m⁻¹ K⁻¹)")
         right.set(xlabel="temperature (K)", ylabel="resistivity (Ω cm)")
-        made.legend(loc="outside lower center", ncols=4)
-    return made
+        fig.legend(loc="outside lower center", ncols=4)
+    return fig
 
 
 def sweep_overview(sweep: xr.Dataset) -> Figure:
     """Draw what a sweep gives against the bias: current, voltages, tip temperature, I-V."""
-    with figure(7.4, 5.2, 2, 2, letters=True) as (made, grid):
+    with figure(7.4, 5.2, 2, 2, letters=True) as (fig, grid):
         current, voltage, tip, iv = grid.ravel()
         curve(current, sweep, "bias_V", "current_mA", "o-", color=BLUE, label="I$_h$, swept supply")
         held = [name for name in map(str, sweep.data_vars) if name.endswith("_mA")]
@@ -71,8 +71,8 @@ def sweep_overview(sweep: xr.Dataset) -> Figure:
         bridge_beside(voltage, sweep, "bias_V", marker="^")
         curve(tip, sweep, "bias_V", "tip_K", "o-", color=VERMILION)
         curve(iv, sweep, "lever_V", "current_mA", "o-", color=BLUE)
-        entitle(made, sweep)
-    return made
+        entitle(fig, sweep)
+    return fig
 
 
 def iv_curves(
@@ -93,7 +93,7 @@ def iv_curves(
         From `Measurement.dataset`.
     published : sequence of `hotlever.spieser2017` operating points, optional
     """
-    with figure(4.8, 3.6) as (made, axes):
+    with figure(4.8, 3.6) as (fig, axes):
         for (name, sweep), colour in zip(sweeps.items(), cycle(COLOURS), strict=False):
             line = marker(sweep, "bias") or "-"
             curve(axes, sweep, "lever_V", "current_mA", line, color=colour, label=name)
@@ -109,15 +109,15 @@ def iv_curves(
             axes.plot(point.lever_V, point.current_mA, "o", **ring)
             at: Any = {"xytext": (-4, -13), "textcoords": "offset points", "ha": "right"}
             axes.annotate(point.name, (point.lever_V, point.current_mA), fontsize=8, **at)
-        shown = [*sweeps.values(), *([] if measured is None else [measured])]
+        datasets = [*sweeps.values(), *([] if measured is None else [measured])]
         volts, currents = (
-            np.concatenate([data[name].values for data in shown])
+            np.concatenate([data[name].values for data in datasets])
             for name in ("lever_V", "current_mA")
         )
         axes.set(xlim=from_zero(volts), ylim=from_zero(currents))
-        entitle(made, *sweeps.values())
+        entitle(fig, *sweeps.values())
         axes.legend(loc="upper left")
-    return made
+    return fig
 
 
 def temperature_power(
@@ -131,7 +131,7 @@ def temperature_power(
     def expected(power: Any) -> np.ndarray:
         return law.tip_temperature(power, base_temperature_K)
 
-    with figure(4.6, 4.6, 2, 1, sharex=True, height_ratios=(2.2, 1.0)) as (made, (axes, below)):
+    with figure(4.6, 4.6, 2, 1, sharex=True, height_ratios=(2.2, 1.0)) as (fig, (axes, below)):
         power = np.linspace(0, float(sweep.power_mW.max()) * 1.03, 800)
         jump = np.searchsorted(power, law.threshold_mW)
         for part, label in ((slice(0, jump), "power law, Eq. 12"), (slice(jump, None), None)):
@@ -147,13 +147,13 @@ def temperature_power(
         axes.legend(loc="upper left")
         where: Any = {"xycoords": "axes fraction", "color": "0.4", "fontsize": 8}
         below.annotate(f"±{POWER_LAW_SPREAD_K:.0f} K", (0.02, 0.06), **where)
-        entitle(made, sweep)
-    return made
+        entitle(fig, sweep)
+    return fig
 
 
 def resistances(sweep: xr.Dataset) -> Figure:
     """Draw heater, leg and total resistance against tip temperature (paper's Fig. 5)."""
-    with figure(4.2, 3.4) as (made, axes):
+    with figure(4.2, 3.4) as (fig, axes):
         for name, label, colour, mark in (
             ("lever_ohm", "lever, total", BLACK, "s"),
             ("heater_ohm", "heater R$_h$", VERMILION, "o"),
@@ -162,24 +162,24 @@ def resistances(sweep: xr.Dataset) -> Figure:
             style: Any = {"color": colour, "marker": marker(sweep, "bias", mark), "label": label}
             axes.plot(sweep.tip_K, sweep[name] / 1000, **style)
         axes.set(xlabel=axis_label("tip_K"), ylabel="resistance (kΩ)", ylim=(0, None))
-        entitle(made, sweep)
+        entitle(fig, sweep)
         axes.legend()
-    return made
+    return fig
 
 
 def doping_profile(profile: xr.Dataset) -> Figure:
     """Draw doping and local inversion temperature along the heater (paper's Fig. 7a)."""
-    with figure(4.6, 3.4) as (made, axes):
+    with figure(4.6, 3.4) as (fig, axes):
         curve(axes, profile, "position", "doping", color=BLUE)
         axes.set(yscale="log")
         axes.yaxis.label.set_color(BLUE)
         right = axes.twinx()
         right.plot(profile.position, profile.inversion_temperature, "--", color=VERMILION)
         right.set_ylabel("inversion temperature (K)", color=VERMILION)
-        entitle(made, profile)
+        entitle(fig, profile)
         right.spines["right"].set_visible(True)
         right.grid(False)
-    return made
+    return fig
 
 
 def heater_profiles(profiles: Mapping[str, xr.Dataset]) -> Figure:
@@ -192,14 +192,14 @@ def heater_profiles(profiles: Mapping[str, xr.Dataset]) -> Figure:
     profiles : mapping of str to xarray.Dataset
         From `heater_profile`, by the name of the operating point.
     """
-    with figure(5.2, 5.2, 2, 1, sharex=True) as (made, (upper, lower)):
+    with figure(5.2, 5.2, 2, 1, sharex=True) as (fig, (upper, lower)):
         for (name, profile), colour in zip(profiles.items(), cycle(COLOURS), strict=False):
             rho, metallic = profile.resistivity, profile.resistivity_slope.values > 0
             # let the dashed part reach the solid one
             inverted = ~metallic | ~np.roll(metallic, 1) | ~np.roll(metallic, -1)
             for part, line in ((metallic, "-"), (inverted & ~metallic.all(), "--")):
-                shown = profile.assign(resistivity=rho.where(part))
-                curve(upper, shown, "position", "resistivity", line, color=colour)
+                masked_profile = profile.assign(resistivity=rho.where(part))
+                curve(upper, masked_profile, "position", "resistivity", line, color=colour)
             seen = f"{profile.attrs['lever_V']:.2f} V, {profile.attrs['current_mA']:.2f} mA"
             label = f"{name}: {seen}"
             curve(lower, profile, "position", "temperature", color=colour, label=label)
@@ -209,9 +209,9 @@ def heater_profiles(profiles: Mapping[str, xr.Dataset]) -> Figure:
         upper.legend(handles=[solid, dashed], loc="upper right")
         low, high = lower.get_ylim()
         lower.set_ylim(low, high + 0.35 * (high - low))
-        entitle(made, *profiles.values())
+        entitle(fig, *profiles.values())
         lower.legend(loc="upper left")
-    return made
+    return fig
 
 
 def held_states(data: xr.Dataset, curve: xr.Dataset | None = None) -> Figure:
@@ -224,7 +224,7 @@ def held_states(data: xr.Dataset, curve: xr.Dataset | None = None) -> Figure:
     """
     of_power = "set_mW" in data
     column, scale = ("set_mW", 1.0) if of_power else ("set_ohm", 1000.0)
-    with figure(7.4, 3.4, 1, 2, letters=True) as (made, (quantity, bias)):
+    with figure(7.4, 3.4, 1, 2, letters=True) as (fig, (quantity, bias)):
         if curve is not None:
             whole = curve.power_mW if of_power else curve.lever_V / curve.current_mA
             style: Any = {"color": "0.6", "lw": 1.0, "label": "all states"}
@@ -246,5 +246,5 @@ def held_states(data: xr.Dataset, curve: xr.Dataset | None = None) -> Figure:
         )
         bias.set(xlabel=axis_label("tip_K"), ylabel=axis_label("bias_V"))
         quantity.legend()
-        entitle(made, data)
-    return made
+        entitle(fig, data)
+    return fig

@@ -91,7 +91,7 @@ def field_maps(state: State) -> Figure:
     most = _MAGNIFIED * np.ptp(layout.box, axis=0).max()
     if size > most:  # where all of the conductor heats
         what, size, centre = "tip", most, np.array(layout.tip)
-    with figure(7.0, 6.8, 3, 2, width_ratios=(1.75, 1.0)) as (made, grid):
+    with figure(7.0, 6.8, 3, 2, width_ratios=(1.75, 1.0)) as (fig, grid):
         for row, (label, values, colours, norm) in zip(grid, maps, strict=True):
             shading = "gouraud" if values.size == len(fields.points) else "flat"
             style: Any = {"cmap": colours, "norm": norm, "shading": shading, "rasterized": True}
@@ -100,10 +100,10 @@ def field_maps(state: State) -> Figure:
                 outlines(axes, layout)
             row[1].set_xlim(centre[0] + np.array([-0.85, 0.85]) * size)
             row[1].set_ylim(centre[1] + np.array([-0.65, 0.65]) * size)
-            made.colorbar(image, ax=row[1], label=label, extend="min" if norm else "neither")
+            fig.colorbar(image, ax=row[1], label=label, extend="min" if norm else "neither")
         grid[0, 1].set_title(f"{what}, magnified")
-        made.suptitle(_title(state), x=0.01, ha="left")
-    return made
+        fig.suptitle(_title(state), x=0.01, ha="left")
+    return fig
 
 
 def temperature_map(state: State) -> Figure:
@@ -117,13 +117,13 @@ def temperature_map(state: State) -> Figure:
     surface = seen_from_above(state.lever)
     T = surface.sampling @ state.nodal[0]
     hottest = surface.points[T.argmax()]
-    with figure(7.0, _height(state.lever) + 0.4) as (made, axes):
+    with figure(7.0, _height(state.lever) + 0.4) as (fig, axes):
         _map(axes, state.lever, surface, T, (state.lever.circuit.base_temperature_K, T.max()))
         style: Any = {"ls": "none", "marker": "x", "color": "black", "ms": 5}
         axes.plot(*hottest, label=f"hottest, {T.max():.0f} K", **style)
-        made.legend(loc="outside lower center", ncols=2)
-        made.suptitle(_title(state), x=0.01, ha="left")
-    return made
+        fig.legend(loc="outside lower center", ncols=2)
+        fig.suptitle(_title(state), x=0.01, ha="left")
+    return fig
 
 
 def air_loss(
@@ -146,7 +146,7 @@ def air_loss(
     top = heights.min(axis=1) > heights.max() * (1 - 1e-9)
     values = 1e3 * flux[top]
     strongest = float(np.abs(values).max())
-    with figure(7.0, 6.0, 2, 1, height_ratios=(1.5, 1.0), letters=True) as (made, (upper, lower)):
+    with figure(7.0, 6.0, 2, 1, height_ratios=(1.5, 1.0), letters=True) as (fig, (upper, lower)):
         scale = SymLogNorm(0.01 * strongest, vmin=-strongest, vmax=strongest)
         style: Any = {"cmap": "RdBu_r", "norm": scale, "edgecolors": "face", "linewidths": 0.2}
         cells = PolyCollection(list(panels.corners[top][:, :, :2]), array=values, **style)
@@ -159,7 +159,7 @@ def air_loss(
         powers = 10.0 ** np.arange(np.ceil(np.log10(0.02 * strongest)), np.log10(strongest))
         ticks = [*-powers[::-1], 0.0, *powers]
         bar: dict[str, Any] = {"location": "bottom", "shrink": 0.8, "aspect": 40, "ticks": ticks}
-        made.colorbar(cells, ax=upper, label=label, **bar)
+        fig.colorbar(cells, ax=upper, label=label, **bar)
         upper.set_title(title, loc="right")
         colours = [colour for colour in COLOURS if colour != BLACK] + ["0.5"]
         names = shares.region.values.tolist()
@@ -171,8 +171,8 @@ def air_loss(
         lower.axhline(0.0, color="0.6", lw=0.6)
         lower.set(xlabel=axis_label("tip_K"), ylabel="share of the power\nlost to air (%)")
         beside(lower)
-        entitle(made, shares)
-    return made
+        entitle(fig, shares)
+    return fig
 
 
 def temperature_slices(slices: xr.Dataset) -> Figure:
@@ -185,7 +185,7 @@ def temperature_slices(slices: xr.Dataset) -> Figure:
     """
     base, tip = slices.attrs["base_K"], slices.attrs["tip_K"]
     levels = [base + share * (tip - base) for share in ISOTHERMS]
-    with figure(7.2, 6.4, 2, 2, letters=True) as (made, grid):
+    with figure(7.2, 6.4, 2, 2, letters=True) as (fig, grid):
         for axes, name in zip(grid.ravel(), slices.slice.values, strict=True):
             cut = slices.sel(slice=name)
             at: Any = (cut.along_um, cut.z_um, cut.temperature)
@@ -195,9 +195,9 @@ def temperature_slices(slices: xr.Dataset) -> Figure:
             axes.set(aspect="equal", xlabel=f"{cut.axis.item()} (µm)", ylabel="z (µm)")
             axes.grid(False)
             axes.set_title(name, loc="center")
-        made.colorbar(image, ax=grid, label="temperature (K)", shrink=0.7)
-        entitle(made, slices, more=f"bias {slices.attrs['bias_V']:.3g} V, tip at {tip:.0f} K")
-    return made
+        fig.colorbar(image, ax=grid, label="temperature (K)", shrink=0.7)
+        entitle(fig, slices, more=f"bias {slices.attrs['bias_V']:.3g} V, tip at {tip:.0f} K")
+    return fig
 
 
 def pulse_film(history: xr.Dataset, states: Sequence[tuple[float, State]]) -> FuncAnimation:
@@ -242,17 +242,17 @@ def pulse_film(history: xr.Dataset, states: Sequence[tuple[float, State]]) -> Fu
     data = history.isel(time=history.time > 0) if settled(history) else history
     bias = np.interp([t for t, _ in states], history.time, history.bias_V)
     high = _height(lever), 2.2
-    with figure(7.0, sum(high), 2, 1, height_ratios=high) as (made, (above, below)):
+    with figure(7.0, sum(high), 2, 1, height_ratios=high) as (fig, (above, below)):
         image = _map(above, lever, surface, frames[-1], limits)
         curve(below, data, "time", "tip_K", color=VERMILION)
         if settled(history):
             below.set_xscale("log")
         (now,) = below.plot([], [], "o", color="black", ms=6)
-        made.suptitle(f"{lever.probe.title}, {history.attrs['waveform']}", x=0.01, ha="left")
+        fig.suptitle(f"{lever.probe.title}, {history.attrs['waveform']}", x=0.01, ha="left")
         at = above.set_title(f"{states[-1][0]:.4g} µs")
-        made.set_dpi(_DPI)
-        made.draw_without_rendering()
-        made.set_layout_engine("none")  # from here on nothing but the state changes
+        fig.set_dpi(_DPI)
+        fig.draw_without_rendering()
+        fig.set_layout_engine("none")  # from here on nothing but the state changes
         # outlines are over the temperature
         for artist in (image, *above.patches, *above.lines, at, now):
             artist.set_animated(True)
@@ -264,7 +264,7 @@ def pulse_film(history: xr.Dataset, states: Sequence[tuple[float, State]]) -> Fu
         at.set_text(f"{t:.4g} µs: bias {bias[frame]:.3g} V, tip at {state.tip_K:.1f} K")
         return image, now, at
 
-    return FuncAnimation(made, show, frames=len(states), interval=1000 / _PER_SECOND)
+    return FuncAnimation(fig, show, frames=len(states), interval=1000 / _PER_SECOND)
 
 
 def save_film(
@@ -289,12 +289,12 @@ def save_film(
     if suffix not in FILM_TYPES:
         raise InputError(f"{path}: unknown film type '{suffix}', expected {FILM_TYPES[0]}")
 
-    def told(frame: int, frames: int) -> None:
+    def report_frame(frame: int, frames: int) -> None:
         if progress is not None:
             progress(frame + 1, frames)
 
     with mpl.rc_context(STYLE), whole_file(path) as temporary:
-        film.save(temporary, _Writer(_PER_SECOND), dpi=_DPI, progress_callback=told)
+        film.save(temporary, _Writer(_PER_SECOND), dpi=_DPI, progress_callback=report_frame)
 
 
 class _Writer(PillowWriter):

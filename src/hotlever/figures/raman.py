@@ -51,9 +51,9 @@ def thermometry(
     lines, table = [line for line in lines if line.correction.use], table.isel(spectrum=used)
     names = list(map(str, table.file.values))
     if calibration is None:
-        with figure(4.2, 5.4) as (made, axes):
+        with figure(4.2, 5.4) as (fig, axes):
             _stack(axes, list(zip(names, lines, strict=True)))
-        return made
+        return fig
     if series:
         stated = {point.file: point.temperature_K for point in calibration.points}
         heated = [line for line in series if line.spectrum.name in stated]
@@ -62,15 +62,15 @@ def thermometry(
     else:
         read = zip(names, table.temperature_K.values, lines, strict=True)
         stacked = [(f"{t:.0f} K" if np.isfinite(t) else name, line) for name, t, line in read]
-    with figure(10.0, 5.4) as (made, alone):
+    with figure(10.0, 5.4) as (fig, alone):
         alone.remove()  # for a column of one panel beside a column of two
-        grid = made.add_gridspec(2, 2, width_ratios=(1.0, 1.35), height_ratios=(1.5, 1.0))
-        panels = [made.add_subplot(cell) for cell in (grid[:, 0], grid[0, 1], grid[1, 1])]
+        grid = fig.add_gridspec(2, 2, width_ratios=(1.0, 1.35), height_ratios=(1.5, 1.0))
+        panels = [fig.add_subplot(cell) for cell in (grid[:, 0], grid[0, 1], grid[1, 1])]
         _stack(panels[0], stacked)
         _calibration(panels[1], calibration, table)
         _residuals(panels[2], calibration)
         panel_letters(panels)
-    return made
+    return fig
 
 
 def _in_window(line: Line) -> tuple[Array, Array]:
@@ -165,7 +165,7 @@ def raman_check(check: xr.Dataset) -> Figure:
     hottest, predicted = check.hottest_K, check.knee_predicted_K
     low, high = check.error_at_hottest.min().item(), check.error_at_hottest.max().item()
     bars = [("as published", check.knee_measured_K - predicted, GREY)]
-    with figure(7.2, 6.4, 2, 1, height_ratios=(1.7, 1.0)) as (made, (upper, lower)):
+    with figure(7.2, 6.4, 2, 1, height_ratios=(1.7, 1.0)) as (fig, (upper, lower)):
         style: Any = {"color": GREY, "alpha": 0.2, "lw": 0}
         upper.fill_between(temperature, -band, band, label=f"the paper's error, {_BAND}", **style)
         for index, (color, dash) in enumerate(((VERMILION, "--"), (BLUE, "-."))):
@@ -173,8 +173,8 @@ def raman_check(check: xr.Dataset) -> Figure:
             name = str(law.line.item())
             upper.plot(temperature, law.error, dash, color=color, lw=1.8, label=name)
             upper.plot([hottest], [law.error_at_hottest.item()], "o", color=color, ms=5)
-            shown = name.split(":")[0] + ",\ncurvature corrected"
-            bars.append((shown, law.discrepancy.item(), color))
+            bar_label = name.split(":")[0] + ",\ncurvature corrected"
+            bars.append((bar_label, law.discrepancy.item(), color))
         text = f"{low:.0f} to {high:.0f} K too hot\nat {hottest:.0f} K"
         upper.text(hottest - 55.0, 0.99 * high, text, ha="right", va="top", fontsize=9)
         upper.axvline(check.calibrated_to_K, color=BLACK, lw=0.8, ls=":")
@@ -192,15 +192,15 @@ def raman_check(check: xr.Dataset) -> Figure:
         values = [value for _, value, _ in bars]
         lower.set(xlabel="knee temperature, measured − predicted (K)")
         lower.set(xlim=(min(0.0, *values), 1.45 * max(values)))
-        made.suptitle("\n".join(textwrap.wrap(conclusion(check), 92)), fontsize=9.5)
-    return made
+        fig.suptitle("\n".join(textwrap.wrap(conclusion(check), 92)), fontsize=9.5)
+    return fig
 
 
 def one_spectrum(line: Line) -> Figure:
     """One spectrum with its fit and what the fit leaves."""
     x, y = _in_window(line)
     residual: Array = y - float(np.median(y))
-    with figure(6.0, 4.6, 2, 1, sharex=True, height_ratios=(3.0, 1.0)) as (made, (upper, lower)):
+    with figure(6.0, 4.6, 2, 1, sharex=True, height_ratios=(3.0, 1.0)) as (fig, (upper, lower)):
         upper.plot(x, y, ".", ms=3, color=GREY, label="counts")
         if line.peak is not None:
             residual = _fitted(upper, line.peak, x, y)
@@ -213,7 +213,7 @@ def one_spectrum(line: Line) -> Figure:
         upper.set(ylabel="counts", title=line.spectrum.name)
         lower.set(xlabel="Raman shift (cm⁻¹)", ylabel="counts − fit", xlim=WINDOW)
         upper.legend()
-    return made
+    return fig
 
 
 def _fitted(axes: Axes, peak: Peak, x: Array, y: Array) -> Array:
@@ -236,6 +236,6 @@ def _fitted(axes: Axes, peak: Peak, x: Array, y: Array) -> Array:
     axes.set_ylim(least - 0.08 * reach, top)
     if hit.any():
         # a spike above the frame is marked at its edge
-        shown = np.minimum(y[hit], top - 0.03 * reach)
-        axes.plot(x[hit], shown, "x", color=VERMILION, ms=7, label="cosmic ray, left out")
+        clipped = np.minimum(y[hit], top - 0.03 * reach)
+        axes.plot(x[hit], clipped, "x", color=VERMILION, ms=7, label="cosmic ray, left out")
     return residual

@@ -85,14 +85,14 @@ def figure(
         As matplotlib's ``Figure.subplots`` has them.
     """
     with mpl.rc_context(STYLE):
-        made = Figure(figsize=(width, height), layout="constrained")
-        axes: Any = made.subplots(*shape, **subplots)
+        fig = Figure(figsize=(width, height), layout="constrained")
+        axes: Any = fig.subplots(*shape, **subplots)
         if letters:
             panel_letters(axes.ravel())
-        yield made, axes
+        yield fig, axes
 
 
-def save_figure(made: Figure, path: str | os.PathLike[str]) -> None:
+def save_figure(fig: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure as PNG, SVG or PDF, whole or not at all.
 
     Raises
@@ -108,7 +108,7 @@ def save_figure(made: Figure, path: str | os.PathLike[str]) -> None:
     with mpl.rc_context(STYLE), whole_file(path) as temporary:
         # no dates: the same figure gives the same file
         metadata = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-        made.savefig(temporary, metadata=metadata.get(suffix))
+        fig.savefig(temporary, metadata=metadata.get(suffix))
 
 
 def curve(axes: Axes, data: xr.Dataset, along: str, name: str, *line: str, **style: Any) -> None:
@@ -135,16 +135,16 @@ def bridge_beside(axes: Axes, data: xr.Dataset, along: str, **style: Any) -> Non
         right.grid(False)
 
 
-def entitle(made: Figure, *datasets: xr.Dataset, more: str = "", is_described: bool = True) -> None:
+def entitle(fig: Figure, *datasets: xr.Dataset, more: str = "", is_described: bool = True) -> None:
     """Write above a figure of which levers its datasets are, as far as these say so, and more.
 
     Where the levers do not show their data, the title says so.
     """
-    told = [data.attrs["lever"] for data in datasets if "lever" in data.attrs]
+    levers = [data.attrs["lever"] for data in datasets if "lever" in data.attrs]
     doubt = "" if is_described else "the data are not described: the nearest lever, without errors"
-    text = "; ".join(filter(None, [" and ".join(dict.fromkeys(told)), more, doubt]))
+    text = "; ".join(filter(None, [" and ".join(dict.fromkeys(levers)), more, doubt]))
     if text:
-        made.suptitle(text, x=0.01, ha="left", color=BLACK if is_described else VERMILION)
+        fig.suptitle(text, x=0.01, ha="left", color=BLACK if is_described else VERMILION)
 
 
 def marker(data: xr.Dataset, along: str, mark: str = "o") -> str:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 #: Share of a step of which a line is drawn; and of the gains, whose times are told apart.
-_OVERSHOOT, _SHOWN = 0.1, 0.8
+_OVERSHOOT, _COLOURED_SHARE = 0.1, 0.8
 
 
 def history_overview(history: xr.Dataset) -> Figure:
@@ -39,7 +39,7 @@ def history_overview(history: xr.Dataset) -> Figure:
     if data.air_stored_nJ.any():
         energies["air_stored_nJ"] = "in the air", BLUE
     energies["lost_nJ"] = "lost", ORANGE
-    with figure(7.4, 5.2, 2, 2, letters=True, sharex=True) as (made, grid):
+    with figure(7.4, 5.2, 2, 2, letters=True, sharex=True) as (fig, grid):
         voltage, current, tip, heat = grid.ravel()
         for name, label, colour in (
             ("bias_V", "bias V$_b$", PURPLE),
@@ -61,8 +61,8 @@ def history_overview(history: xr.Dataset) -> Figure:
         bridge_beside(voltage, data, "time", **style)
         if settled(history):
             tip.set_xscale("log")
-        entitle(made, history, more=history.attrs.get("waveform", ""))
-    return made
+        entitle(fig, history, more=history.attrs.get("waveform", ""))
+    return fig
 
 
 def _resistance(axes: Axes, data: xr.Dataset, style: Any) -> None:
@@ -75,7 +75,7 @@ def _resistance(axes: Axes, data: xr.Dataset, style: Any) -> None:
 
 def small_signals(spectrum: xr.Dataset) -> Figure:
     """Draw the impedance (Nyquist, Bode) and how the tip follows power and bias."""
-    with figure(7.4, 5.4, 2, 2, letters=True) as (made, grid):
+    with figure(7.4, 5.4, 2, 2, letters=True) as (fig, grid):
         nyquist, bode, size, phase = grid.ravel()
         real, imaginary = spectrum.impedance_real_ohm / 1000, spectrum.impedance_imag_ohm / 1000
         nyquist.plot(real, -imaginary, "o-", ms=3, color=BLUE)
@@ -99,8 +99,8 @@ def small_signals(spectrum: xr.Dataset) -> Figure:
         size.set(ylabel=changes, yscale="log")
         phase.set(ylabel="phase (°)")
         _along_frequency(bode, size, phase)
-        entitle(made, spectrum, more=f"bias {spectrum.attrs['bias_V']:.3g} V")
-    return made
+        entitle(fig, spectrum, more=f"bias {spectrum.attrs['bias_V']:.3g} V")
+    return fig
 
 
 def _along_frequency(*panels: Axes) -> None:
@@ -111,27 +111,27 @@ def _along_frequency(*panels: Axes) -> None:
 
 def harmonics(data: xr.Dataset) -> Figure:
     """Draw amplitude and phase of the harmonics of the lever voltage, and of a bridge's."""
-    shown = {"": ("-", "V$_l$")}
+    voltages = {"": ("-", "V$_l$")}
     if "first_bridge_harmonic_V" in data:
-        shown["bridge_"] = "--", "V$_{bridge}$"
-    with figure(7.4, 3.2, 1, 2, letters=True) as (made, (size, phase)):
-        for of, (line, symbol) in shown.items():
+        voltages["bridge_"] = "--", "V$_{bridge}$"
+    with figure(7.4, 3.2, 1, 2, letters=True) as (fig, (size, phase)):
+        for of, (line, symbol) in voltages.items():
             for name, colour in (("first", BLUE), ("second", GREEN), ("third", VERMILION)):
                 volts = data[f"{name}_{of}harmonic_V"]
                 # without an offset there is no second harmonic, but for rounding errors
                 if float(volts.max()) < 1e-9 * float(data.first_harmonic_V.max()):
                     continue
-                label = f"{name} harmonic" + (f", {symbol}" if len(shown) > 1 else "")
+                label = f"{name} harmonic" + (f", {symbol}" if len(voltages) > 1 else "")
                 size.plot(data.frequency, volts, line, color=colour, label=label)
                 angle = data[f"{name}_{of}harmonic_deg"]
                 phase.plot(data.frequency, angle, line, color=colour, label=label)
-        volts_of = ", ".join(symbol for _, symbol in shown.values())
+        volts_of = ", ".join(symbol for _, symbol in voltages.values())
         size.set(ylabel=f"amplitude of {volts_of} (V)", yscale="log")
         phase.set(ylabel="phase (°)")
         _along_frequency(size, phase)
         driven = f"bias {data.attrs['bias_V']:.3g} V + {data.attrs['amplitude_V']:.3g} V sine"
-        entitle(made, data, more=driven)
-    return made
+        entitle(fig, data, more=driven)
+    return fig
 
 
 def gain_map(data: xr.Dataset, gains: tuple[float, float] | None = None) -> Figure:
@@ -146,11 +146,11 @@ def gain_map(data: xr.Dataset, gains: tuple[float, float] | None = None) -> Figu
     """
     P, per_ms = (np.abs(data[name].values) for name in ("proportional", "integral"))
     settling, minus = data.settling_us.values.T, "−" if data.integral.values[0] < 0.0 else ""
-    with figure(5.4, 4.4) as (made, axes):
-        lowest, highest = np.nanquantile(settling, [0.0, _SHOWN])
+    with figure(5.4, 4.4) as (fig, axes):
+        lowest, highest = np.nanquantile(settling, [0.0, _COLOURED_SHARE])
         cells: Any = {"norm": LogNorm(lowest, highest), "cmap": "cividis_r", "rasterized": True}
         colours = axes.pcolormesh(P, per_ms, settling, shading="nearest", **cells)
-        made.colorbar(colours, extend="max").set_label("time until a step has settled to 2 % (µs)")
+        fig.colorbar(colours, extend="max").set_label("time until a step has settled to 2 % (µs)")
         axes.set(facecolor="0.85", xscale="log", yscale="log")
         style: Any = {"colors": BLACK, "linewidths": 1.2}
         axes.contour(P, per_ms, data.growth_per_us.values.T, [0.0], **style)
@@ -162,7 +162,7 @@ def gain_map(data: xr.Dataset, gains: tuple[float, float] | None = None) -> Figu
         axes.plot([], [], "--", color=BLACK, lw=1.2, label=f"overshoot {_OVERSHOOT:.0%}")
         axes.fill_between([], [], color="0.85", label="not stable")
         axes.set(xlabel=f"{minus}P (V/kΩ)", ylabel=f"{minus}I (V/(kΩ ms))")
-        made.legend(loc="outside lower center", ncols=3)
+        fig.legend(loc="outside lower center", ncols=3)
         held = f"{data.attrs['set_ohm']:.5g} Ω, tip at {data.attrs['tip_K']:.0f} K"
-        entitle(made, data, more=f"{held}, filter {data.attrs['filter_us']:g} µs")
-    return made
+        entitle(fig, data, more=f"{held}, filter {data.attrs['filter_us']:g} µs")
+    return fig

@@ -57,10 +57,10 @@ def calibration_page(
         for name in (*TABLE_COLUMNS, *OF_THE_CONTACT)
         if name in calibration.table and (described or not (name in STATED or "stderr" in name))
     ]
-    shown = even_rows(calibration.heating, names, "tip_K", fewest=_ROWS)
+    columns = even_rows(calibration.heating, names, "tip_K", fewest=_ROWS)
     page.table(
         [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in names],
-        [[f"{value:.4g}" for value in row] for row in zip(*shown.values(), strict=True)],
+        [[f"{value:.4g}" for value in row] for row in zip(*columns.values(), strict=True)],
         "Some rows of the table "
         + ("for the instrument." if described else "of the nearest lever, not for an instrument."),
     )

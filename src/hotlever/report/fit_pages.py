@@ -179,7 +179,7 @@ def levers_page(batch: Batch[Fit]) -> Page:
     return page
 
 
-def add_remarks(page: Page, batch: Batch[Any], result: str, made: str) -> None:
+def add_remarks(page: Page, batch: Batch[Any], result: str, participle: str) -> None:
     """Add to a page of many levers what their results say, and what could not be made."""
     noted = [*batch.undescribed.items()]
     noted += [(name, text) for name, each in batch.results.items() for text in each.notes]
@@ -187,6 +187,6 @@ def add_remarks(page: Page, batch: Batch[Any], result: str, made: str) -> None:
         page.heading(f"What single {result}s say")
         page.table(("lever", "note"), noted, prose=True)
     if batch.failures:
-        page.heading(f"Not {made}")
+        page.heading(f"Not {participle}")
         reasons = [(path, str(error)) for path, error in batch.failures.items()]
         page.table(("file", "reason"), reasons, prose=True)

@@ -90,9 +90,9 @@ class Page:
         """Add a table of strings; one of sentences is set flush left."""
         self._add("table", columns=columns, rows=rows, caption=caption, prose=prose)
 
-    def figure(self, name: str, made: Figure, caption: str) -> None:
+    def figure(self, name: str, figure: Figure, caption: str) -> None:
         """Add a figure; `name` is its file name without suffix."""
-        self._add("figure", name=name, figure=made, caption=caption)
+        self._add("figure", name=name, figure=figure, caption=caption)
 
     def write(self, folder: str | os.PathLike[str], name: str = "index") -> Path:
         """Write the page, and each figure as PDF beside it; return the page's path.

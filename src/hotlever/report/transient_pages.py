@@ -88,8 +88,8 @@ def _train(page: Page, lever: Lever, biases: list[float]) -> None:
     wave = pulse(biases[-1], _LENGTH, _PERIOD, _COUNT)
     history = simulate(lever, wave, per_step=_PER_STEP)
     page.figure("train", figures.history_overview(history), f"{sentence(wave.text)}")
-    kept = history.stored_nJ + history.air_stored_nJ + history.lost_nJ
-    off = float(np.abs(history.supplied_nJ - kept).max() / history.supplied_nJ.max())
+    accounted_nJ = history.stored_nJ + history.air_stored_nJ + history.lost_nJ
+    off = float(np.abs(history.supplied_nJ - accounted_nJ).max() / history.supplied_nJ.max())
     page.text(f"Of the heat supplied all but {off:.0e} is stored or lost.")
 
 
@@ -116,9 +116,9 @@ def _time_constants(page: Page, lever: Lever, biases: list[float]) -> None:
 def _small_signals(page: Page, lever: Lever, biases: list[float]) -> None:
     for bias in (biases[1], biases[-1]):
         (state,) = lever.solve([bias])
-        made = figures.small_signals(spectrum(state, _FREQUENCIES))
+        figure = figures.small_signals(spectrum(state, _FREQUENCIES))
         page.figure(
-            f"spectrum_{bias:g}V", made, f"At {bias:g} V, with the tip at {state.tip_K:.0f} K."
+            f"spectrum_{bias:g}V", figure, f"At {bias:g} V, with the tip at {state.tip_K:.0f} K."
         )
 
 

@@ -42,7 +42,7 @@ _NARROW = 2.0
 #: Shares of their prior's spread up to which parameters are told from data.
 _LEARNED = 0.8
 #: Change of a prediction since it was written down that is told, in its own standard deviations.
-_MOVED = 0.2
+_LEAST_CHANGE = 0.2
 #: Reading error of the curve (µA).
 _READ_UA = 4.0
 
@@ -82,7 +82,7 @@ def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]
         "The prediction is the one that was written down before the published value; which of the "
         "two came first is in the history of the project's files.",
     )
-    _moved(page, every, now)
+    _lost_draws_and_changes(page, every, now)
     _outside(page, every, compared)
     _bases(page, every)
     _real_curve(page, calibrations)
@@ -125,15 +125,15 @@ def _row(case: Case, row: xr.Dataset) -> list[str]:
     low, high = _number(row.low_95.item()), _number(row.high_95.item())
     return [
         case.name,
-        case.asked.meaning,
-        _unbroken(case.asked.unit),
+        case.definition.meaning,
+        _unbroken(case.definition.unit),
         f"{_number(row.predicted.item())} {_unbroken(f'({low} to {high})')}",
         _unbroken(f"{_number(row.published.item(), 4)} ± {_number(row.published_error.item(), 2)}"),
         _unbroken(row.verdict.item()),
     ]
 
 
-def _moved(page: Page, every: Sequence[Case], now: Sequence[Prediction]) -> None:
+def _lost_draws_and_changes(page: Page, every: Sequence[Case], now: Sequence[Prediction]) -> None:
     """Say which draws did not count, and where a prediction is another than was written down."""
     for draws, are in (
         ("impossible", "are no lever that can be drawn, or beyond what a parameter may be"),
@@ -142,15 +142,17 @@ def _moved(page: Page, every: Sequence[Case], now: Sequence[Prediction]) -> None
         lost = [(getattr(today, draws), case.name) for case, today in zip(every, now, strict=True)]
         text = ", ".join(f"{count} for {name}" for count, name in lost if count)
         page.text(f"Of the {DRAWS} draws these are left out as they {are}: {text or 'none'}.")
-    told = []
+    changes = []
     for case, today in zip(every, now, strict=True):
         assert case.prediction is not None
-        before = Prediction.as_stored(case.prediction, case.asked.is_share)
-        if abs(today.centre - before.centre) > _MOVED * before.spread:
-            told.append(f"{case.name}: {_number(before.median)} then, {_number(today.median)} now")
+        before = Prediction.as_stored(case.prediction, case.definition.is_share)
+        if abs(today.centre - before.centre) > _LEAST_CHANGE * before.spread:
+            changes.append(
+                f"{case.name}: {_number(before.median)} then, {_number(today.median)} now"
+            )
     page.text(
-        f"Predicted anew, some are others by now: {'; '.join(told)}."
-        if told
+        f"Predicted anew, some are others by now: {'; '.join(changes)}."
+        if changes
         else "Predicted anew today, all are the same within a fifth of their standard deviations."
     )
 
@@ -167,7 +169,7 @@ def _outside(page: Page, every: Sequence[Case], compared: xr.Dataset) -> None:
             [variant.why, _number(computed(case, dict(variant.changes)))]
             for variant in case.variants.values()
         ]
-        page.table(("assumption", f"{case.asked.meaning} ({case.asked.unit})"), rows)
+        page.table(("assumption", f"{case.definition.meaning} ({case.definition.unit})"), rows)
 
 
 def _bases(page: Page, every: Sequence[Case]) -> None:

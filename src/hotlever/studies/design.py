@@ -37,7 +37,7 @@ ANNEALING = {
 _OF_SHAPES = ("heater_length_um", "heater_width_um", "scale", "thickness_um")
 _OF_HEATERS = ("n_d", "resistivity")
 #: Of these, what the table of sensitivities shows.
-_SHOWN = ("knee_K", "knee_mW", "knee_V", "knee_bias_V", "tip_K", "cold_ohm", "k")
+_TABLE_QUANTITIES = ("knee_K", "knee_mW", "knee_V", "knee_bias_V", "tip_K", "cold_ohm", "k")
 #: Relative change by which a sensitivity is found; for the annealing temperature far smaller.
 _STEP = 0.02
 #: Between the coarse and the default mesh, for differences between levers.
@@ -303,7 +303,7 @@ def _few(texts: list[str]) -> list[str]:
 def sensitivity_text(data: xr.Dataset) -> str:
     """Return the sensitivities of a design, see `sensitivities`, as lines of text."""
     base = {key: data[key].item() for key in QUANTITIES}
-    shown = [key for key in _SHOWN if np.isfinite(base[key])]
+    quantities = [key for key in _TABLE_QUANTITIES if np.isfinite(base[key])]
     width = max(map(len, data.name.values))
     knee = (
         _NO_KNEE
@@ -319,11 +319,11 @@ def sensitivity_text(data: xr.Dataset) -> str:
         + ("" if np.isnan(base["k"]) else f"; k = {base['k']:.3f} in air"),
         "change for 1 % more of each (K for temperatures, % for the others):",
         "",
-        "  ".join([" " * width, f"{'at':>9}", *(f"{key:>11}" for key in shown)]),
+        "  ".join([" " * width, f"{'at':>9}", *(f"{key:>11}" for key in quantities)]),
     ]
     for name in data.name.values:
         row = data.sel(name=name)
-        cells = [f"{row[f'by_{key}'].item():+11.3f}" for key in shown]
+        cells = [f"{row[f'by_{key}'].item():+11.3f}" for key in quantities]
         lines.append("  ".join([f"{name:<{width}}", f"{row.value.item():9.4g}", *cells]))
     return "\n".join(lines)
 

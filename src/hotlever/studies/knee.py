@@ -261,13 +261,13 @@ def carried_by(probe: Probe, suspect: str, own_K: float | None = None) -> tuple[
     lever, away = Lever(true), suspect == AWAY
     data = Measurement.of_sweep(ramp_of(lever, -1 if away else 1))
     branch = lever.branch_to(0.0, lowest=-paper.RAMP[-1]).mirrored if away else lever.branch()
-    shown = knee_of(branch, f"the lever ({suspect})").tip_K
+    apparent_K = knee_of(branch, f"the lever ({suspect})").tip_K
     if by_line:
         data = replace(data, tip_K=read_by_the_line(data.tip_K))
-        shown = float(read_by_the_line(shown))
+        apparent_K = float(read_by_the_line(apparent_K))
     fitted = fit(data, probe).probe
     own_K = knee_K(probe) if own_K is None else own_K
-    return shown - own_K, shown - knee_K(fitted)
+    return apparent_K - own_K, apparent_K - knee_K(fitted)
 
 
 def ramp_of(lever: Lever, polarity: int) -> xr.Dataset:
@@ -317,8 +317,8 @@ def by_layout(probe: Probe, progress: Progress | None = None) -> float:
     parameters = parameters_of(probe)
     for name in each(nuisances(probe), progress):
         value, spread = float(probe.values([name])[0]), parameters[name].spread or 0.0
-        moved = probe.replace({name: value * (1.0 + spread)})
-        off.append(knee_K(fit(data, moved).probe) - true)
+        perturbed_probe = probe.replace({name: value * (1.0 + spread)})
+        off.append(knee_K(fit(data, perturbed_probe).probe) - true)
     return float(np.linalg.norm(off))
 
 

@@ -82,19 +82,19 @@ class Case:
 
 def all_cases() -> dict[str, Case]:
     """Return the levers of the study by what is changed."""
-    made = {}
+    cases = {}
     for start in (Probe.reference(), Probe.u_shape()):
         name = start.shape.shape
-        made[name] = Case(start, start.shape, "n", "")
+        cases[name] = Case(start, start.shape, "n", "")
         fields = {*type(start.shape).model_fields, "n_d", "delta"}
         for key in (key for key in _VARIED if key in fields):
             for value in _VARIED[key]:
                 probe = start.with_(**{key: value})
-                made[f"{name}, {key} = {value:g}"] = Case(probe, probe.shape, "n", key)
+                cases[f"{name}, {key} = {value:g}"] = Case(probe, probe.shape, "n", key)
         for n_a in _BORON:
             probe = with_heater_of(start, kind="p-silicon", n_d=n_a)
-            made[f"{name}, boron {n_a:g}"] = Case(probe, start.shape, "p", "n_d")
-    return made
+            cases[f"{name}, boron {n_a:g}"] = Case(probe, start.shape, "p", "n_d")
+    return cases
 
 
 def with_heater_of(probe: Probe, **material: Any) -> Probe:

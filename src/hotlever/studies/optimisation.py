@@ -37,7 +37,7 @@ MOST_DESIGNS, _ACCURATE = 30, 1e-6
 #: The same of what a reader shows, which changes a little with each mesh.
 _ACCURATE_OF_A_READER = 5e-4
 #: Relative change of a dimension from which on the lever is meshed anew.
-_MOVED = 0.25
+_REMESH_CHANGE = 0.25
 #: How near a bound is met: over its range, or over the bound of a quantity.
 _AT_BOUND = 1e-3
 #: An objective where there is no such lever, in first ones: the search steps back from it.
@@ -146,8 +146,8 @@ def optimise(
         reason = f"{MOST_DESIGNS} designs were tried without coming to rest"
     if search.best is None:
         raise InputError(
-            f"no design was found within {_told(search.limited)}; expected wider bounds, or more "
-            "numbers that may change"
+            f"no design was found within {_bounds_text(search.limited)}; expected wider bounds, "
+            "or more numbers that may change"
         )
     improved = search.probe_at(search.best)
     best = SolvedDesign(SimilarLevers(Lever(improved)), improved, point, search.names)
@@ -183,7 +183,7 @@ def _check(probe: Probe, quantity: str, bounds: Mapping[str, Bounds]) -> None:
         raise InputError("found no number that may change, expected bounds of one at least")
 
 
-def _told(bounds: Mapping[str, Bounds]) -> str:
+def _bounds_text(bounds: Mapping[str, Bounds]) -> str:
     texts = [
         f"{name} from {low:g} to {high:g}"
         if low is not None and high is not None
@@ -312,7 +312,7 @@ class _Search:
         if self._similar is None:
             return False
         drawn, now = (each.values(self.names) for each in (self._similar.drawn, probe))
-        return bool(np.all(np.abs(now - drawn) <= _MOVED * np.abs(drawn)))
+        return bool(np.all(np.abs(now - drawn) <= _REMESH_CHANGE * np.abs(drawn)))
 
     # --- what limits a design ---------------------------------------------------------------------
 

@@ -337,10 +337,10 @@ def shift_by_heat(lever: Lever, bias: ArrayLike) -> xr.Dataset:
 def _shift(way: _Way, plain: State, polarity: int) -> dict[str, Any]:
     """Return a row of `shift_by_heat`."""
     before = hot_spot(way.rises(plain.x)[0])
-    x, moved = plain.x, np.zeros(len(HEATS) * len(SIDES) + 1)
+    x, shift_um = plain.x, np.zeros(len(HEATS) * len(SIDES) + 1)
     for share, weight in _GAUSS:
         equations, x = way.state(polarity * share, plain.bias_V, x)
-        moved += weight * way.rates(equations, x, polarity * share)
+        shift_um += weight * way.rates(equations, x, polarity * share)
     equations, x = way.state(polarity, plain.bias_V, x)
     after = hot_spot(way.rises(x)[0])
     heats = way.heats.tested(x, -equations.fluxes(x).charge).values()
@@ -348,8 +348,8 @@ def _shift(way: _Way, plain: State, polarity: int) -> dict[str, Any]:
         "plain_um": before.at_um,
         # S is reversed in place of the current, which is the mirror image in charge
         "moved_nm": 1e3 * polarity * (after.at_um - before.at_um),
-        "share_nm": 1e3 * moved[:-1],
-        "rest_nm": 1e3 * (moved[-1] - moved[:-1].sum()),
+        "share_nm": 1e3 * shift_um[:-1],
+        "rest_nm": 1e3 * (shift_um[-1] - shift_um[:-1].sum()),
         "at_um": after.at_um,
         "centre_rise_K": after.centre_rise,
         "highest_rise_K": after.rise,

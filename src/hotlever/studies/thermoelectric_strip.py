@@ -67,5 +67,5 @@ def self_heated(silicon: LowDopedSilicon, tip: ArrayLike) -> xr.Dataset:
     rises = temperatures - lever.circuit.base_temperature_K
     whole = Taper((0.5 * _LENGTH, 0.0), (1.0, 0.0), _LENGTH)
     along = rises_along(lever.space, whole, branch.states(np.sqrt(rises)))
-    moved = [1e3 * hot_spot(rise).at_um for rise in along]
-    return labelled({"moved_nm": moved}, "tip_K", {"tip_K": temperatures})
+    shift_nm = [1e3 * hot_spot(rise).at_um for rise in along]
+    return labelled({"moved_nm": shift_nm}, "tip_K", {"tip_K": temperatures})

@@ -158,8 +158,8 @@ class SolvedDesign:
         """Return the derivatives of a quantity of the working point's or the knee's state."""
         _, by_shown, by_circuit = self._read(own, u)
         partial = self._partials(np.array([u]))[0][0]
-        moved = self._along(u)[:, None] * self._moved(u, partial)
-        return np.asarray(by_shown @ (partial + moved) + by_circuit)
+        along_branch = self._along(u)[:, None] * self._place_by(u, partial)
+        return np.asarray(by_shown @ (partial + along_branch) + by_circuit)
 
     def _read(self, own: str, u: float) -> tuple[float, Array, Array]:
         """Return a quantity, and its derivatives by V_l, I_h and T_tip, and by the circuit."""
@@ -195,13 +195,13 @@ class SolvedDesign:
             NewtonOptions(),
             parametrisation=parametrisation,
         )
-        shown = by_parameter(self._equations, roots.x, self._names, roots.factors, constraint)
+        derivatives = by_parameter(self._equations, roots.x, self._names, roots.factors, constraint)
         along = self._equations.along(roots.x, roots.factors, constraint)[-1]
-        return shown[:, [0, 1, TIP_RISE]], along * parametrisation.rate(
+        return derivatives[:, [0, 1, TIP_RISE]], along * parametrisation.rate(
             u, self._equations.space, roots.x
         )
 
-    def _moved(self, u: float, partial: Array) -> Array:
+    def _place_by(self, u: float, partial: Array) -> Array:
         """Return how the place u of the working point or of the knee moves, (p,)."""
         if u == self.branch.knee_u:
             # the knee is where V_l stops rising

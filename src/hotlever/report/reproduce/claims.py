@@ -182,10 +182,10 @@ def shift_section(page: Findings) -> None:
         for bias in points
     ]
     page.tabulate("thermoelectric_shift", columns, rows)
-    moved, at_bias = abs(n_type.moved_nm).max("polarity"), n_type.bias[0]
+    shift_nm, at_bias = abs(n_type.moved_nm).max("polarity"), n_type.bias[0]
     at_points = n_type.sel(bias=points, method="nearest")
     largest = abs(at_points.moved_nm).max().item()
-    numbers: Any = {"largest": largest, "cold": moved[0], "bias": at_bias}
+    numbers: Any = {"largest": largest, "cold": shift_nm[0], "bias": at_bias}
     page.claim("thermoelectric_size", holds=largest < paper.SHIFT_NM, **numbers)
     thomson = at_points.share_nm.sel(heat="Thomson").sum("side")
     silicon = page.lever.probe.heater_silicon
@@ -206,20 +206,20 @@ def shift_section(page: Findings) -> None:
 
 def _row(name: str, at: xr.Dataset, base: float) -> tuple[str, ...]:
     """Return what thermoelectricity does at a bias, as cells."""
-    moved = [f"{value:+.0f}" for value in at.share_nm.sel(heat="Peltier").values]
+    peltier = [f"{value:+.0f}" for value in at.share_nm.sel(heat="Peltier").values]
     heats = [f"{value:+.3f}" for value in at.heat_mW.sel(heat="Peltier").values]
     bias, tip = f"{at.polarity * at.bias:+.2f}", f"{base + at.centre_rise_K:.0f}"
     thomson = at.share_nm.sel(heat="Thomson").sum()
-    return (name, bias, tip, f"{at.moved_nm:+.0f}", *moved, f"{thomson:+.0f}", *heats)
+    return (name, bias, tip, f"{at.moved_nm:+.0f}", *peltier, f"{thomson:+.0f}", *heats)
 
 
 def _turn(strip: xr.Dataset) -> float:
     """Return the temperature (K) at which the shift of a strip turns for the last time."""
-    moved, tip = strip.moved_nm.values, strip.tip_K.values
-    before = int(np.flatnonzero(np.diff(np.sign(moved)))[-1])
+    shift_nm, tip = strip.moved_nm.values, strip.tip_K.values
+    before = int(np.flatnonzero(np.diff(np.sign(shift_nm)))[-1])
     near = slice(before, before + 2)
-    order = np.argsort(moved[near])
-    return float(np.interp(0.0, moved[near][order], tip[near][order]))
+    order = np.argsort(shift_nm[near])
+    return float(np.interp(0.0, shift_nm[near][order], tip[near][order]))
 
 
 def prediction_section(page: Findings) -> None:
@@ -240,13 +240,13 @@ def prediction_section(page: Findings) -> None:
         rows.append([model, *cells, *(f"{value:.4g}" for value in values[with_it])])
     columns = ["model", *(f"rms {name}" for name in rms[False]), *PARAMETERS]
     page.tabulate("thermoelectric_fit", columns, rows)
-    moved = abs(values[True] / values[False] - 1.0)
+    changes = abs(values[True] / values[False] - 1.0)
     page.claim(
         "thermoelectric_prediction",
         holds=1.0 - rms[True]["tip_K"] / rms[False]["tip_K"] < _MATTERS,
         without=rms[False],
         with_it=rms[True],
-        symbol=list(PARAMETERS.values())[moved.argmax()].symbol,
-        moved=moved.max(),
+        symbol=list(PARAMETERS.values())[changes.argmax()].symbol,
+        change=changes.max(),
         off=described_without(probe).off_K.max(),
     )

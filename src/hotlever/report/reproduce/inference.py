@@ -97,9 +97,9 @@ def _option_claims(page: Findings, name: str, fits: dict[str, Fit]) -> None:
     first, third = (_hot_error(fits[option]) for option in ("I", "III"))
     page.claim("current_alone", holds=first > 1.5 * third, name=name, first=first, third=third)
     free, held = fits["III"], fits["III, n_d fixed"]
-    moved = abs(held.inversion_temperature_K - free.inversion_temperature_K)
+    shift_K = abs(held.inversion_temperature_K - free.inversion_temperature_K)
     worse = held.residual_rms["tip_K"] - free.residual_rms["tip_K"]
-    page.claim("doping_held", holds=worse < 2.0, name=name, moved=moved, worse=worse)
+    page.claim("doping_held", holds=worse < 2.0, name=name, shift_K=shift_K, worse=worse)
 
 
 def _between_groups(result: Fit) -> list[float]:

@@ -49,8 +49,8 @@ def parameter_section(page: Findings) -> None:
             value_with_error(getattr(material, name), error.get(name), parameter.scale)
             for name, parameter in PARAMETERS.items()
         )
-        shown = "" if printed is None else f"{printed:.0f}"
-        rows.append((entry.name, *values, shown, f"{ours:.1f}"))
+        printed_cell = "" if printed is None else f"{printed:.0f}"
+        rows.append((entry.name, *values, printed_cell, f"{ours:.1f}"))
     page.tabulate("parameters", ("set", *PARAMETER_COLUMNS, "T_i published (K)", "T_i (K)"), rows)
     page.claim("inversion_temperatures", holds=max(away) < 1.0, away=max(away))
 
@@ -168,9 +168,9 @@ def discrepancy_section(page: Findings) -> None:
     Quickly in vacuum alone, without the uncertain layout.
     """
     probe, media = page.lever.probe, ("vacuum",) if page.quick else ("vacuum", "air")
-    asked: Any = {"layout": not page.quick, "progress": page.progress}
+    options: Any = {"layout": not page.quick, "progress": page.progress}
     studies = {
-        medium: compare_suspects(probe.in_medium(medium), page.fitted_example, **asked)
+        medium: compare_suspects(probe.in_medium(medium), page.fitted_example, **options)
         for medium in media
     }
     vacuum = studies["vacuum"]

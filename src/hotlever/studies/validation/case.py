@@ -77,14 +77,14 @@ class Case(Record):
         case = cls.from_values({"name": Path(path).stem, **values, "lever": lever}, where)
         if case.quantity not in QUANTITIES:
             raise unknown_name("quantity", case.quantity, QUANTITIES, where)
-        given = case.asked.given
+        arguments = case.definition.arguments
         for name in case.given:
-            if name not in given:
-                raise unknown_name("key", name, given, f"{where}: [given]")
-        for name, needed in given.items():
+            if name not in arguments:
+                raise unknown_name("key", name, arguments, f"{where}: [given]")
+        for name, needed in arguments.items():
             if needed and name not in case.given:
                 raise InputError(f"{where}: [given]: {name} is missing")
-        if lever and not case.asked.of_a_lever:
+        if lever and not case.definition.of_a_lever:
             raise InputError(
                 f"{where}: [{next(iter(lever))}]: {case.quantity} is of no lever, expected its "
                 "arguments in [given]"
@@ -94,13 +94,13 @@ class Case(Record):
         return case
 
     @property
-    def asked(self) -> Quantity:
+    def definition(self) -> Quantity:
         """The quantity."""
         return QUANTITIES[self.quantity]
 
     def probe(self, where: str = "") -> Probe | None:
         """Return the lever, or what it is taken for; None of a law."""
-        if not self.asked.of_a_lever:
+        if not self.definition.of_a_lever:
             return None
         return Probe.from_sections(self.lever, where or self.name)
 

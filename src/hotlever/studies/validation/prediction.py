@@ -123,15 +123,15 @@ def computed(case: Case, changes: dict[str, Any] | None = None) -> float:
         If there is no such lever, or it does not show the quantity.
     """
     changes = changes or {}
-    given, _ = case.numbers()
-    own = {name: float(changes[name]) for name in case.asked.given if name in changes}
+    values, _ = case.numbers()
+    own = {name: float(changes[name]) for name in case.definition.arguments if name in changes}
     lever = {name: value for name, value in changes.items() if name not in own}
-    arguments: dict[str, Any] = {**given, **own}
+    arguments: dict[str, Any] = {**values, **own}
     if (probe := case.probe()) is not None:
         # what was known beforehand need not hold of what is drawn
         without_prior = probe.model_copy(update={"prior": None})
         arguments["probe"] = without_prior.with_(**lever) if lever else without_prior
-    value = case.asked.compute(**arguments)
+    value = case.definition.compute(**arguments)
     if not (math.isfinite(value) and value > 0):
         raise ComputationError(f"{case.name}: no {case.quantity} of such a lever")
     return value
@@ -166,7 +166,7 @@ def predict(case: Case, progress: Progress | None = None) -> Prediction:
         raise ComputationError(
             f"{case.name}: {missing} of {DRAWS} draws from the priors show no {case.quantity}"
         )
-    return Prediction.of(values, case.asked.is_share, impossible, missing - impossible)
+    return Prediction.of(values, case.definition.is_share, impossible, missing - impossible)
 
 
 def comparison(cases: list[Case]) -> xr.Dataset:
@@ -182,14 +182,14 @@ def comparison(cases: list[Case]) -> xr.Dataset:
         assert case.prediction is not None
         assert case.published is not None
         value, error = case.published.value, case.published.error
-        stored = Prediction.as_stored(case.prediction, case.asked.is_share)
+        stored = Prediction.as_stored(case.prediction, case.definition.is_share)
         low, high = stored.band_95
         rows.append(
             {
                 "case": case.name,
                 "group": case.group,
                 "quantity": case.quantity,
-                "unit": case.asked.unit,
+                "unit": case.definition.unit,
                 "predicted": stored.median,
                 "low_95": low,
                 "high_95": high,

@@ -47,7 +47,7 @@ class Quantity(NamedTuple):
         return self.unit == _SHARE
 
     @property
-    def given(self) -> dict[str, bool]:
+    def arguments(self) -> dict[str, bool]:
         """Its arguments beside the lever, and whether each must be given."""
         parameters = inspect.signature(self.compute).parameters
         return {
@@ -165,8 +165,8 @@ def raman_softening(
     *, temperature_K: float, reference_K: float, three_phonon: float, four_phonon: float
 ) -> float:
     """Softening of silicon's Raman line from a reference temperature."""
-    moved, _ = anharmonic.shift(temperature_K, reference_K, three_phonon, four_phonon)
-    return -float(moved)
+    shift_per_cm, _ = anharmonic.shift(temperature_K, reference_K, three_phonon, four_phonon)
+    return -float(shift_per_cm)
 
 
 def two_sided_contact(*, radius_um: float, kappa: float, other_kappa: float) -> float:
