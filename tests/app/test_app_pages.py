@@ -299,6 +299,9 @@ def test_commands_run_in_processes_that_can_be_ended(tmp_path: Path) -> None:
         assert job.standing == "cancelled"
         assert [path.name for path in tmp_path.iterdir()] == ["lever-a.csv"]
         job = jobs.start("fit", Task("sweep", (), {"bias": "0:12:4000"}))
+        # a process that dies before it is called is started again
+        while jobs._workers["fit"]._answer is None:
+            await asyncio.sleep(0)
         jobs._workers["fit"].kill()
         while jobs.running("fit"):
             await asyncio.sleep(0.02)
