@@ -8,5 +8,5 @@ for name, parameter in result.parameters.items():
 
 measured = result.measurement.dataset(result.probe.circuit)
 model = Lever(result.probe).sweep(result.measurement.bias_V)
-made = figures.data_and_model(measured, model, result.observables)
-save_figure(made, "fit_my_data.png")
+fig = figures.data_and_model(measured, model, result.observables)
+save_figure(fig, "fit_my_data.png")

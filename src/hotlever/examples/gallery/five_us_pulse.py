@@ -12,9 +12,9 @@ peak = [simulate(lever, pulse(V, 5.0), at=[5.0]).tip_K.item() for V in heights]
 rest = lever.sweep(np.linspace(0.5, 10.0, 100))
 print(f"{heights[-1]:g} V for 5 µs heat the tip to {peak[-1]:.0f} K.")
 
-with figure(4.8, 3.4) as (made, axes):
+with figure(4.8, 3.4) as (fig, axes):
     axes.plot(rest.bias_V, rest.tip_K, label="at rest")
     axes.plot(heights, peak, "o-", label="peak of a pulse of 5 µs")
     axes.set(xlabel="bias (V)", ylabel="tip temperature (K)")
     axes.legend()
-save_figure(made, "five_us_pulse.png")
+save_figure(fig, "five_us_pulse.png")

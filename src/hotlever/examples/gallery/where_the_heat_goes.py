@@ -13,5 +13,5 @@ print(f"At 11 V {into_air[-1]:.0%} of the power go into the air, the rest into t
 
 flux = air.flux(states[-1])
 title = f"tip at {states[-1].tip_K:.0f} K"
-made = figures.air_loss(probe.layout(), air.panels, flux, shares, title)
-save_figure(made, "where_the_heat_goes.png")
+fig = figures.air_loss(probe.layout(), air.panels, flux, shares, title)
+save_figure(fig, "where_the_heat_goes.png")
