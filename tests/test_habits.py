@@ -59,6 +59,11 @@ def test_the_citation_is_of_this_version_and_licence():
 
 def test_no_name_in_the_code_is_one_that_fits_anything():
     vague = {"found", "known", "one", "thing", "things", "stuff"}
+    # what has been done to something says as little of what it is
+    vague |= {"made", "shown", "moved", "given", "kept", "told", "asked", "said", "wanted", "taken"}
+    # keys of files: the history of a project, and the published cases
+    of_files = {"app/session.py: shown", "app/state.py: kept", "app/state.py: asked"}
+    of_files |= {"studies/validation/case.py: given"}
     bound = []
     for path in (ROOT / "src" / "hotlever").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -71,6 +76,7 @@ def test_no_name_in_the_code_is_one_that_fits_anything():
                     pass
                 case _:
                     continue
-            if name.strip("_") in vague:
-                bound.append(f"{path.relative_to(ROOT)}:{node.lineno}: {name}")
+            module = path.relative_to(ROOT / "src" / "hotlever").as_posix()
+            if name.strip("_") in vague and f"{module}: {name}" not in of_files:
+                bound.append(f"{module}:{node.lineno}: {name}")
     assert bound == []
