@@ -198,7 +198,7 @@ def test_a_knee_of_another_power_is_refused_by_the_rule(reference):
     """Bias and current in other units have the resistance of such a lever, and a knee."""
     data = measurement_of(measured_curve(reference, np.random.default_rng(3)))
     wrong = replace(data, bias_V=data.bias_V / 1e3, current_mA=data.current_mA / 1e3)
-    with pytest.raises(InputError, match="expected within a factor of 10; are bias and current"):
+    with pytest.raises(InputError, match="expected within a factor of 100; are bias and current"):
         calibrate(wrong, law=EQ12)
 
 

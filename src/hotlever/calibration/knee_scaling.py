@@ -41,8 +41,9 @@ from hotlever.types import Array
 
 #: A vacuum model that needs this factor is told that its lever is probably in air.
 _LOOKS_LIKE_AIR = 1.08
-#: Levers of a kind have their knees within this factor of each other's power.
-_ALIKE = 10.0
+#: Knees are within this factor of the power of each other: large levers have 20 mW where small ones
+#: have 2, and a wrong unit is a thousand.
+_ALIKE = 100.0
 #: Largest relative error of a knee estimated from the points below it, to go on with.
 _WORST_ESTIMATE = 0.3
 #: How far (standard deviations) a parameter is moved for a derivative.
