@@ -362,7 +362,6 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
             plausible(where, unit, size, low, high)
             negative = (data < -NOISE * size) & (not either)
             contents.note_rows(negative, f"{symbol} is negative")
-
     base = settings.get("base_temperature_K", _COLDEST_BASE_K)
     for symbol in (each.symbol for each in FITTED.values() if each.unit == "K"):
         contents.note_rows(
