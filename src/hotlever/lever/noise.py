@@ -86,8 +86,8 @@ class NoiseOptions:
                 )
         if not 0 < self.low_Hz < self.high_Hz:
             raise InputError(
-                f"found a band from {self.low_Hz:g} to {self.high_Hz:g} Hz, expected one from a "
-                "frequency above 0 to a higher one"
+                f"bandwidth: found {self.low_Hz:g}Hz:{self.high_Hz:g}Hz, expected LOW:HIGH, such "
+                "as 1Hz:1kHz, with 0 < LOW < HIGH"
             )
 
     @property
