@@ -8,7 +8,7 @@ import dask
 import pytest
 from distributed import LocalCluster, Security
 
-from hotlever.cluster import cluster_workers
+from hotlever.cluster import cluster_executor
 from hotlever.errors import InputError
 from hotlever.estimation.batch import fit_many
 from hotlever.processes import run_all
@@ -38,7 +38,7 @@ def test_a_scheduler_with_tls_is_found_by_dask_s_settings(credentials):
     options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "protocol": "tls"}
     with (
         LocalCluster(security=credentials, dashboard_address="127.0.0.1:0", **options) as cluster,
-        cluster_workers(cluster.scheduler_address) as workers,
+        cluster_executor(cluster.scheduler_address) as workers,
     ):
         assert cluster.scheduler_address.startswith("tls://")
         assert dict(run_all(workers, square, [(3,)])) == {0: 9}
@@ -51,7 +51,7 @@ def test_a_scheduler_with_tls_is_found_by_dask_s_settings(credentials):
 def test_tls_without_credentials_is_one_line(missing, words):
     settings = {"distributed.comm.tls.ca-file": missing}
     with dask.config.set(settings), pytest.raises(InputError, match=words):
-        cluster_workers("tls://127.0.0.1:1").__enter__()
+        cluster_executor("tls://127.0.0.1:1").__enter__()
 
 
 def test_a_scheduler_without_dask_is_one_line(tmp_path, monkeypatch):

@@ -10,12 +10,11 @@ import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
 import psutil
 import pytest
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.processes import local_processes, local_workers, run_all
+from hotlever.processes import Patience, local_executor, run_all
 
 # --- tasks --------------------------------------------------------------------------------------
 
@@ -53,27 +52,13 @@ def makes_what_cannot_be_sent() -> object:
     return lambda: 1
 
 
-class CountedArray:
-    """An array that counts how often it is sent."""
-
-    def __init__(self, values: np.ndarray) -> None:
-        self.values, self.sent = values, 0
-
-    def sum(self) -> float:
-        return self.values.sum()
-
-    def __reduce__(self):
-        self.sent += 1
-        return CountedArray, (self.values,)
-
-
 def fail(kind: str) -> None:
     raise {"input": InputError, "other": ZeroDivisionError}[kind]("the reason")
 
 
 @pytest.fixture(scope="module")
 def workers():
-    with local_workers(2) as processes:
+    with local_executor(2) as processes:
         yield processes
 
 
@@ -110,9 +95,8 @@ def test_a_task_that_kills_its_workers_is_given_up_and_the_others_go_on(workers)
     assert results == {0: 0, 2: 2, 3: 3}
 
 
-def test_a_stopped_worker_is_replaced(tmp_path, monkeypatch):
-    monkeypatch.setattr("hotlever.processes._SILENT_S", 2)
-    with local_workers(2) as workers:
+def test_a_worker_that_takes_too_long_is_replaced(tmp_path):
+    with local_executor(2, Patience(task_s=2.0)) as workers:
         tasks = [(str(tmp_path / name),) for name in "ab"]
         assert dict(run_all(workers, stop_once, tasks)) == dict.fromkeys(range(2), "done")
 
@@ -120,24 +104,10 @@ def test_a_stopped_worker_is_replaced(tmp_path, monkeypatch):
 def test_nobody_can_connect_to_them():
     """Another user of the machine finds no port: they listen to their pipes."""
     before = psutil.Process().net_connections("inet")
-    with local_workers(2):
+    with local_executor(2):
         assert psutil.Process().net_connections("inet") == before
         assert len(children()) >= 2
         assert not any(process.net_connections("inet") for process in children())
-
-
-def total(large: CountedArray, number: int) -> float:
-    return float(large.sum()) + number
-
-
-def test_what_tasks_share_is_sent_once():
-    large = CountedArray(np.ones(1_000_000))
-    with local_processes(2) as (run, share):
-        shared = share(large)
-        assert run(total, [(shared, number) for number in range(8)]) == [
-            1e6 + number for number in range(8)
-        ]
-    assert 1 <= large.sent <= 2
 
 
 def test_a_task_that_cannot_be_sent_is_an_error(workers):
@@ -149,11 +119,11 @@ def test_a_task_that_cannot_be_sent_is_an_error(workers):
 
 SCRIPT = """
 import os, sys
-from hotlever.processes import local_workers, run_all
+from hotlever.processes import local_executor, run_all
 sys.path.insert(0, {folder!r})
 from test_processes import children, slow
 if __name__ == "__main__":
-    with local_workers(2) as workers:
+    with local_executor(2) as workers:
         for _ in run_all(workers, slow, [(0.01,), (0.01,), (60.0,), (60.0,)]):
             print(*(process.pid for process in children()), flush=True)
 """
@@ -183,7 +153,7 @@ def test_workers_and_their_folder_end_with_their_parent(tmp_path, number):
 
 def test_without_a_cache_workers_share_a_folder_that_goes(monkeypatch):
     monkeypatch.setenv("HOTLEVER_CACHE", "")
-    with local_workers(1) as workers:
+    with local_executor(1) as workers:
         [(_, folder)] = run_all(workers, os.getenv, [("HOTLEVER_CACHE",)])
         assert Path(folder).parent == Path(tempfile.gettempdir())
     assert not Path(folder).exists()
@@ -192,7 +162,7 @@ def test_without_a_cache_workers_share_a_folder_that_goes(monkeypatch):
 
 def test_workers_that_do_not_start_are_said(tmp_path):
     """A script without the guard that spawn needs."""
-    script = "from hotlever.processes import local_workers\nwith local_workers(1):\n    pass\n"
+    script = "from hotlever.processes import local_executor\nwith local_executor(1):\n    pass\n"
     (tmp_path / "script.py").write_text(script)
     ended = subprocess.run(
         [sys.executable, str(tmp_path / "script.py")], capture_output=True, text=True, check=False

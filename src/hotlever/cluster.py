@@ -15,7 +15,7 @@ from distributed import CancelledError, Client, KilledWorker
 from hotlever import __version__
 from hotlever.errors import ComputationError, InputError
 from hotlever.files import read_text
-from hotlever.processes import WorkerDiedError, guarded
+from hotlever.processes import Patience, WorkerDiedError, guarded
 
 #: Seconds that a scheduler, and then its first worker, may take to answer.
 _PATIENCE_S = 10
@@ -32,8 +32,10 @@ _CREDENTIALS = {
 _LOST = "the scheduler is lost; what was done until then is written"
 
 
-class ClusterWorkers:
+class ClusterExecutor:
     """The workers that a scheduler has."""
+
+    patience = Patience()
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -54,10 +56,10 @@ class ClusterWorkers:
             raise ComputationError(_LOST) from error
         return sum(threads.values())
 
-    def submit(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Future[Any]:
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
         """Send a task; its future raises WorkerDiedError if the workers that had it died."""
         result: Future[Any] = Future()
-        task = self._client.submit(guarded, function, arguments, pure=False)
+        task = self._client.submit(guarded, function, *arguments, pure=False)
         # the task is kept by its callback until it is done
         task.add_done_callback(partial(_hand_on, result=result))
         return result
@@ -76,7 +78,7 @@ def _hand_on(task: Any, result: Future[Any]) -> None:
 
 
 @contextmanager
-def cluster_workers(address: str) -> Iterator[ClusterWorkers]:
+def cluster_executor(address: str) -> Iterator[ClusterExecutor]:
     """Connect to a running scheduler, whose workers must have the same version of hotlever.
 
     Raises
@@ -91,7 +93,7 @@ def cluster_workers(address: str) -> Iterator[ClusterWorkers]:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         with _connected(address, where) as client:
-            yield ClusterWorkers(client)
+            yield ClusterExecutor(client)
     finally:
         for name, level in levels.items():
             logging.getLogger(name).setLevel(level)

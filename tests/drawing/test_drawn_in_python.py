@@ -166,7 +166,7 @@ def box_of(probe: Probe) -> list[float]:
 
 def test_a_worker_draws_what_it_can_import():
     assert pickle.loads(pickle.dumps(POINTED)) == POINTED
-    with local_processes(2) as (run, _):
+    with local_processes(2) as run:
         assert run(box_of, [(REFERENCE,)]) == [[0.0, -9.88, 60.0, 9.88]]
 
 

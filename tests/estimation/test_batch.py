@@ -20,6 +20,7 @@ from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimation import FitOptions
 from hotlever.estimation.batch import Batch, fit_many, lever_names
 from hotlever.lever import Lever
+from hotlever.processes import Patience
 
 BIAS = np.linspace(2, 11, 7)
 #: Two parameters are left to find: the fits are not what is tested.
@@ -180,8 +181,8 @@ time.sleep(600)
 def test_a_lost_cluster_is_said_and_what_was_done_is_written(
     levers, tmp_path, capfd, monkeypatch, lost, message
 ):
-    monkeypatch.setattr("hotlever.processes._WITHOUT_WORKERS_S", 0.5)
-    monkeypatch.setattr("hotlever.processes._LOOK_S", 0.5)
+    impatient = Patience(look_s=0.5, without_workers_s=0.5)
+    monkeypatch.setattr("hotlever.cluster.ClusterExecutor.patience", impatient)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen(
         [sys.executable, "-c", SCHEDULER, str(Path(experiments.__file__).parent)], **pipes

@@ -22,7 +22,7 @@ from hotlever.lever.lever import Lever
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced
 from hotlever.measurement import Measurement, read_measurement_of, with_measured_circuit
 from hotlever.probe import Probe
-from hotlever.processes import PROCESSORS, Workers, guarded, local_workers, run_all
+from hotlever.processes import PROCESSORS, Executor, guarded, local_executor, run_all
 from hotlever.types import Progress
 
 
@@ -206,12 +206,12 @@ def estimate_many(
             batch.reused += 1
     tell()
     if waiting:
-        with _workers(scheduler, min(processes or PROCESSORS, len(waiting))) as workers:
+        with _executor(scheduler, min(processes or PROCESSORS, len(waiting))) as executor:
             for name, reason in _not_reduced(work, waiting, reducing).items():
                 batch.fail(waiting.pop(name).path, reason)
             names = list(waiting)
             tasks = ((measurement,) for measurement in waiting.values())
-            for number, result in run_all(workers, work.estimate, tasks):
+            for number, result in run_all(executor, work.estimate, tasks):
                 name, measurement = names[number], waiting[names[number]]
                 try:
                     if isinstance(result, HotleverError):
@@ -226,17 +226,17 @@ def estimate_many(
     return batch
 
 
-def _workers(scheduler: str | None, processes: int) -> AbstractContextManager[Workers]:
+def _executor(scheduler: str | None, processes: int) -> AbstractContextManager[Executor]:
     if scheduler is None:
-        return local_workers(processes)
+        return local_executor(processes)
     try:
-        from hotlever.cluster import cluster_workers
+        from hotlever.cluster import cluster_executor
     except ImportError:
         raise InputError(
             f"--scheduler {scheduler}: Dask is not installed, expected pip install "
             "'hotlever[cluster]'"
         ) from None
-    return cluster_workers(scheduler)
+    return cluster_executor(scheduler)
 
 
 def lever_names(paths: Sequence[str | os.PathLike[str]]) -> dict[str, Path]:
@@ -306,7 +306,7 @@ def _not_reduced(
         for measured in probes:
             geometry = measured.circuit.base_temperature_K, measured.surroundings.medium
             if geometry not in results:
-                results[geometry] = guarded(_reduce, (measured, work.options, progress))
+                results[geometry] = guarded(_reduce, measured, work.options, progress)
             errors.append(results[geometry])
         # of two media one will do
         if None not in errors:

@@ -277,12 +277,13 @@ def sample(
     total = _WARM_UP + draws
     seeds = np.random.SeedSequence(seed).generate_state(ENSEMBLES).tolist()
     points, densities = [], []
-    with local_processes(min(processes, ENSEMBLES)) as (run, share):
-        density = share(log_density)
-        states = run(_started, [(density, approximation, walkers, number) for number in seeds])
+    with local_processes(min(processes, ENSEMBLES)) as run:
+        states = run(_started, [(log_density, approximation, walkers, number) for number in seeds])
         for done in range(0, total, _BLOCK):
             steps = min(_BLOCK, total - done)
-            blocks = run(_advanced, [(density, approximation, state, steps) for state in states])
+            blocks = run(
+                _advanced, [(log_density, approximation, state, steps) for state in states]
+            )
             states = [state for state, _, _ in blocks]
             points.append([positions for _, positions, _ in blocks])
             densities.append([logarithms for _, _, logarithms in blocks])

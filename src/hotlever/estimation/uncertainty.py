@@ -215,7 +215,7 @@ def examine(
     if profiles:
         tasks = [(fit, name) for name in fit.names]
         # some at a time, in processes of their own
-        with local_processes(min(processes, len(tasks))) as (run, _):
+        with local_processes(min(processes, len(tasks))) as run:
             results = run(profile_likelihood, tasks, profiling)
         curves = dict(zip(fit.names, results, strict=True))
     if samples is not None:

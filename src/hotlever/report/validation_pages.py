@@ -64,7 +64,7 @@ def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]
     every = cases()
     tasks: list[tuple[Any, ...]] = [(predict, case) for case in every]
     tasks += [(_calibrated, changes) for changes in _OTHER_LEVERS.values()]
-    with local_processes(PROCESSORS) as (run, _):
+    with local_processes(PROCESSORS) as run:
         results = run(operator.call, tasks, progress)
     now, calibrations = results[: len(every)], results[len(every) :]
     compared = comparison(every)
