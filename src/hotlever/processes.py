@@ -272,6 +272,8 @@ class LocalExecutor:
         task = pickle.dumps((function, arguments))
         pool = self._idle.get()
         try:
+            # a new process has the time to start before that for its task begins
+            pool.submit(int).result(self.patience.start_s)
             return pool.submit(_call, task).result(self.patience.task_s)
         except (BrokenExecutor, TimeoutError) as error:
             _kill(pool)
