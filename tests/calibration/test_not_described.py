@@ -30,10 +30,11 @@ ERRORS = ("tip_stderr_K", "tip_low_K", "tip_high_K")
 
 
 @pytest.fixture(scope="module")
-def clipped(reference: Branch) -> Measurement:
-    """A current that its meter has clipped."""
+def saturated(reference: Branch) -> Measurement:
+    """A current of which its meter shows a tenth beyond some value."""
     data = measurement_of(measured_curve(reference, np.random.default_rng(4)))
-    return replace(data, current_mA=np.minimum(data.current_mA, 0.8 * data.current_mA.max()))
+    beyond = np.maximum(data.current_mA - 0.8 * data.current_mA.max(), 0.0)
+    return replace(data, current_mA=data.current_mA - 0.9 * beyond)
 
 
 @pytest.fixture(scope="module", params=["said", pytest.param("searched", marks=pytest.mark.slow)])
@@ -41,18 +42,20 @@ def folder(
     request: pytest.FixtureRequest,
     tmp_path_factory: pytest.TempPathFactory,
     reference: Branch,
-    clipped: Measurement,
+    saturated: Measurement,
 ) -> Path:
     """What ``hotlever calibrate`` writes of data that no lever shows.
 
     It takes long to find that none does; it may as well be said of data that a lever shows.
     """
     folder = tmp_path_factory.mktemp("refused")
-    data = clipped
+    data = saturated
     if request.param == "said":
         data = measurement_of(measured_curve(reference, np.random.default_rng(4)))
     rows = [f"{v:.6g},{i:.6g}" for v, i in zip(data.bias_V, data.current_mA, strict=True)]
-    (folder / "clipped.csv").write_text("\n".join(["# R_s (kOhm): 5.6", "V_b (V),I_h (mA)", *rows]))
+    (folder / "saturated.csv").write_text(
+        "\n".join(["# R_s (kOhm): 5.6", "V_b (V),I_h (mA)", *rows])
+    )
     files = {"-o": "cal.json", "--table": "table.csv", "--plot": "cal.png"}
     options = [word for key, name in files.items() for word in (key, str(folder / name))]
     with pytest.MonkeyPatch.context() as patch:
@@ -60,14 +63,14 @@ def folder(
             patch.setattr(inference, "_verdict", lambda *_: (True, "current differs by 5 %"))
             patch.setattr(Diagnosis, "named", lambda *_: "is the current clipped?")
         with pytest.raises(SystemExit) as ended:
-            main(["calibrate", str(folder / "clipped.csv"), *options, "--pulse", "5us"])
+            main(["calibrate", str(folder / "saturated.csv"), *options, "--pulse", "5us"])
     assert ended.value.code == 1
     return folder
 
 
 @pytest.fixture(scope="module")
-def refused(folder: Path, clipped: Measurement) -> Calibration:
-    return replace(read_calibration(folder / "cal.json"), measurement=clipped)
+def refused(folder: Path, saturated: Measurement) -> Calibration:
+    return replace(read_calibration(folder / "cal.json"), measurement=saturated)
 
 
 def numbers(content: Any, key: str) -> list[Any]:
@@ -132,9 +135,9 @@ def test_no_band_is_drawn_and_the_figure_says_so(refused):
 def test_the_rows_that_no_lever_shows_are_drawn(refused):
     drawn = {line.get_label(): line for line in figures.calibration_curves(refused).axes[3].lines}
     measured = refused.measurement
-    clipped = measured.bias_V[measured.current_mA > 0.999 * measured.current_mA.max()]
-    assert clipped.size > 3
-    assert set(drawn["off"].get_xdata()) & set(clipped)
+    saturated = measured.bias_V[measured.current_mA > 0.95 * measured.current_mA.max()]
+    assert saturated.size > 3
+    assert set(drawn["off"].get_xdata()) & set(saturated)
     assert drawn["measured"].get_xdata().size == measured.bias_V.size
 
 

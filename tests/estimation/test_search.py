@@ -79,11 +79,12 @@ def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
             )
 
 
-def test_a_clipped_current_is_not_described(reference_curve, monkeypatch):
+def test_a_current_that_saturates_is_not_described(reference_curve, monkeypatch):
     monkeypatch.setattr(Diagnosis, "named", lambda _: "is the current clipped?")
     top = np.sort(reference_curve.current_mA)[-5]
-    clipped = replace(reference_curve, current_mA=np.minimum(reference_curve.current_mA, top))
-    result = fit(clipped)
+    beyond = np.maximum(reference_curve.current_mA - top, 0.0)
+    saturated = replace(reference_curve, current_mA=reference_curve.current_mA - 0.9 * beyond)
+    result = fit(saturated)
     assert result.describes_data is False
     assert "neighbouring rows" in result.reason or "not at random" in result.reason
     assert "is the current clipped?" in result.reason

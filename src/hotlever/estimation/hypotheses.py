@@ -12,13 +12,14 @@ from functools import partial
 import numpy as np
 
 from hotlever.materials.parameters import parameter_named
+from hotlever.measurement.compliance import is_level
 from hotlever.probe import Probe
 from hotlever.text import with_unit
-from hotlever.types import Array
+from hotlever.types import Array, Mask
 
-#: A current that stands at its highest value in so many rows, within this share, is clipped, if it
-#: is below that in so many.
-_LEVEL_ROWS, _LEVEL, _BELOW = 2, 1e-4, 5
+#: A current that stands at its highest value in so many rows may be clipped, though that is not
+#: seen without the lever, if it is below that in so many.
+_LEVEL_ROWS, _BELOW = 2, 5
 #: The range of a meter may be off by such a factor, and its zero by such a share.
 _FACTOR, _OF_THE_ZERO = 50.0, 0.5
 #: How much warmer than stated the base may be (K).
@@ -32,7 +33,7 @@ class MeasuredRows:
     bias_V: Array
     current_mA: Array
     series_kohm: float
-    included: Array
+    included: Mask
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def _of_the_resistor(rows: MeasuredRows) -> Hypothesis:
 def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
     bias, current, number = rows.bias_V, rows.current_mA, np.arange(rows.bias_V.size)
     clipped = []
-    level = current >= current.max() * (1.0 - _LEVEL)
+    level = is_level(current)
     if level.sum() >= _LEVEL_ROWS and (~level).sum() >= _BELOW:
         text = f"is the current clipped at {current.max():.3g} mA, by the range of its meter?"
         clipped.append(Hypothesis(lambda _: text, lambda rows, _: replace(rows, included=~level)))

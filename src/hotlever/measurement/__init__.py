@@ -2,7 +2,8 @@
 
 `columns` knows the names and units of the columns, `contents` the comments that give circuit and
 surroundings and what no lever can show, `bias` completes the rows, `rows` polarities
-and the order of the rows; `reading` takes these together.
+and the order of the rows, `compliance` what an instrument has clipped; `reading` takes these
+together.
 """
 
 from hotlever.measurement.columns import parse_columns

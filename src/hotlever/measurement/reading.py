@@ -23,6 +23,7 @@ from hotlever.measurement.columns import (
     note_on_unused,
     quantity_of,
 )
+from hotlever.measurement.compliance import without_rows_at_compliance
 from hotlever.measurement.contents import Contents, Settings, check
 from hotlever.measurement.data import DISTANCE, MEASURED, OPTIONAL, TIME, Measurement
 from hotlever.measurement.rows import described, disagreements, sweeps_of
@@ -116,7 +117,7 @@ def read_measurement(
     if not measurement.observables:
         symbols = ", ".join(column.symbol for column in FITTED.values())
         raise InputError(f"{path}: no values in any of the columns {symbols}")
-    return measurement
+    return without_rows_at_compliance(measurement, circuit)
 
 
 def _complete_in_time(
@@ -187,7 +188,9 @@ def read_measurement_of(
 def given_measurement(
     measurement: Measurement | str | os.PathLike[str], probe: Probe
 ) -> Measurement:
-    """Return a measurement as it is, or read one of a probe's lever from its file.
+    """Return a measurement, or read one of a probe's lever from its file.
+
+    Either is without rows at a limit of an instrument (`hotlever.measurement.compliance`).
 
     Raises
     ------
@@ -195,7 +198,7 @@ def given_measurement(
         If it is neither, or the file is at fault.
     """
     if isinstance(measurement, Measurement):
-        return measurement
+        return without_rows_at_compliance(measurement, probe.circuit)
     if isinstance(measurement, str | os.PathLike):
         return read_measurement_of(probe, measurement)
     raise InputError(
