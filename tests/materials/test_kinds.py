@@ -10,6 +10,7 @@ from test_silicon import BEYOND, TEMPERATURES, numerical_derivative
 
 from hotlever.errors import InputError
 from hotlever.materials import KINDS, PARAMETERS, published
+from hotlever.materials.departures import DEPARTURES, departure_of
 from hotlever.materials.heat import thermal_conductivity_of_layer
 from hotlever.materials.kinds import LowDopedSilicon, PSilicon
 from hotlever.materials.p_silicon import (
@@ -26,6 +27,24 @@ OPTION_III = published("option III").material
 SECTIONS = {
     "n-silicon": {"kind": "n-silicon", "impurity_exponent": 0.4, "intrinsic_scale": 1.2},
     "n-silicon, thin": {"kind": "n-silicon", "c_kappa": "thickness"},
+    "n-silicon, departing": {
+        "kind": "n-silicon",
+        "kappa_1": 1.0,
+        "kappa_3": -1.0,
+        "n_i_1": -1.0,
+        "n_i_2": 0.5,
+        "intrinsic_scale": 1.2,
+        "mobility_1": 0.8,
+        "mobility_2": -1.3,
+        "mobility_3": 0.4,
+    },
+    "p-silicon, departing": {"kind": "p-silicon", "n_i_2": 1.0, "mobility_1": -1.0},
+    "high-doped-silicon, departing": {
+        "kind": "high-doped-silicon",
+        "kappa_2": 1.0,
+        "legs_1": -0.7,
+        "legs_3": 1.5,
+    },
     "p-silicon": {"kind": "p-silicon", "impurity_exponent": 0.4, "intrinsic_scale": 0.8},
     "high-doped-silicon": {"kind": "high-doped-silicon"},
     "metal-film": {"kind": "metal-film", "preset": "Pd", "tcr": 2.1e-3},
@@ -68,6 +87,9 @@ def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, 
 
             slope = numerical_derivative(varied_law, number, 1e-3 * (number or 1.0))
             expected = partials.get(parameter, 0.0)
+            if departing := departure_of(parameter):
+                departure, mode = departing
+                expected = partials.get(departure.law, 0.0) * departure.modes(T)[mode]
             assert expected == pytest.approx(slope, rel=1e-6, abs=1e-12 * abs(value[0]))
         for place, other in enumerate(("n", "thickness_um")):
             step = 1e-3 * at[place]
@@ -78,7 +100,9 @@ def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, 
             slope = numerical_derivative(away, at[place], step)
             assert partials.get(other, 0.0) == pytest.approx(slope, rel=1e-5, abs=1e-12)
     # what counts in the taper alone is no argument of a law
-    assert set(kind.parameters) - found <= {"n_d", "delta", "n_hd"}
+    in_taper = {"n_d", "delta", "n_hd"}
+    depends = found | {name for law in found & set(DEPARTURES) for name in DEPARTURES[law].names}
+    assert set(kind.parameters) - depends <= in_taper
 
 
 @pytest.mark.parametrize("name", MATERIALS)

@@ -18,6 +18,7 @@ from hotlever.lever.space import Space
 from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind, full_name
 from hotlever.materials.air import thermal_conductivity_of_air
+from hotlever.materials.departures import departure_of
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.materials.laws import Evaluated
@@ -60,6 +61,11 @@ class FilmLaws:
     ) -> None:
         self.film, self.kind, self.carrier = film, materials[film.material], carrier
         self.own = names_in_laws(film.material, self.kind)
+        self.departures = {
+            name: departing
+            for name, own in self.own.items()
+            if (departing := departure_of(own)) is not None
+        }
         self.thickening = {
             name: motion.thickening_um[number]
             for name, motion in motions.items()
@@ -91,18 +97,23 @@ class FilmLaws:
         And to their derivatives, by parameter.
         """
         film, kind, T = self.film, self.kind, T[self.film.points]
+        modes = {
+            name: (departure.law, departure.modes(T)[number])
+            for name, (departure, number) in self.departures.items()
+            if name in by
+        }
         sheet = PER_CM_TO_MILLI_PER_UM * film.counted_um
-        self._add("kappa", kind.thermal_conductivity(T, film.thickness_um), sheet, total, by)
-        self._add("sigma", kind.electrical_conductivity(T, self.doping), sheet, total, by)
+        self._add("kappa", kind.thermal_conductivity(T, film.thickness_um), sheet, total, by, modes)
+        self._add("sigma", kind.electrical_conductivity(T, self.doping), sheet, total, by, modes)
         if total.beta is not None:
             (beta, gamma), by_own = kind.thermoelectric(T, self.doping, self.carrier)
             for row, (name, value) in enumerate((("beta", beta), ("gamma", gamma))):
                 rows = {own: change[row] for own, change in by_own.items()}
-                self._add(name, (value, rows), sheet, total, by)
+                self._add(name, (value, rows), sheet, total, by, modes)
         if total.emission is not None:
             faces = PER_CM2_TO_MILLI_PER_UM2 * film.faces
             emission = kind.emission(T, surroundings_K)
-            self._add("emission", emission, faces, total, by, thickens=False)
+            self._add("emission", emission, faces, total, by, modes, thickens=False)
 
     def _add(
         self,
@@ -111,10 +122,14 @@ class FilmLaws:
         sheet: float | Array,
         total: Properties,
         by: Mapping[str, Properties],
+        modes: Mapping[str, tuple[str, Array]],
         *,
         thickens: bool = True,
     ) -> None:
-        """Add a law to the sheet's, and its derivatives to theirs."""
+        """Add a law to the sheet's, and its derivatives to theirs.
+
+        The modes at the temperatures are those of the coefficients asked for, and the law departs.
+        """
         film, points, (value, by_own) = self.film, self.film.points, evaluated
         getattr(total, law)[points] += sheet * value
         for name, changes in by.items():
@@ -123,6 +138,9 @@ class FilmLaws:
                 change[points] += sheet * by_own[own]
             if "n" in by_own and name in self.doping_by:
                 change[points] += sheet * (by_own["n"] * self.doping_by[name])
+            if name in modes and modes[name][0] in by_own:
+                departing, mode = modes[name]
+                change[points] += sheet * (by_own[departing] * mode)
             if thickens and name in self.thickening:
                 more = PER_CM_TO_MILLI_PER_UM * self.thickening[name]
                 by_thickness = film.thickness_um * by_own.get("thickness_um", 0.0)

@@ -9,10 +9,15 @@ which law. A parameter is a row of `hotlever.materials.parameters` and a field o
 have it: what a fit may vary, probe files and ``[material]`` follow from these. Where a film has a
 number for a property, a section may state a law: a table or a formula, see
 `hotlever.materials.stated`.
+
+Laws of silicon may depart from their formulas (`hotlever.materials.departures`). With the name of
+the law as its key a property has its derivative by δ at each place, which the modes make one by the
+coefficients.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -20,6 +25,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from hotlever.errors import InputError
+from hotlever.materials.departures import DEPARTURES
 from hotlever.materials.films import (
     constant_conductivity,
     dielectric_conductivity,
@@ -62,6 +68,15 @@ from hotlever.types import Array
 
 #: In place of c_κ: κ follows from the thickness.
 BY_THICKNESS = "thickness"
+# What c_κ may be.
+ScaleOrByThickness = Annotated[
+    Annotated[float, field_of(OF_SILICON["c_kappa"])] | Literal["thickness"],
+    Field(
+        union_mode="left_to_right",
+        description=f'scale of the thermal conductivity; or "{BY_THICKNESS}": it follows from the '
+        "thickness",
+    ),
+]
 #: Share of its resistivity at 300 K that high-doped silicon has when it is colder.
 _LEAST_LEFT = 0.1
 
@@ -71,11 +86,10 @@ class Silicon(Kind):
 
     family: ClassVar = OF_SILICON
 
-    c_kappa: Annotated[float, field_of(OF_SILICON["c_kappa"])] | Literal["thickness"] = Field(
-        union_mode="left_to_right",
-        description=f'scale of the thermal conductivity; or "{BY_THICKNESS}": it follows from the '
-        "thickness",
-    )
+    c_kappa: ScaleOrByThickness
+    kappa_1: float = field_of(OF_SILICON["kappa_1"])
+    kappa_2: float = field_of(OF_SILICON["kappa_2"])
+    kappa_3: float = field_of(OF_SILICON["kappa_3"])
     heat_capacity_scale: float = field_of(OF_SILICON["heat_capacity_scale"])
     scattering_exponent: float = field_of(OF_SILICON["scattering_exponent"])
     emissivity: float = field_of(OF_SILICON["emissivity"])
@@ -91,7 +105,22 @@ class Silicon(Kind):
 
     def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
         """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
-        return self._heat(T, thickness_um if self.c_kappa == BY_THICKNESS else self.c_kappa)
+        kappa = self._heat(T, thickness_um if self.c_kappa == BY_THICKNESS else self.c_kappa)
+        return self._departed("kappa", T, kappa)
+
+    def _departed(self, law: str, T: Array, evaluated: Evaluated) -> Evaluated:
+        """Return a property that is proportional to a law, as far as that departs."""
+        value, by = evaluated
+        coefficients = self._coefficients(law)
+        if any(coefficients):
+            factor, slope = DEPARTURES[law].departed(T, coefficients)
+            value = factor * value
+            by = {name: factor * partial for name, partial in by.items()}
+            by["T"] = by["T"] + value * slope
+        return value, {**by, law: value}
+
+    def _coefficients(self, law: str) -> tuple[float, ...]:
+        return tuple(getattr(self, name) for name in DEPARTURES[law].names)
 
     def enthalpy(self, T: Array) -> Evaluated:
         """Return the heat held (J cm⁻³), see `Kind.enthalpy`."""
@@ -114,6 +143,12 @@ class LowDopedSilicon(Silicon):
     p: float = field_of(OF_SILICON["p"])
     impurity_exponent: float = field_of(OF_SILICON["impurity_exponent"])
     intrinsic_scale: float = field_of(OF_SILICON["intrinsic_scale"])
+    n_i_1: float = field_of(OF_SILICON["n_i_1"])
+    n_i_2: float = field_of(OF_SILICON["n_i_2"])
+    n_i_3: float = field_of(OF_SILICON["n_i_3"])
+    mobility_1: float = field_of(OF_SILICON["mobility_1"])
+    mobility_2: float = field_of(OF_SILICON["mobility_2"])
+    mobility_3: float = field_of(OF_SILICON["mobility_3"])
 
     @property
     def of_carriers(self) -> dict[str, float]:
@@ -128,7 +163,29 @@ class LowDopedSilicon(Silicon):
 
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
-        return type(self).conductivity(T, n, **self.of_carriers)
+        return self._departing(type(self).conductivity, T, n, **self.of_carriers)
+
+    def _departing(
+        self,
+        law: Callable[..., Evaluated],
+        T: Array,
+        n: Array | float,
+        *,
+        intrinsic_scale: float | Array,
+        **others: float | Array,
+    ) -> Evaluated:
+        """Return a law of the carriers as far as their density and mobility depart."""
+        coefficients, scale, slope = self._coefficients("n_i"), intrinsic_scale, None
+        if any(coefficients):
+            factor, slope = DEPARTURES["n_i"].departed(T, coefficients)
+            scale = intrinsic_scale * factor
+        value, by = law(T, n, intrinsic_scale=scale, **others)
+        # δ moves the logarithm of what the scale moves
+        by_density = scale * by["intrinsic_scale"]
+        by = {**by, "intrinsic_scale": by_density / intrinsic_scale, "n_i": by_density}
+        if slope is not None:
+            by["T"] = by["T"] + by_density * slope
+        return self._departed("mobility", T, (value, by))
 
     @property
     def effects(self) -> tuple[Law, ...]:
@@ -137,17 +194,18 @@ class LowDopedSilicon(Silicon):
 
     def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""
-        exponent = self.scattering_exponent
-        return type(self).seebeck(T, n, scattering_exponent=exponent, **self.of_carriers)
+        own = self.of_carriers | {"scattering_exponent": self.scattering_exponent}
+        return self._departing(type(self).seebeck, T, n, **own)
 
     def inversion_temperature(self, n: Array | None = None) -> Array:
         """Return the temperature (K) at which the resistivity of a doping (cm⁻³) is highest.
 
         Of its own doping by default; NaN where there is none below 1700 K.
         """
-        doping = self.n_d if n is None else n
         return inversion_temperature(
-            doping, **self.of_carriers, conductivity=type(self).conductivity
+            self.n_d if n is None else n,
+            **self.of_carriers,
+            conductivity=partial(self._departing, type(self).conductivity),
         )
 
 
@@ -178,6 +236,9 @@ class HighDopedSilicon(Silicon):
     a0: float = field_of(OF_SILICON["a0"])
     a1: float = field_of(OF_SILICON["a1"])
     n_hd: float = field_of(OF_SILICON["n_hd"])
+    legs_1: float = field_of(OF_SILICON["legs_1"])
+    legs_2: float = field_of(OF_SILICON["legs_2"])
+    legs_3: float = field_of(OF_SILICON["legs_3"])
 
     def impossible(self, coldest_K: float) -> str:
         """Say that the straight line of Eq. 11 falls to nothing below 300 K, if it does."""
@@ -196,7 +257,7 @@ class HighDopedSilicon(Silicon):
 
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
-        return conductivity_high_doped(T, self.a0, self.a1)
+        return self._departed("legs", T, conductivity_high_doped(T, self.a0, self.a1))
 
     @property
     def effects(self) -> tuple[Law, ...]:
@@ -206,7 +267,7 @@ class HighDopedSilicon(Silicon):
     def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""
         own = self.a0, self.a1, self.n_hd, self.scattering_exponent
-        return thermoelectric_high_doped(T, *own, carrier)
+        return self._departed("legs", T, thermoelectric_high_doped(T, *own, carrier))
 
 
 # --- films ----------------------------------------------------------------------------------------

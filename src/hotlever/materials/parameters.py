@@ -9,12 +9,14 @@ parameter is named.
 from __future__ import annotations
 
 import math
+import operator
 import re
 from typing import Any, NamedTuple
 
 from pydantic import Field
 
 from hotlever.errors import InputError
+from hotlever.materials.departures import DEPARTURES, Departure, departure_of
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 
 INVERSION = "inversion_temperature"
@@ -39,6 +41,8 @@ _EMISSIVITY = 0.7
 _SLOPE = "temperature coefficient of the high-doped resistivity"
 #: What counts in time alone.
 IN_TIME = "in time"
+#: Of coefficients of a law, by their number.
+_SUBSCRIPTS = "₁₂₃"
 #: Units by the endings of names in probe files.
 _UNITS = {"um": "µm", "ohm": "Ω", "V": "V", "K": "K", "deg": "°", "K_per_mW": "K/mW"}
 
@@ -113,6 +117,22 @@ def _scale(of: str, symbol: str) -> Parameter:
     return Parameter(f"{of}_scale", symbol, "1", 1.0, 0.2, 5.0, meaning, spread=_FILM, usual=True)
 
 
+def _coefficients(departure: Departure) -> list[Parameter]:
+    """Return the rows of the coefficients of a law's departure.
+
+    By their scale a first step of a search is a standard deviation.
+    """
+    return [
+        Parameter(
+            *(name, f"{name.rpartition('_')[0]}{_SUBSCRIPTS[number]}", "1", 10.0, -10.0, 10.0),
+            f"departure of the law of the {departure.words}, mode {number + 1}; 0: none",
+            relative=False,
+            value=0.0,
+        )
+        for number, name in enumerate(departure.names)
+    ]
+
+
 #: All parameters of silicon: first the six that the paper fits, in its order.
 OF_SILICON = _table(
     *(
@@ -160,6 +180,7 @@ OF_SILICON = _table(
         counts=IN_TIME,
         value=1.0,
     ),
+    *(row for departure in DEPARTURES.values() for row in _coefficients(departure)),
 )
 #: The six fit parameters of the paper, in its order.
 PARAMETERS = {name: parameter for name, parameter in OF_SILICON.items() if parameter.usual}
@@ -269,6 +290,9 @@ def field_of(parameter: Parameter, **others: Any) -> Any:
     stated = {"description": words, "ge": least, "le": most}
     if not math.isnan(parameter.value):
         stated["default"] = parameter.value
+    if departure_of(parameter.name):
+        # files name the coefficients that are not zero
+        stated["exclude_if"] = operator.not_
     field = Field(**{**stated, **others})
     field.metadata.append(parameter)
     return field

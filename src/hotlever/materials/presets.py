@@ -11,7 +11,7 @@ from pydantic import create_model, model_validator
 from hotlever.errors import unknown_name
 from hotlever.materials.films import SOMMERFELD
 from hotlever.materials.kind import Kind
-from hotlever.materials.kinds import KINDS, HighDopedSilicon, NSilicon
+from hotlever.materials.kinds import KINDS, HighDopedSilicon, NSilicon, ScaleOrByThickness
 from hotlever.materials.parameters import HIGH_DOPED, LOW_DOPED, OF_SILICON, field_of
 from hotlever.records import Record
 from hotlever.spieser2017 import (
@@ -94,6 +94,8 @@ class Material(_Numbers):
     and reader, and the high-doped one around it. A class made of it may have others of these kinds,
     whose own parameters are fields of it too.
     """
+
+    c_kappa: ScaleOrByThickness
 
     #: What the two are, by name.
     classes: ClassVar[Mapping[str, type[Kind]]] = {

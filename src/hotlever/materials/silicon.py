@@ -10,7 +10,7 @@ The laws take arrays of the temperature `T` (K), the local doping concentration 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Literal
 
 import numpy as np
@@ -308,7 +308,7 @@ def inversion_temperature(
     p: ArrayLike,
     impurity_exponent: ArrayLike = 0.0,
     intrinsic_scale: ArrayLike = 1.0,
-    conductivity: Law = conductivity_low_doped,
+    conductivity: Callable[..., Evaluated] = conductivity_low_doped,
 ) -> Array:
     """Temperature T_i (K) at which the resistivity of low-doped silicon is highest, dρ/dT = 0.
 
@@ -316,8 +316,8 @@ def inversion_temperature(
     ----------
     n, p, impurity_exponent, intrinsic_scale : array_like
         See `conductivity_low_doped`.
-    conductivity : law
-        By temperature and these.
+    conductivity : callable
+        Law by temperature and these.
 
     Returns
     -------
@@ -336,7 +336,8 @@ def inversion_temperature(
     cold, hot = (np.full(arguments[0].shape, T) for T in (300.0, FORMULA_TO))
 
     def slope(T: Array, n: Array, p: Array, exponent: Array, scale: Array) -> Array:
-        sigma, partials = conductivity(T, n, p, exponent, intrinsic_scale=scale)
+        others = {"p": p, "impurity_exponent": exponent, "intrinsic_scale": scale}
+        sigma, partials = conductivity(T, n, **others)
         return partials["T"] / sigma
 
     # takes a quarter of a second to load, which not every command has to wait for

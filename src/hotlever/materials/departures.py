@@ -1,0 +1,190 @@
+"""How far nature may be from a material law: a smooth factor exp(δ(T)) of few coefficients.
+
+A law is known to within a departure δ, a Gaussian process in ln T. Its standard deviation is what
+published values of the law differ by, and grows with the temperature, where fewer were measured;
+its correlation length is that of published departures. The process is written by its first
+Karhunen-Loève modes (R. G. Ghanem and P. D. Spanos, Stochastic Finite Elements (1991)), whose
+coefficients are independent and normal with a standard deviation of one: parameters of the material
+like any other. So the error of a law sits in the law, and all that a lever shows stays consistent
+(K. Sargsyan, H. N. Najm and R. Ghanem, Int. J. Chem. Kinet. 47, 246 (2015); J. Brynjarsdóttir and
+A. O'Hagan, Inverse Probl. 30, 114007 (2014)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import ArrayLike
+
+from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO
+from hotlever.types import Array
+
+#: Correlation length in ln T. Published formulas are powers of T and activated, so that they part
+#: over a factor of two in T; three modes leave less than a hundredth of the variance then.
+CORRELATION_LENGTH = float(np.log(2.0))
+#: Coefficients of each law.
+MODES = 3
+#: Temperatures (K) between which the modes are those of the process, and at which spreads are said.
+MODES_FROM, MODES_TO = 300.0, 1300.0
+COLD_K, HOT_K = 300.0, 1000.0
+#: Points by which the integral equation of the modes is solved, and the degree of the polynomials
+#: in ln T that the modes are: both far beyond what smooth modes need.
+_POINTS, _DEGREE = 40, 14
+
+
+@dataclass(frozen=True)
+class Departure:
+    """The departure of one law.
+
+    Attributes
+    ----------
+    law : str
+        Its name in ``[prior]``, after ``law.``, and of the coefficients, before ``_1``.
+    words : str
+        What it is the law of.
+    spread_cold, spread_hot : float
+        Standard deviation of δ at 300 K and at 1000 K, linear in T: what published values of the
+        law differ by at least.
+    source : str
+        Where these are from.
+
+    Examples
+    --------
+    >>> kappa = DEPARTURES["kappa"]
+    >>> kappa.names, kappa.variance_left < 0.01
+    (('kappa_1', 'kappa_2', 'kappa_3'), True)
+    """
+
+    law: str
+    words: str
+    spread_cold: float
+    spread_hot: float
+    source: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its coefficients."""
+        return tuple(f"{self.law}_{number + 1}" for number in range(MODES))
+
+    def spread(self, T: ArrayLike) -> Array:
+        """Return the standard deviation of δ at temperatures (K)."""
+        share = (np.asarray(T, dtype=float) - COLD_K) / (HOT_K - COLD_K)
+        return np.asarray(self.spread_cold + share * (self.spread_hot - self.spread_cold))
+
+    def modes(self, T: ArrayLike) -> Array:
+        """Return the modes at temperatures (K), (modes, ...): the derivatives of δ."""
+        return np.asarray(chebyshev.chebval(_position(np.asarray(T, dtype=float)), self._modes.T))
+
+    def departed(self, T: Array, coefficients: Sequence[float]) -> tuple[Array, Array]:
+        """Return exp(δ) at temperatures (K), and the derivative of δ by the temperature."""
+        series = np.asarray(coefficients) @ self._modes
+        position = _position(T)
+        inside = (T > FORMULA_FROM) & (T < FORMULA_TO)
+        slope = chebyshev.chebval(position, chebyshev.chebder(series)) * (2.0 / _WIDTH)
+        return np.exp(chebyshev.chebval(position, series)), np.where(inside, slope / T, 0.0)
+
+    @property
+    def variance_left(self) -> float:
+        """The share of the variance of the process that more modes would have."""
+        x, weights = _nodes()
+        T = np.exp(x)
+        return float(
+            1.0 - weights @ (self.modes(T) ** 2).sum(axis=0) / (weights @ self.spread(T) ** 2)
+        )
+
+    @cached_property
+    def _modes(self) -> Array:
+        """Their series of Chebyshev polynomials, (modes, degree + 1)."""
+        # Nyström's method: the integral equation at points, and by it the modes anywhere
+        x, weights = _nodes()
+        spread, root = self.spread(np.exp(x)), np.sqrt(weights)
+        kernel = spread[:, None] * _correlation(x, x) * spread
+        variances, vectors = np.linalg.eigh(root[:, None] * kernel * root)
+        variances, vectors = variances[: -MODES - 1 : -1], vectors[:, : -MODES - 1 : -1]
+        at = chebyshev.chebpts1(2 * _DEGREE)
+        anywhere = np.log(FORMULA_FROM) + 0.5 * (at + 1.0) * _WIDTH
+        reach = self.spread(np.exp(anywhere))[:, None] * _correlation(anywhere, x) * spread
+        values = reach @ (root[:, None] * vectors) / np.sqrt(variances)
+        # the sign of a mode is a convention: it raises the law where that is hot
+        values *= np.sign(values[-1])
+        return np.asarray(chebyshev.chebfit(at, values, _DEGREE).T)
+
+
+_WIDTH = float(np.log(FORMULA_TO / FORMULA_FROM))
+
+
+def _position(T: Array) -> Array:
+    """Return ln T between −1 and 1 in the range of formulas; the ends beyond it."""
+    inside = np.clip(T, FORMULA_FROM, FORMULA_TO)
+    return np.asarray(2.0 / _WIDTH * np.log(inside / FORMULA_FROM) - 1.0)
+
+
+def _nodes() -> tuple[Array, Array]:
+    """Return points in ln T and weights, of which the sum is one."""
+    points, weights = leggauss(_POINTS)
+    low, high = np.log(MODES_FROM), np.log(MODES_TO)
+    return low + 0.5 * (points + 1.0) * (high - low), 0.5 * weights
+
+
+def _correlation(x: Array, y: Array) -> Array:
+    """Return the correlation of δ between places in ln T, (x, y)."""
+    away = (x[:, None] - y) / CORRELATION_LENGTH
+    return np.asarray(np.exp(-0.5 * away**2))
+
+
+#: By the name of the law. The numbers are those of published formulas, and a test holds them
+#: (tests/materials/test_departures.py).
+DEPARTURES = {
+    departure.law: departure
+    for departure in (
+        Departure(
+            "kappa",
+            "thermal conductivity of silicon",
+            *(0.07, 0.18),
+            "films of 0.4 µm between c_κ κ_Si(T) and the scattering at surfaces of Fuchs and "
+            "Sondheimer; bulk silicon to 5 %",
+        ),
+        Departure(
+            "n_i",
+            "intrinsic carrier density",
+            *(0.21, 0.32),
+            "Eq. 7, Morin and Maita (1954), Putley and Mitchell (1958), Barber (1967), Slotboom "
+            "(1977), Wasserrab (1977), Sproul and Green (1991), Misiakos and Tsamakis (1993)",
+        ),
+        Departure(
+            "mobility",
+            "mobility of the carriers in low-doped silicon",
+            *(0.06, 0.32),
+            "Eq. 8, Dorkel and Leturcq (1981), Arora et al. (1982), MINIMOS (1990), measured up to "
+            "500 K",
+        ),
+        Departure(
+            "legs",
+            "conductivity of high-doped silicon",
+            *(0.05, 0.10),
+            "bends of 1/σ at 2e20 cm⁻³ from a straight line: Dorkel and Leturcq (1981), Arora et "
+            "al. (1982), MINIMOS (1990); Chapman et al. (1963), measured up to 900 K",
+        ),
+    )
+}
+
+
+def departure_of(name: str) -> tuple[Departure, int] | None:
+    """Return the departure that a coefficient is of, and its number; None of any other name.
+
+    Examples
+    --------
+    >>> departure, number = departure_of("n_i_2")
+    >>> departure.law, number
+    ('n_i', 1)
+    """
+    law, _, number = name.rpartition("_")
+    departure = DEPARTURES.get(law)
+    if departure is None or name not in departure.names:
+        return None
+    return departure, int(number) - 1
