@@ -10,7 +10,8 @@ from typing import Any
 
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text
-from hotlever.materials import REFERENCE
+from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind
+from hotlever.materials.kinds import BY_THICKNESS, Silicon
 from hotlever.materials.sections import LAWS, classes_at_hand, materials_of
 from hotlever.materials.stated import names_stated
 from hotlever.probe.circuit import Contact
@@ -116,12 +117,36 @@ def parts_of(
                 f"{where}: [{MATERIALS}.{name}]: no layer is made of it, expected [layers.…] "
                 f'with material = "{name}"'
             )
+    by_thickness = _other_thickness(shape)
+    for name, section in values.get(MATERIALS, {}).items():
+        kind = materials[name]
+        stated = isinstance(section, Kind) or "c_kappa" in section
+        if isinstance(kind, Silicon) and name in by_thickness and not stated:
+            materials[name] = kind.model_copy(update={"c_kappa": BY_THICKNESS})
     parts: dict[str, Any] = {"shape": shape, MATERIALS: materials}
+    usual = REFERENCE
+    if not by_thickness.isdisjoint({LOW_DOPED, HIGH_DOPED}):
+        usual = REFERENCE.model_copy(update={"c_kappa": BY_THICKNESS})
+        parts[MATERIAL] = usual
     for name in (name for name in PARTS if name in values):
-        usual = REFERENCE.model_dump() if name == MATERIAL else {}
+        own = usual.model_dump() if name == MATERIAL else {}
         record_class = classes.get(name, PARTS[name])
-        parts[name] = record_class.from_values({**usual, **values[name]}, f"{where}: [{name}]")
+        parts[name] = record_class.from_values({**own, **values[name]}, f"{where}: [{name}]")
     return parts
+
+
+def _other_thickness(shape: Shape) -> set[str]:
+    """Return the materials that some layer is of with another thickness than the paper's levers.
+
+    The scale of κ that these have says nothing of it, so that κ of silicon follows from it.
+    """
+    layout = shape.layout()
+    return {
+        film.material
+        for region in layout.regions
+        for film in region.stack
+        if (film.thickness_um or layout.thickness_um) != ThreeLeg.reference().thickness_um
+    }
 
 
 def _shape_of(

@@ -210,9 +210,12 @@ def _row(case: Case) -> dict[str, float]:
     knee = branch.knee.tip_K
     end = min(knee + SPAN_K, branch.hottest_K, HOTTEST)
     line, ends = Line.of(branch, knee, end), np.array([knee, end])
-    silicon = case.probe.heater_silicon
-    c_kappa = 1.0 if silicon is None else silicon.c_kappa
-    conducted = thermal_conductivity(np.array([knee, (knee + end) / 2, end]), c_kappa)[0]
+    silicon, across = case.probe.heater_silicon, np.array([knee, (knee + end) / 2, end])
+    conducted, _ = (
+        thermal_conductivity(across)
+        if silicon is None
+        else silicon.thermal_conductivity(across, case.probe.layout().thickness_um)
+    )
     slopes = branch.by_power.slope(branch.power(ends))
     parts = dataset_of_branch(case.probe, branch, branch.u_at(ends))
     shares = (parts.heater_ohm / (parts.heater_ohm + parts.legs_ohm)).values

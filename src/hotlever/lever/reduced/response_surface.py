@@ -130,7 +130,9 @@ class ParameterDomain:
 
 def is_papers(probe: Probe, names: Collection[str] = ()) -> bool:
     """Whether a probe is of the paper's silicon, and some names are of its six parameters."""
-    return set(names) <= {C_KAPPA, *PAPER} and not probe.materials and probe.has_plain_silicon
+    plain = probe.has_plain_silicon and not probe.materials
+    scaled = isinstance(probe.material.c_kappa, float)
+    return set(names) <= {C_KAPPA, *PAPER} and plain and scaled
 
 
 @dataclass(frozen=True)
