@@ -51,7 +51,9 @@ def test_the_citation_is_of_this_version_and_licence():
     )
     assert citation["version"] == hotlever.__version__
     released = f"## {hotlever.__version__} ({citation['date-released']})"
-    assert re.search(r"^## .+", read("CHANGELOG.md"), re.M)[0] == released
+    # what comes next stands above the last release
+    headings = re.findall(r"^## .+", read("CHANGELOG.md"), re.M)
+    assert next(heading for heading in headings if heading != "## Unreleased") == released
     assert citation["license"] == project["license"]
     assert citation["title"] == project["name"]
     assert citation["abstract"] == project["description"]
