@@ -33,6 +33,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "reader_V": ("V", "reader voltage"),
     "bridge_output_V": ("V", "bridge voltage"),
     "tip_K": ("K", "tip temperature"),
+    "ramp": ("", "way of the bias"),
     "power_mW": ("mW", "power dissipated in the lever"),
     "total_power_mW": ("mW", "power into the lever by all supplies"),
     "tip_error_K": ("K", "standard error of the measured tip temperature"),

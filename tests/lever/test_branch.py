@@ -11,6 +11,8 @@ from hotlever.errors import BranchEndError, ComputationError, InputError
 from hotlever.lever import Branch, Lever
 from hotlever.lever.continuation import continued
 from hotlever.lever.lever import COARSE
+from hotlever.lever.newton import NewtonOptions
+from hotlever.lever.solved_states import solve_at
 from hotlever.probe import Probe
 
 EXAMPLES = Path(__file__).parents[2] / "src/hotlever/examples"
@@ -207,6 +209,50 @@ def test_a_large_resistor_makes_the_lever_jump_and_the_sweep_says_so(coarse):
     assert rise.max() > 80  # the jump
     assert (rise > 0).all()
     np.testing.assert_allclose(sweep.lever_V + 30.0 * sweep.current_mA, sweep.bias_V, rtol=1e-9)
+
+
+def test_a_lever_that_jumps_goes_back_another_way(coarse):
+    lever = with_series(coarse, 30000.0)
+    sweep = lever.sweep(np.linspace(25, 36, 23), and_back=True)
+    up, down = (sweep.isel(bias=(sweep.ramp == way).values) for way in ("up", "down"))
+    assert up.bias_V.values.tolist() == np.linspace(25, 36, 23).tolist()
+    assert down.bias_V.values.tolist() == np.linspace(25, 36, 23)[-2::-1].tolist()
+    warmer = down.tip_K.values[::-1] - up.tip_K.values[:-1]
+    assert warmer.max() > 200  # between the jumps
+    assert (warmer > -1e-9).all()
+    bias = sweep.lever_V + 30.0 * sweep.current_mA
+    np.testing.assert_allclose(bias, sweep.bias_V, rtol=1e-9)
+    solved = lever.dataset(lever.solve(np.linspace(25, 36, 23), and_back=True))
+    np.testing.assert_allclose(sweep.tip_K, solved.tip_K, rtol=0, atol=0.02)
+
+
+def test_jumps_are_where_solved_states_turn(coarse):
+    """The highest and lowest bias of states around a fold, each solved at its tip temperature."""
+    lever = with_series(coarse, 30000.0)
+    branch, reading, failure = lever.read(np.linspace(25, 36, 3), and_back=True)
+    assert failure is None
+    ((upper_V, upper_K),), ((lower_V, lower_K),) = reading.jumps, reading.jumps_back
+    assert upper_V > lower_V
+    for fold_V, tip_K, turn in ((upper_V, upper_K, np.max), (lower_V, lower_K, np.min)):
+        u = branch.u_at(tip_K + np.linspace(-2.0, 2.0, 9))
+        states = solve_at(lever.equations, u, branch.states(u), NewtonOptions())
+        lever_V, current_mA, *_ = lever.equations.observed(states.x)
+        biases = lever.circuit.bias(lever_V, current_mA)
+        parabola = np.polynomial.Polynomial.fit(u, biases, 4)
+        assert fold_V == pytest.approx(turn(parabola(np.linspace(u[0], u[-1], 4001))), abs=1e-6)
+
+
+def test_a_lever_without_jumps_goes_back_as_it_came(coarse):
+    sweep = coarse.sweep([0.0, 4.0, 8.0], and_back=True)
+    assert sweep.bias_V.values.tolist() == [0.0, 4.0, 8.0, 4.0, 0.0]
+    assert sweep.tip_K.values == pytest.approx(sweep.tip_K.values[::-1], abs=1e-9)
+    assert sweep.attrs["notes"] == ""
+
+
+@pytest.mark.parametrize("bias", [[2.0, 1.0], [1.0, 1.0], [-1.0, 1.0]])
+def test_biases_that_go_back_rise_before(coarse, bias):
+    with pytest.raises(InputError, match="expected"):
+        coarse.sweep(bias, and_back=True)
 
 
 def test_without_a_jump_nothing_is_noted(coarse):

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hotlever.calibration.power_law import EQ12, PowerLaw
-from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, VERMILION
+from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION
 from hotlever.figures.style import (
     COLOURS,
     LINES,
@@ -52,9 +52,25 @@ def material_curves(curves: Mapping[str, tuple[Array, Array, Array | None]]) -> 
 
 
 def sweep_overview(sweep: xr.Dataset) -> Figure:
-    """Draw what a sweep gives against the bias: current, voltages, tip temperature, I-V."""
+    """Draw what a sweep gives against the bias: current, voltages, tip temperature, I-V.
+
+    The way back, if it goes back too, is dashed.
+    """
+    if "ramp" in sweep.coords:
+        # the last row of the way up is the first of that down
+        top = int((sweep.ramp == "up").sum())
+        sweep, back = sweep.isel(bias=slice(top)), sweep.isel(bias=slice(max(top - 1, 0), None))
+    else:
+        back = None
     with figure(7.4, 5.2, 2, 2, letters=True) as (fig, grid):
         current, voltage, tip, iv = grid.ravel()
+        if back is not None:
+            style: Any = {"mfc": "none", "label": "way back"}
+            curve(current, back, "bias_V", "current_mA", "o--", color=SKY, **style)
+            curve(voltage, back, "bias_V", "lever_V", "o--", color=SKY, **style)
+            curve(voltage, back, "bias_V", "reader_V", "s--", color=GREEN, mfc="none")
+            curve(tip, back, "bias_V", "tip_K", "o--", color=ORANGE, **style)
+            curve(iv, back, "lever_V", "current_mA", "o--", color=SKY, **style)
         curve(current, sweep, "bias_V", "current_mA", "o-", color=BLUE, label="I$_h$, swept supply")
         held = [name for name in map(str, sweep.data_vars) if name.endswith("_mA")]
         held = [name for name in held if name not in ("current_mA", "ground_current_mA")]
@@ -63,6 +79,7 @@ def sweep_overview(sweep: xr.Dataset) -> Figure:
             current.plot(sweep.bias_V, sweep[name], "s-", color=colour, label=label)
         if held:
             current.set(ylabel="current into the lever (mA)")
+        if held or back is not None:
             current.legend()
         curve(voltage, sweep, "bias_V", "lever_V", "o-", color=BLUE, label="lever V$_l$")
         curve(voltage, sweep, "bias_V", "reader_V", "s-", color=GREEN, label="reader V$_r$")

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from hotlever.errors import BranchEndError
 from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations
-from hotlever.lever.newton import NewtonResult
+from hotlever.lever.newton import NewtonOptions, NewtonResult
 from hotlever.lever.readings import ByPower, Reading, slow_ramp
 from hotlever.lever.solved_states import (
     NATURAL,
@@ -30,6 +30,7 @@ from hotlever.lever.solved_states import (
     Parametrisation,
     PseudoArclength,
     SolvedStates,
+    solve_at,
 )
 from hotlever.piecewise import Piecewise
 from hotlever.probe.circuit import Circuit
@@ -229,6 +230,39 @@ class Branch(SolvedStates):
         u[~below], u[below] = up.u, down.u
         ends = down if np.isnan(down.u).any() and not np.isnan(up.u).any() else up
         return replace(ends, u=u, jumps=[*up.jumps, *down.jumps])
+
+    def read_back(self, circuit: Circuit, bias: Array, from_u: float) -> Reading:
+        """Find the states that a slow ramp back to zero takes from a place of the branch.
+
+        The biases (V) may be in any order, none of them above that of the place.
+        """
+        # with reversed signs that ramp is one upwards
+        back, turns = self.mirrored, -self.turns(self.bias_by_u(circuit))[::-1]
+        curve = back.bias_by_u(circuit)
+        return slow_ramp(curve, turns, back.end_u, -bias, back.tip_K, -from_u).mirrored
+
+    def with_folds(self, circuit: Circuit) -> Branch:
+        """Return the branch with a solved state at each fold of the bias in a circuit.
+
+        A fold read from curves between states is off by as much as these, to first order; through a
+        state and its tangent by their square.
+
+        Raises
+        ------
+        ComputationError
+            If a state was not found.
+        """
+        curve = self.bias_by_u(circuit)
+        # at a state of the branch, as its end, there is nothing to add
+        folds = np.array([u for u in self.turns(curve).tolist() if u not in self.u])
+        if not folds.size:
+            return self
+        lines = self.parametrisation
+        guess = self.states(folds)
+        roots = solve_at(self.equations, folds, guess, NewtonOptions(), parametrisation=lines)
+        every = self.followed_by(Branch.of_roots(self.equations, folds, roots, lines))
+        ordered = every.among(np.argsort(every.u))
+        return replace(ordered, stated_parametrisation=self.stated_parametrisation)
 
     def highest_bias(self, circuit: Circuit, bias_V: float) -> float:
         """Return the highest bias (V) up to some one at which a slow ramp finds a state."""

@@ -39,7 +39,7 @@ from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.parts import SECTIONS
-from hotlever.types import Array
+from hotlever.types import Array, Mask
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -255,14 +255,19 @@ def circuit_of(data: xr.Dataset) -> Circuit:
     return Circuit.from_values(_section(data, "circuit"), "sweep: [circuit]")
 
 
-def checked_bias(bias: ArrayLike, probe: Probe) -> Array:
-    """Return biases as an array.
+def with_ramp(data: xr.Dataset, up: Mask) -> xr.Dataset:
+    """Return a sweep whose rows, (n,), are known to be of the way up or of that down."""
+    return data.assign_coords(ramp=quantity("ramp", "bias", np.where(up, "up", "down")))
+
+
+def checked_bias(bias: ArrayLike, probe: Probe, and_back: bool = False) -> Array:
+    """Return biases as an array; those of a ramp that goes back as well rise from 0 V or more.
 
     Raises
     ------
     InputError
         If one is not finite or there is none; or one is negative, unless that is another state
-        than the positive one.
+        than the positive one; or they do not rise where they must.
     """
     values = np.atleast_1d(np.asarray(bias, dtype=float))
     lowest = probe.lowest_bias_V
@@ -272,4 +277,9 @@ def checked_bias(bias: ArrayLike, probe: Probe) -> Array:
         raise InputError(f"found a bias of {wrong[0]:g} V, expected finite biases{of}")
     if not values.size:
         raise InputError("no bias, expected one or more")
+    if and_back and (values[0] < 0.0 or (np.diff(values) <= 0.0).any()):
+        raise InputError(
+            f"found biases from {values[0]:g} to {values[-1]:g} V up and back, expected some that "
+            "rise from 0 V or more"
+        )
     return values

@@ -13,10 +13,16 @@ from numpy.typing import ArrayLike
 from hotlever.errors import ComputationError, as_far_as_possible
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, branch_end
 from hotlever.lever.continuation import Enough, continued
-from hotlever.lever.dataset import at_bias, checked_bias, dataset_of_branch, dataset_of_states
+from hotlever.lever.dataset import (
+    at_bias,
+    checked_bias,
+    dataset_of_branch,
+    dataset_of_states,
+    with_ramp,
+)
 from hotlever.lever.discretisation import MeshedProbe
 from hotlever.lever.observables import sensitivities_of
-from hotlever.lever.readings import Reading
+from hotlever.lever.readings import Reading, there_and_back
 from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP, Constraint
 from hotlever.probe import MeshOptions, Probe
@@ -95,13 +101,17 @@ class Lever(MeshedProbe):
         return self._branch_until(lambda branch: np.any(np.diff(branch.values[:-1, 0]) < 0))
 
     @one_blas_thread
-    def solve(self, bias: ArrayLike, progress: Progress | None = None) -> list[State]:
+    def solve(
+        self, bias: ArrayLike, progress: Progress | None = None, *, and_back: bool = False
+    ) -> list[State]:
         """Find the states that a slow ramp of the bias takes, each solved by itself.
 
         Parameters
         ----------
         bias : array_like, shape (n,)
             Biases (V) in any order; negative ones where held supplies make them differ.
+        and_back : bool
+            See `sweep`.
         progress : callable, optional
             Called with the states done and their number.
 
@@ -117,8 +127,10 @@ class Lever(MeshedProbe):
         BranchEndError, ComputationError
             If not every bias is reached; ``partial`` holds the states up to there.
         """
-        values = checked_bias(bias, self.probe)
-        branch, reading, failure = self.read(values)
+        values = checked_bias(bias, self.probe, and_back)
+        branch, reading, failure = self.read(values, and_back=and_back)
+        if and_back:
+            values = there_and_back(values)[: reading.u.size]
         states: list[State] = []
         for u, value in zip(reading.u, values.tolist(), strict=True):
             if failure is not None and np.isnan(u):
@@ -139,14 +151,24 @@ class Lever(MeshedProbe):
         return self.polished(branch.states(at), bias, branch.parametrisation.constraint(at))
 
     def read(
-        self, bias: Array, progress: Progress | None = None
+        self, bias: Array, progress: Progress | None = None, *, and_back: bool = False
     ) -> tuple[Branch, Reading, ComputationError | None]:
-        """Return the branch, where on it a ramp finds biases (V), and why it lacks some of them."""
+        """Return the branch, where on it a ramp finds biases (V), and why it lacks some of them.
+
+        One that goes back too, from the last of rising biases, finds `there_and_back` of them;
+        from where the branch ends before there is no way back.
+        """
         below, above = min(float(bias.min()), 0.0) or None, float(bias.max())
         branch, failure = as_far_as_possible(lambda: self.branch_to(above, progress, below))
+        if and_back and failure is None:
+            branch = self._branch = branch.with_folds(self.circuit)
         reading = branch.read(self.circuit, bias)
-        missing = np.isnan(reading.u).any()
-        return branch, reading, (failure or branch_end(branch, reading)) if missing else None
+        if np.isnan(reading.u).any():
+            return branch, reading, failure or branch_end(branch, reading)
+        if and_back:
+            back = branch.read_back(self.circuit, bias[-2::-1], reading.u[-1])
+            reading = reading.and_back(back)
+        return branch, reading, None
 
     @one_blas_thread
     def polished(self, guess: Array, bias: float, constraint: Constraint = TIP) -> State:
@@ -161,6 +183,7 @@ class Lever(MeshedProbe):
         bias: ArrayLike,
         *,
         sensitivities: bool = False,
+        and_back: bool = False,
         progress: Progress | None = None,
     ) -> xr.Dataset:
         """Read the lever's branch over a range of bias.
@@ -173,6 +196,10 @@ class Lever(MeshedProbe):
         sensitivities : bool
             Add the derivatives of what a fit compares, at fixed bias, by the parameters that it
             usually varies.
+        and_back : bool
+            Let the ramp go back from the last bias as well; biases rise then, from 0 V or more. The
+            coordinate ``ramp`` says which rows are of the way ``up`` and ``down``. Where the lever
+            jumps it does so at other biases on either way.
         progress : callable, optional
             Called with the states done and how many there usually are.
 
@@ -186,7 +213,7 @@ class Lever(MeshedProbe):
         Raises
         ------
         InputError
-            If a bias is not finite, or negative where it must not be.
+            If a bias is not finite, or negative where it must not be, or they do not rise.
         BranchEndError, ComputationError
             If not every bias is reached; ``partial`` holds the dataset up to there.
 
@@ -196,8 +223,11 @@ class Lever(MeshedProbe):
         ones (`solve`), a third of the mesh's error, the highest temperature too; 5e-5 and 0.05 K
         where a leg gets hot faster than the tip.
         """
-        values = checked_bias(bias, self.probe)
-        branch, reading, failure = self.read(values, progress)
+        values = checked_bias(bias, self.probe, and_back)
+        branch, reading, failure = self.read(values, progress, and_back=and_back)
+        up = values.size
+        if and_back:
+            values = there_and_back(values)[: reading.u.size]
         reached = np.flatnonzero(np.isfinite(reading.u))
         u, slopes = reading.u[reached], None
         if sensitivities:
@@ -205,6 +235,8 @@ class Lever(MeshedProbe):
         notes = reading.notes(values[reached])
         data = dataset_of_branch(self.probe, branch, u, notes, slopes)
         data = at_bias(data, values[reached])
+        if and_back:
+            data = with_ramp(data, reached < up)
         if failure is not None:
             failure.partial = data
             raise failure

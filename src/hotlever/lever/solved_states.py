@@ -221,8 +221,8 @@ class SolvedStates:
         """Return the state without power, whose slope is given."""
         return cls.of(equations, np.zeros(1), np.zeros_like(slope), slope)
 
-    def among(self, which: NDArray[np.bool_]) -> Self:
-        """Return some of them."""
+    def among(self, which: NDArray[np.bool_ | np.intp]) -> Self:
+        """Return some of them, by a mask or in an order."""
         return type(self)(
             equations=self.equations,
             u=self.u[which],

@@ -16,11 +16,11 @@ from skfem.element import ElementTetP2
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.lever.branch import Branch
-from hotlever.lever.dataset import at_bias, checked_bias
+from hotlever.lever.dataset import at_bias, checked_bias, with_ramp
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever, State
-from hotlever.lever.readings import Reading
+from hotlever.lever.readings import Reading, there_and_back
 from hotlever.lever3d.still_air import OpenAir, ngsolve
 from hotlever.probe import Layout, Probe, Wiring
 from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid, middle_and_reach
@@ -130,19 +130,24 @@ class SolidLever(Lever):
         bias: ArrayLike,
         *,
         sensitivities: bool = False,
+        and_back: bool = False,
         progress: Progress | None = None,
     ) -> xr.Dataset:
         """Solve the lever at each of some biases; see `Lever.sweep`.
 
         Sensitivities are those of the flat lever.
         """
-        values = checked_bias(bias, self.probe)
-        states, failure = as_far_as_possible(lambda: self.solve(values, progress))
-        solved = values[: len(states)]
-        notes = self._flat.branch_to(float(values.max())).read(self.circuit, values).notes(values)
-        data = at_bias(self.dataset(states, notes), solved)
+        values = checked_bias(bias, self.probe, and_back)
+        every = there_and_back(values) if and_back else values
+        states, failure = as_far_as_possible(
+            lambda: self.solve(values, progress, and_back=and_back)
+        )
+        notes = self._flat.read(values, and_back=and_back)[1].notes(values)
+        data = at_bias(self.dataset(states, notes), every[: len(states)])
+        if and_back:
+            data = with_ramp(data, np.arange(len(states)) < values.size)
         if sensitivities:
-            flat = self._flat.sweep(solved, sensitivities=True)
+            flat = self._flat.sweep(values[: len(states)], sensitivities=True, and_back=and_back)
             data = data.assign(sensitivity=flat.sensitivity)
         if failure is not None:
             failure.partial = data
@@ -162,10 +167,10 @@ class SolidLever(Lever):
         return flat.interpolation(self.space.elements.nodes[:2].T)[0]
 
     def read(
-        self, bias: Array, progress: Progress | None = None
+        self, bias: Array, progress: Progress | None = None, *, and_back: bool = False
     ) -> tuple[Branch, Reading, ComputationError | None]:
         """Return the branch of the flat lever; see `Lever`."""
-        return self._flat.read(bias, progress)
+        return self._flat.read(bias, progress, and_back=and_back)
 
     def _state_at(self, branch: Branch, u: float, bias: float) -> State:
         """Return a state from the cache, or solve it from that of the flat lever."""

@@ -171,6 +171,11 @@ class SweepRequest(TableRequest, LeverRequest):
         metavar="START:STOP:COUNT",
         help="In volts, ends included, or a single one; 1:11:25 if left out.",
     )
+    and_back: bool = option(
+        False,
+        "--and-back",
+        help="Let the bias go back as well: a lever that jumps does so elsewhere.",
+    )
     hold_resistance: str | None = option(
         None,
         metavar="OHM",
@@ -204,6 +209,7 @@ class SweepRequest(TableRequest, LeverRequest):
         else:
             return None
         option = f"--hold-{what}"
+        self.refuse("and_back", why=f"does not go with {option}")
         if self.model != "flat":
             raise InputError(f"{option}: goes with --model flat, found {excerpt(self.model)}")
         return what, option, parse_set_points(text, unit, option)

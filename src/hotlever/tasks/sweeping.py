@@ -45,11 +45,16 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
                 raise InputError(f"{option}: {error}") from None
             data, states, curve = held_states.data, held_states.states, held_states.curve
         else:
-            data, failure = as_far_as_possible(lambda: lever.sweep(biases, progress=update))
+            data, failure = as_far_as_possible(
+                lambda: lever.sweep(biases, and_back=request.and_back, progress=update)
+            )
         if failure is not None and not data.bias.size:
             raise failure
         if request.fields is not None and not states:
-            states, ended = as_far_as_possible(lambda: lever.solve(data.bias_V.values, update))
+            solved = biases if request.and_back else data.bias_V.values
+            states, ended = as_far_as_possible(
+                lambda: lever.solve(solved, update, and_back=request.and_back)
+            )
             failure = failure or ended
         if request.map is not None:
             hottest = int(data.tip_K.values.argmax())
