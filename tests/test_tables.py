@@ -23,14 +23,45 @@ def table(tmp_path, text):
 
 @pytest.mark.parametrize(
     ("cell", "value"),
-    [("1", 1.0), ("-1.5e3", -1500.0), ("+.5", 0.5), ("1D3", 1000.0), ("5.", 5.0)],
+    [
+        *(("1", 1.0), ("-1.5e3", -1500.0), ("+.5", 0.5), ("1D3", 1000.0), ("5.", 5.0)),
+        *(("−1.5e3", -1500.0), ("–0.5", -0.5), ("5e−3", 0.005), ("－2", -2.0), ("âˆ’2", -2.0)),
+    ],
 )
 def test_numbers_as_instruments_write_them(cell, value):
     assert number(cell) == value
     assert number(cell.replace(".", ","), decimal_comma=True) == value
 
 
-@pytest.mark.parametrize("cell", ["", "nan", "NaN", "-", "--", "n/a"])
+@pytest.mark.parametrize(
+    "cell",
+    [
+        *("", "nan", "NaN", "-", "--", "n/a", "---", "—", "NULL", "None", "inf", "-Inf", "∞"),
+        *(
+            "OVERFLOW",
+            "+OVER",
+            "OL",
+            "O.L",
+            "BURNOUT",
+            "+++++",
+            "*****",
+            "#####",
+            "#N/A",
+            "#DIV/0!",
+        ),
+        *(
+            "#WERT!",
+            "#NV",
+            "1.#QNAN",
+            "-1.#IND",
+            "-nan(ind)",
+            "9.91E37",
+            "+9.910000E+37",
+            "-9.9E37",
+        ),
+        "199.999E+99",
+    ],
+)
 def test_a_cell_may_say_that_there_is_no_number(cell):
     value = number(cell)
     assert value is not None
@@ -39,7 +70,7 @@ def test_a_cell_may_say_that_there_is_no_number(cell):
 
 @pytest.mark.parametrize(
     "cell",
-    ["inf", "1e999", "1e31", "1_000", "0x10", "1,5", "1.2.3", "１", "1 000", "=1+1", "9" * 99],
+    ["ERR", "1e999", "1e31", "1_000", "0x10", "1,5", "1.2.3", "１", "1 000", "=1+1", "9" * 99],
 )
 def test_what_is_no_number_is_not_taken_for_one(cell):
     assert number(cell) is None

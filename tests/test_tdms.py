@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever import InputError, read_measurement
+from hotlever.measurement import file_groups
 from hotlever.tables.binary import TDMS
 
 BIAS = np.array([0.1, 1.0, 2.0 / 3.0, 8.25])
@@ -40,13 +41,42 @@ def test_channels_are_columns_with_their_units(tmp_path):
     assert f"{path}: column 'flag' is not used" in data.unused
 
 
-def test_groups_of_the_same_channels_follow_each_other(tmp_path):
-    up = [("V_b", "V", BIAS), ("I_h", "Amps", CURRENT)]
-    down = [("V_b", "V", BIAS[::-1]), ("I_h", "Amps", CURRENT[::-1])]
-    data = read_measurement(written(tmp_path / "iv.tdms", up, down))
-    assert data.bias_V.size == 8
-    path = written(tmp_path / "two.tdms", up, [("V_b", "V", BIAS), ("V_r", "V", BIAS)])
-    with pytest.raises(InputError, match="the group 'sweep 1' has other channels than 'sweep 0'"):
+def test_of_several_groups_the_one_that_is_told_is_read(tmp_path):
+    one = [("V_b", "V", BIAS), ("I_h", "Amps", CURRENT)]
+    other = [("V_b", "V", BIAS), ("I_h", "Amps", 1.3 * CURRENT)]
+    path = written(tmp_path / "iv.tdms", one, other)
+    with pytest.raises(
+        InputError, match=r"2 groups, .*: 'sweep 0', 'sweep 1'; .* --column 'group=sweep 0'"
+    ):
+        read_measurement(path)
+    data = read_measurement(path, {"group": "sweep 1"})
+    np.testing.assert_allclose(data.current_mA, 1.3e3 * CURRENT, rtol=1e-15)
+    with pytest.raises(InputError, match="unknown group 'sweep 2': did you mean 'sweep 1'"):
+        read_measurement(path, {"group": "sweep 2"})
+    assert file_groups(path) == ["sweep 0", "sweep 1"]
+
+
+def test_a_group_of_settings_is_asked_for_too(tmp_path):
+    one = [("V_b", "V", BIAS), ("I_h", "Amps", CURRENT)]
+    path = written(tmp_path / "iv.tdms", one, [("T_stage", "°C", BIAS)])
+    with pytest.raises(InputError, match="expected one, which --column 'group=sweep 0' says"):
+        read_measurement(path)
+    assert read_measurement(path, {"group": "sweep 0"}).bias_V.tolist() == BIAS.tolist()
+
+
+def test_other_files_have_no_groups(tmp_path):
+    path = tmp_path / "iv.csv"
+    path.write_text("V_b (V),I_h (mA)\n1,0.14\n")
+    assert file_groups(path) == []
+    with pytest.raises(InputError, match=r"iv\.csv: is no TDMS file, .* no group 'up'"):
+        read_measurement(path, {"group": "up"})
+
+
+def test_channels_of_other_times_are_no_rows(tmp_path):
+    fast, slow = ({"wf_start_offset": 0.0, "wf_increment": step} for step in (1e-3, 2e-3))
+    channels = [("V_b", "V", BIAS, fast), ("I_h", "A", CURRENT[::2], slow)]
+    path = written(tmp_path / "iv.tdms", channels)
+    with pytest.raises(InputError, match=r"every 0\.001 s .* every 0\.002 s .* the same times"):
         read_measurement(path)
 
 

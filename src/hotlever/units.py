@@ -28,6 +28,9 @@ LONGEST_NUMBER = 60  #: characters
 _PREFIXES = {"": 0, "d": -1, "c": -2, "m": -3, "u": -6, "μ": -6, "n": -9, "p": -12, "f": -15}
 _PREFIXES |= {"a": -18, "da": 1, "h": 2, "k": 3, "K": 3, "M": 6, "G": 9, "T": 12, "P": 15, "E": 18}
 _PREFIX_WORDS = {"": 0, "milli": -3, "micro": -6, "nano": -9, "pico": -12, "kilo": 3, "mega": 6}
+#: Hyphens, dashes and minus signs that stand before negative numbers, and what U+2212 and the en
+#: dash look like where UTF-8 was read as Windows' Latin-1.
+_MINUS = re.compile("[‐‑‒–—−﹣－]|âˆ’|â€“")
 #: Quantity (its unit), and what one of a unit is of it.
 _SYMBOLS = {
     **{symbol: (symbol, 1.0) for symbol in ("V", "A", "W", "K", "s", "Hz", "m", "bar", "S", "J")},
@@ -107,6 +110,17 @@ def is_unit(text: str) -> bool:
     """
     unit = _unit(text.strip())
     return unit is not None and unit.quantity not in _OF_SETTINGS
+
+
+def differ(unit: str, other: str) -> bool:
+    """Whether two texts are units, and not the same one.
+
+    Examples
+    --------
+    >>> differ("mA", "A"), differ("µA", "uA"), differ("mA", "CH1")
+    (True, False, False)
+    """
+    return is_unit(unit) and is_unit(other) and _unit(unit.strip()) != _unit(other.strip())
 
 
 def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float, float] | None:
@@ -231,14 +245,26 @@ def key_and_value(line: str) -> tuple[str, str]:
     return key.strip(' "'), value[0].strip(' =:;,\t"') if value else ""
 
 
+def plain_minus(text: str) -> str:
+    """Write every sign that is meant for a minus as the one of ASCII.
+
+    Examples
+    --------
+    >>> plain_minus("−1.5e–3")
+    '-1.5e-3'
+    """
+    return text if text.isascii() else _MINUS.sub("-", text)
+
+
 def quantity(text: str) -> tuple[float | None, str]:
     """Split ``5.6 kOhm`` into number and what follows; None if no number begins the text.
 
     Examples
     --------
-    >>> quantity("5,6e3 Ohm"), quantity("20°C"), quantity("many")
-    ((5600.0, ' Ohm'), (20.0, '°C'), (None, 'many'))
+    >>> quantity("5,6e3 Ohm"), quantity("−20°C"), quantity("many")
+    ((5600.0, ' Ohm'), (-20.0, '°C'), (None, 'many'))
     """
+    text = plain_minus(text)
     match = NUMBER.match(text[:LONGEST_NUMBER])
     if match is None:
         return None, text
@@ -260,7 +286,7 @@ def plain_powers(text: str) -> str:
     ('2e-6 mbar', '1e-4 Pa')
     """
     text = re.sub(r"10(?=[⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹])", "10^", text)
-    text = unicodedata.normalize("NFKC", text).replace("−", "-")
+    text = plain_minus(unicodedata.normalize("NFKC", text))
     text = re.sub(r"\s?[x×*·]\s?10\^?(?=[-+]?\d)", "e", text)
     return re.sub(r"(?<![\d.,])10\^(?=[-+]?\d)", "1e", text)
 

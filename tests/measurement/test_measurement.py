@@ -91,7 +91,7 @@ def test_comments_may_give_the_circuit(tmp_path, comment, ohm, kelvin):
         ("V_b (V),I_h (mA)\n1,2\n1,2,3\n", r"line 3: 3 cells, expected 2"),
         ("V_b (V),I_h (mA)\n,2\n", r"line 2: V_b is '', expected a bias"),
         ("V_b (V),I_h (mA)\n-1,2\n", r"line 2: V_b is '-1'"),
-        ("V_b (V),I_h (mA)\n1,inf\n", r"found 'inf', expected a number"),
+        ("V_b (V),I_h (mA)\n1,ERR\n", r"found 'ERR', expected a number"),
         ("V_b (V),I_h (mA)\n1,\n", r"no values in any of the columns"),
         ("# R_s (kV): 5\n" + PLAIN, r"line 1: R_s: unit 'kV' is not understood here"),
         ("# R_s (kOhm): many\n" + PLAIN, r"line 1: R_s: found 'many', expected a number"),

@@ -139,3 +139,29 @@ def test_missing_library_is_named_with_the_way_to_get_it(
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=rf"{package}.*hotlever\[raman\]"):
         read_spectrum(tmp_path / name)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_labspecs_xml_is_named_with_what_to_save_instead(tmp_path, encoding):
+    # rows of numbers in XML are pieces of one array: fifteen of each line were spectra
+    x = np.linspace(600.0, 440.0, 300)
+    lines = "\n".join(" ".join(f"{v:.6g}" for v in row) for row in x.reshape(-1, 15))
+    text = (
+        f'<?xml version="1.0"?>\n<LSX_Data>\n<LSX_Row Index="0">\n{lines}\n</LSX_Row>\n</LSX_Data>'
+    )
+    path = tmp_path / "tip.xml"
+    path.write_bytes(text.encode(encoding))
+    with pytest.raises(InputError, match=r"tip\.xml: LabSpec's XML, .* save the spectrum as \.txt"):
+        read_file(path)
+    own = tmp_path / "tip.l6s"
+    own.write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match=r"tip\.l6s: LabSpec's own format \.l6s, expected text"):
+        read_file(own)
+
+
+def test_other_markup_is_no_table(tmp_path):
+    path = tmp_path / "tip.xml"
+    lines = "\n".join(f"{v} {v * v}" for v in range(400, 700))
+    path.write_text(f"<?xml version='1.0'?>\n<spectrum>\n{lines}\n</spectrum>\n")
+    with pytest.raises(InputError, match=r"tip\.xml: an XML or HTML file, expected a table"):
+        read_file(path)

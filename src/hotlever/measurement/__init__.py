@@ -11,6 +11,7 @@ from hotlever.measurement.data import MEASURED, Measurement, with_measured_circu
 from hotlever.measurement.reading import (
     FileColumn,
     file_columns,
+    file_groups,
     given_measurement,
     read_measurement,
     read_measurement_of,
@@ -21,6 +22,7 @@ __all__ = [
     "FileColumn",
     "Measurement",
     "file_columns",
+    "file_groups",
     "given_measurement",
     "parse_columns",
     "read_measurement",

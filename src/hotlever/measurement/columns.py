@@ -25,6 +25,8 @@ _SYMBOLS = {
 }
 #: In place of a quantity: a column that is not used.
 UNUSED = "unused"
+#: In place of a quantity: the group of a TDMS file that the columns are those of.
+GROUP = "group"
 #: µs that a table in time lasts at most, unless one says that it is one: longer ones are slow
 #: sweeps with the time of each row.
 BRIEF = 1e4
@@ -75,9 +77,9 @@ def _bare(name: str) -> str:
 
 
 class Assignment(NamedTuple):
-    """What a user says of one column: a quantity, or None if it is not used, and its unit."""
+    """What a user says of a column: a quantity, or None if it is not used, and its unit."""
 
-    symbol: str | None
+    symbol: str | None  #: or `GROUP`, of which the heading is the name
     unit: str | None
     quantity: str  #: as it was written
     heading: str
@@ -86,8 +88,9 @@ class Assignment(NamedTuple):
 def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     """Parse ``I_h (uA)=Current``: which heading, or number, of a column is which quantity.
 
-    ``unused=Current`` is a column that is not used, whatever its heading says. What has no ``=`` is
-    a file of such lines; those that start with ``#`` are comments.
+    ``unused=Current`` is a column that is not used, whatever its heading says, and ``group=up`` the
+    group of a TDMS file that the columns are of. What has no ``=`` is a file of such lines; those
+    that start with ``#`` are comments.
 
     Raises
     ------
@@ -119,8 +122,9 @@ def assignments(
             assigned.append(Assignment(None, None, f"{UNUSED} {len(assigned) + 1}", heading))
             continue
         symbol, unit = _quantity(quantity, assigned=True)
+        symbol = GROUP if quantity == GROUP else symbol
         if symbol is None:
-            names = [*MEASURANDS, UNUSED]
+            names = [*MEASURANDS, UNUSED, GROUP]
             raise unknown_name("quantity", name_and_unit(quantity)[0], names, where)
         if unit is not None and conversion(unit, MEASURANDS[symbol].unit) is None:
             raise unknown_unit(unit, MEASURANDS[symbol].unit, f"{where}: {symbol}")
@@ -156,6 +160,11 @@ def quantity_of(heading: str, *, assigned: bool = False) -> str | None:
     return _quantity(heading, assigned)[0]
 
 
+def of_columns(assigned: Sequence[Assignment]) -> list[Assignment]:
+    """Return what is said of columns, without the group that they are of."""
+    return [each for each in assigned if each.symbol != GROUP]
+
+
 def measured_table(path: str | os.PathLike[str], assigned: Sequence[Assignment]) -> TextTable:
     """Read the table of a measurement file, below the row whose headings are known or assigned.
 
@@ -164,14 +173,16 @@ def measured_table(path: str | os.PathLike[str], assigned: Sequence[Assignment])
     InputError
         If there is none.
     """
-    headings = {each.heading.casefold() for each in assigned}
+    headings = {each.heading.casefold() for each in of_columns(assigned)}
+    group = next((each.heading for each in assigned if each.symbol == GROUP), None)
 
     def is_heading(name: str) -> bool:
         bare = name_and_unit(name)[0]
         named = symbol_of(bare) is not None or any(_bare(bare) in plain for plain in PLAIN.values())
         return named or bool({name.casefold(), bare.casefold()} & headings)
 
-    return read_table(path, "one like 'V_b (V),I_h (mA),V_r (mV)'", is_heading=is_heading)
+    expected = "one like 'V_b (V),I_h (mA),V_r (mV)'"
+    return read_table(path, expected, is_heading=is_heading, group=group)
 
 
 def find_columns(
@@ -195,7 +206,7 @@ def find_columns(
     where = table.where(-1)
     columns: dict[str, Column] = {}
     unused = {table.index(each.heading) for each in assigned if each.symbol is None}
-    for symbol, unit, _, heading in assigned:
+    for symbol, unit, _, heading in of_columns(assigned):
         if symbol is None:
             continue
         index = table.index(heading)

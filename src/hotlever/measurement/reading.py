@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hotlever.errors import InputError, counted, excerpt
+from hotlever.files import read_bytes
 from hotlever.lever.transient.waveform import Waveform
 from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
@@ -21,6 +22,7 @@ from hotlever.measurement.columns import (
     measured_table,
     note_on_bias,
     note_on_unused,
+    of_columns,
     quantity_of,
 )
 from hotlever.measurement.compliance import without_rows_at_compliance
@@ -28,6 +30,7 @@ from hotlever.measurement.contents import Contents, Settings, check
 from hotlever.measurement.data import DISTANCE, MEASURED, OPTIONAL, TIME, Measurement
 from hotlever.measurement.rows import described, disagreements, sweeps_of
 from hotlever.probe import Circuit, Probe
+from hotlever.tables import groups_in
 from hotlever.units import name_and_unit
 
 _MOST_NOTES = 20
@@ -232,6 +235,17 @@ class FileColumn:
     symbol: str
 
 
+def file_groups(path: str | os.PathLike[str]) -> list[str]:
+    """Return the groups of a TDMS file, each a measurement of its own; other files have none.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    return groups_in(read_bytes(path), str(path))
+
+
 def file_columns(
     path: str | os.PathLike[str], columns: Mapping[str, str] | None = None, *, driven: bool = False
 ) -> list[FileColumn]:
@@ -259,7 +273,7 @@ def file_columns(
     except InputError:
         # what is missing or stands twice is for the user to say
         symbols = {i: quantity_of(name) or "" for i, name in enumerate(table.names)}
-        for each in assigned:
+        for each in of_columns(assigned):
             with suppress(InputError):
                 symbols[table.index(each.heading)] = each.symbol or ""
     headings = [name.casefold() for name in table.names]

@@ -248,6 +248,28 @@ def _origins(
     return coordinates, temperatures
 
 
+# --- LabSpec ------------------------------------------------------------------------------------
+
+#: How the XML begins in which HORIBA's LabSpec keeps a spectrum or a map, and how the names of its
+#: own files end.
+_LABSPEC_XML = re.compile(rb"<LSX_\w+")
+_LABSPEC = {f".{kind}" for kind in ("l6s", "l6m", "l6v", "l5s", "l5m", "l5v", "ngs", "ngc")}
+
+
+def refuse_labspec(file: Path, suffix: str, raw: bytes, is_text: bool) -> None:
+    """Refuse LabSpec's own files and its XML, and say what to save instead.
+
+    Raises
+    ------
+    InputError
+        If it is one of them.
+    """
+    in_xml = _LABSPEC_XML.search(raw[:4096].replace(b"\0", b"")) is not None
+    if in_xml or (suffix in _LABSPEC and not is_text):
+        what = "LabSpec's XML" if in_xml else f"LabSpec's own format {suffix}"
+        raise InputError(f"{file}: {what}, expected text: save the spectrum as .txt in LabSpec")
+
+
 #: By suffix.
 MAKERS = {
     ".wdf": Format("WiRE", lambda raw, _: read_wdf(raw)),

@@ -17,7 +17,7 @@ from hotlever.errors import InputError
 from hotlever.files import LARGEST_TEXT, read_bytes
 from hotlever.raman.layout import pick_spectra, require_line
 from hotlever.raman.lineshape import in_window
-from hotlever.raman.makers import MAKERS, WDF_SIGNATURE, read_makers
+from hotlever.raman.makers import MAKERS, WDF_SIGNATURE, read_makers, refuse_labspec
 from hotlever.raman.noise import zeros
 from hotlever.raman.spectrum import (
     Spectrum,
@@ -73,6 +73,7 @@ def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
         raise InputError(f"{file}: the file is empty, expected a Raman spectrum")
     inside = Path(file.stem) if file.suffix.lower() == ".gz" else file
     kind = _kind(inside, raw)
+    refuse_labspec(file, inside.suffix.lower(), raw, is_text=not kind)
     spectra = read_makers(kind, file, raw) if kind in MAKERS else _in_text(file, raw)
     if not spectra:
         raise InputError(f"{file}: holds no spectrum")

@@ -5,7 +5,8 @@ the lines beside the rows mean is for the caller to know. `read_table` is for fi
 where a line that is no row is an error; `find_tables` for files with numbers anywhere.
 """
 
+from hotlever.tables.binary import groups_in
 from hotlever.tables.reading import find_tables, read_table
 from hotlever.tables.table import TextTable
 
-__all__ = ["TextTable", "find_tables", "read_table"]
+__all__ = ["TextTable", "find_tables", "groups_in", "read_table"]

@@ -10,14 +10,16 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
-from itertools import zip_longest
+from itertools import islice, zip_longest
 from typing import Any
 
 import numpy as np
 
-from hotlever.errors import InputError, excerpt, quoted
+from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.tables.headings import with_units
 from hotlever.tables.table import MOST_LINES, Line, decode
 from hotlever.types import Array
@@ -31,37 +33,66 @@ WAVES = tuple(version.to_bytes(2, order) for version in (2, 3, 5) for order in (
 #: Parts of a wave of version 5 whose sizes its header states: data, formula, note, units, labels
 #: and indices.
 _PARTS = 13
+#: What files are called, the extra that brings their library, and this.
+_TDMS, _IGOR = ("TDMS file", "tdms", "npTDMS"), ("Igor wave", "igor", "igor2")
+#: Groups that a question names.
+_MOST_GROUPS = 6
 #: The unit of a channel, as LabVIEW's waveforms and as DAQmx name that property.
 _UNITS = ("unit_string", "NI_UnitDescription")
 #: Time of the first value (s), and between two.
 _OFFSET, _STEP = "wf_start_offset", "wf_increment"
 
 
-def lines_of_binary(raw: bytes, where: str) -> list[Line] | None:
+def lines_of_binary(raw: bytes, where: str, group: str | None = None) -> list[Line] | None:
     """Return comments, header row and rows of a wave or a TDMS file; None of any other file.
 
-    Cells are separated by tabs.
+    Cells are separated by tabs. A TDMS file of several groups needs one of them named.
 
     Raises
     ------
     InputError
-        If its library is missing, or the file is damaged, too long, or no table of numbers.
+        If its library is missing, or the file is damaged, too long, no table of numbers, or has
+        no such group, or several and none is named.
     """
     if raw.startswith(TDMS):
-        read, what, suffix, extra, package = _tdms_lines, "TDMS file", "tdms", "tdms", "npTDMS"
-    elif raw.startswith(WAVES):
-        read, what, suffix, extra, package = _igor_lines, "Igor wave", "ibw", "igor", "igor2"
-    else:
-        return None
+        read = partial(_tdms_lines, group=group)
+        return list(enumerate(_read(read, raw, where, *_TDMS), start=1))
+    if group is not None:
+        raise InputError(f"{where}: is no TDMS file, so that it has no group {quoted(group)}")
+    if raw.startswith(WAVES):
+        return list(enumerate(_read(_igor_lines, raw, where, *_IGOR), start=1))
+    return None
+
+
+def groups_in(raw: bytes, where: str) -> list[str]:
+    """Return the names of the groups of a TDMS file that have values; of other files, none.
+
+    Raises
+    ------
+    InputError
+        As `lines_of_binary`.
+    """
+    return _read(_tdms_groups, raw, where, *_TDMS) if raw.startswith(TDMS) else []
+
+
+def _read(
+    read: Callable[[bytes, str], list[str]],
+    raw: bytes,
+    where: str,
+    what: str,
+    extra: str,
+    package: str,
+) -> list[str]:
+    """Return what is read by a library, whose errors become those of the input."""
     try:
         import_module(package.lower())
     except ImportError:
         raise InputError(
-            f"{where}: reading .{suffix} needs the package {package}; install it with: "
+            f"{where}: reading a {what} needs the package {package}; install it with: "
             f"pip install 'hotlever[{extra}]'"
         ) from None
     try:
-        return list(enumerate(read(raw, where), start=1))
+        return read(raw, where)
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes the library raise
@@ -157,12 +188,9 @@ def _name(name: Any) -> str:
 # --- LabVIEW's TDMS files -----------------------------------------------------------------------
 
 
-def _tdms_lines(raw: bytes, where: str) -> list[str]:
-    """Return the lines of a TDMS file.
-
-    The rows of groups with the same channels follow each other. Where channels are waveforms, and
-    none has the times, a column of these comes first.
-    """
+@contextmanager
+def _tdms_file(raw: bytes) -> Iterator[Any]:
+    """Open a TDMS file; what the library would only print is an error."""
     from nptdms import TdmsFile
     from nptdms.log import log_manager
 
@@ -171,9 +199,35 @@ def _tdms_lines(raw: bytes, where: str) -> list[str]:
     try:
         # channels are read one by one, as a damaged file may claim any length
         with TdmsFile.open(io.BytesIO(raw)) as file:
-            return _lines_of_groups(file, where)
+            yield file
     finally:
         console.removeFilter(_refuse)
+
+
+def _tdms_groups(raw: bytes, where: str) -> list[str]:
+    with _tdms_file(raw) as file:
+        return list(_filled_groups(file, where))
+
+
+def _tdms_lines(raw: bytes, where: str, group: str | None) -> list[str]:
+    """Return the lines of a group of a TDMS file, which must be named if there are several.
+
+    Each group is a measurement of its own. Where channels are waveforms, and none has the times,
+    a column of these comes first.
+    """
+    with _tdms_file(raw) as file:
+        groups = _filled_groups(file, where)
+        if group is None and len(groups) > 1:
+            some = ", ".join(map(quoted, islice(groups, _MOST_GROUPS)))
+            more = f" and {len(groups) - _MOST_GROUPS} more" if len(groups) > _MOST_GROUPS else ""
+            raise InputError(
+                f"{where}: {len(groups)} groups, each a measurement of its own: {some}{more}; "
+                f"expected one, which --column 'group={excerpt(next(iter(groups)))}' says"
+            )
+        name = next(iter(groups)) if group is None else group
+        if name not in groups:
+            raise unknown_name("group", name, groups, where)
+        return _lines_of_group(file, groups[name], where)
 
 
 def _refuse(record: logging.LogRecord) -> bool:
@@ -181,31 +235,32 @@ def _refuse(record: logging.LogRecord) -> bool:
     raise ValueError(record.getMessage())
 
 
-def _lines_of_groups(file: Any, where: str) -> list[str]:
-    groups = {group.name: group for group in file.groups() if any(map(len, group.channels()))}
-    lengths = [max(map(len, group.channels())) for group in groups.values()]
+def _filled_groups(file: Any, where: str) -> dict[str, Any]:
+    """Return the groups with values by their names, as these are told."""
+    groups = {
+        _cell(group.name): group for group in file.groups() if any(map(len, group.channels()))
+    }
     if not groups:
         raise InputError(f"{where}: no channel has values")
-    _check_length(sum(lengths), where)
-    headings = {name: list(map(_channel, group.channels())) for name, group in groups.items()}
-    first, names = next(iter(headings.items()))
-    for other in headings:
-        if headings[other] != names:
-            raise InputError(
-                f"{where}: the group {quoted(other)} has other channels than {quoted(first)}, "
-                "expected groups with the same channels"
-            )
-    lines = [f"# {key}: {_cell(value)}" for key, value in _properties(file, groups).items()]
-    starts = [_times(group.channels()) for group in groups.values()]
-    named = any(name_and_unit(name)[0].casefold() in TIMES for name in names)
-    timed = not named and None not in starts
-    lines.append("\t".join([*(["time (s)"] * timed), *names]))
-    for group, length, start in zip(groups.values(), lengths, starts, strict=True):
-        columns = [channel[:].tolist() for channel in group.channels()]
-        if timed and start is not None:
-            columns.insert(0, [start[0] + start[1] * row for row in range(length)])
-        for row in zip_longest(*columns, fillvalue=""):
-            lines.append("\t".join(map(_cell, row)))
+    return groups
+
+
+def _lines_of_group(file: Any, group: Any, where: str) -> list[str]:
+    channels = group.channels()
+    length = max(map(len, channels))
+    _check_length(length, where)
+    names = list(map(_channel, channels))
+    # what is said of the file counts before what is said of the group
+    properties = {**group.properties, **file.properties}
+    lines = [f"# {key}: {_cell(value)}" for key, value in properties.items()]
+    times = _times(channels, names, where)
+    columns = [channel[:].tolist() for channel in channels]
+    if times and not any(name_and_unit(name)[0].casefold() in TIMES for name in names):
+        names.insert(0, "time (s)")
+        columns.insert(0, [times[0] + times[1] * row for row in range(length)])
+    lines.append("\t".join(names))
+    for row in zip_longest(*columns, fillvalue=""):
+        lines.append("\t".join(map(_cell, row)))
     return lines
 
 
@@ -215,21 +270,27 @@ def _channel(channel: Any) -> str:
     return with_units([_cell(channel.name)], [next(filter(None, units), "")])[0]
 
 
-def _properties(file: Any, groups: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is said of the file, and of its groups."""
-    properties: dict[str, Any] = {}
-    for each in (file, *groups.values()):
-        properties = {**each.properties, **properties}
-    return properties
+def _times(channels: Sequence[Any], names: Sequence[str], where: str) -> tuple[float, float] | None:
+    """Return the first time and the step (s) of the channels; None if not all have them.
 
-
-def _times(channels: list[Any]) -> tuple[float, float] | None:
-    """Return the first time and the step (s) that all channels share; None if they have none."""
-    times = {
+    Raises
+    ------
+    InputError
+        If they are not the same, so that rows of values are of different times.
+    """
+    times = [
         (float(each.properties.get(_OFFSET, 0.0)), float(each.properties.get(_STEP, 0.0)))
         for each in channels
-    }
-    return next(iter(times)) if len(times) == 1 and all(step > 0.0 for _, step in times) else None
+    ]
+    timed = {time: name for time, name in zip(times, names, strict=True) if time[1] > 0.0}
+    if len(timed) > 1:
+        (first, name), (other, other_name) = list(timed.items())[:2]
+        raise InputError(
+            f"{where}: '{excerpt(name)}' has values every {first[1]:g} s from {first[0]:g} s on, "
+            f"'{excerpt(other_name)}' every {other[1]:g} s from {other[0]:g} s on, expected "
+            "channels of the same times"
+        )
+    return times[0] if timed and all(step > 0.0 for _, step in times) else None
 
 
 def _cell(value: Any) -> str:

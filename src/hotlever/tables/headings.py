@@ -12,8 +12,8 @@ from itertools import groupby, zip_longest
 
 import numpy as np
 
-from hotlever.tables.table import DIALECTS, Dialect, Line
-from hotlever.units import LONGEST_NUMBER, NUMBER, is_unit, name_and_unit
+from hotlever.tables.table import DIALECTS, Dialect, Line, is_readable
+from hotlever.units import LONGEST_NUMBER, is_unit, name_and_unit, plain_minus
 
 #: Lines among which a header row is looked for, how near to the numbers a comment is one, and
 #: characters of a heading.
@@ -32,16 +32,50 @@ _OF_BUFFERS = {"volt dc": "V", "amp dc": "A", "vdc": "V", "adc": "A"}
 _REMARKS = "comment"
 #: Marks of a comment, around it, and quotes.
 _MARKS = ' \t"#%!'
+#: A first cell in which a spreadsheet says that there is no value, which begins no comment.
+_FIRST_CELL = re.compile(r"#(?:N/A|NV|[A-ZÀ-Ý]{3,}(?:/0)?[!?]|#+)\"?\s*[\t;,|]")
+#: What begins as numbers do, behind marks or the letters with which some meters tell their state:
+#: ``(1.5)``, ``~1``, ``='2``, ``CV+4.0E-01``; and a date, a time or a number with its unit.
+_BEGINS_NUMBER = re.compile(r"[\W_]*[.,]?\d|[A-Za-z]{1,3}[+-]?\d+[.,]\d")
+_LIKE_A_NUMBER = re.compile(
+    r"[\W_]*(?:[A-Za-z]{1,3}(?=[+-]?\d+[.,]))?[+-]?[.,]?\d"
+    r"(?:[\d\s.,:/'’+-]|[eEdDT](?=[+-]?\d))*(?P<unit>.*?)[\W_]*"
+)
+_UNIT_PREFIXES = set("yzafpnuµμmkMGT")
+#: A row of marks between the headings and the numbers.
+_UNDERLINE = re.compile(r"[\s:=+|-]*")
 
 
 def is_comment(line: str) -> bool:
     """Whether a line starts with the mark of a comment."""
-    return line.lstrip(' "').startswith("#")
+    text = line.lstrip(' "')
+    return text.startswith("#") and not _FIRST_CELL.match(text)
 
 
 def begins_number(cell: str) -> bool:
-    """Whether a cell is a number or begins with one."""
-    return (cell[:1] in set("0123456789+-.,") and len(cell) > 1) or cell.isdigit()
+    """Whether a cell is a number or begins with one, be it one that cannot be read.
+
+    Examples
+    --------
+    >>> [begins_number(cell) for cell in ("-9", "(9)", "16:20:11", "V_b", "---")]
+    [True, True, True, False, False]
+    """
+    return _BEGINS_NUMBER.match(plain_minus(cell[:LONGEST_NUMBER])) is not None
+
+
+def is_like_a_number(cell: str) -> bool:
+    """Whether a cell is a number, a date or a time and nothing else, or says that there is none.
+
+    Examples
+    --------
+    >>> [is_like_a_number(cell) for cell in ("~0.4 mA", "OVERFLOW", "2W (ohm)", "V_b")]
+    [True, True, False, False]
+    """
+    if is_readable(cell):
+        return True
+    match = _LIKE_A_NUMBER.fullmatch(plain_minus(cell[:LONGEST_NUMBER]))
+    unit = match["unit"] if match else "?"
+    return not unit or unit in _UNIT_PREFIXES or is_unit(unit)
 
 
 def separator_in(line: str) -> str | None:
@@ -50,10 +84,13 @@ def separator_in(line: str) -> str | None:
 
 
 def row_of_numbers(line: str, width: int | None = None) -> tuple[str | None, int] | None:
-    """Return separator and number of cells of a row of nothing but numbers; None if it is not."""
-    if not NUMBER.match(line.lstrip('" \t;,')[:LONGEST_NUMBER]):
-        return None
+    """Return separator and number of cells of a row of nothing but numbers; None if it is not.
+
+    Some may say that there is no value.
+    """
     for dialect in DIALECTS:
+        if dialect.separator is None and "\t" in line.strip():
+            continue  # blanks between tabs stand within a cell
         row = dialect.row(line)
         if row is None:
             continue
@@ -62,6 +99,28 @@ def row_of_numbers(line: str, width: int | None = None) -> tuple[str | None, int
         if count == (width or count) > 1:
             return dialect.separator, count
     return None
+
+
+def row_mostly_of_numbers(line: str) -> tuple[str | None, int] | None:
+    """Return separator and number of cells of a row at least half of which is like numbers.
+
+    Its first cell is no word, which would be what a line says of a column or a setting. None if
+    it is no such row.
+    """
+    for separator in ("\t", ";", ",", "|", None):
+        cells = Dialect(separator).cells(line) or []
+        filled = [cell for cell in cells if cell]
+        if len(filled) < 2 or not (begins_number(filled[0]) or is_readable(filled[0])):
+            continue
+        alike = sum(map(is_like_a_number, filled))
+        if 2 * alike >= len(filled) and any(map(begins_number, filled)):
+            return separator, len(cells)
+    return None
+
+
+def is_underline(cells: Sequence[str]) -> bool:
+    """Whether a line merely underlines the headings above it."""
+    return all(map(_UNDERLINE.fullmatch, cells))
 
 
 def headings_in(line: str) -> list[str]:
@@ -89,7 +148,8 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
     """Return the index of the header row among the lines of a file; None for numbers alone.
 
     It is the first line with two headings, a comment if numbers follow; without such a line, the
-    one above the first row of numbers, but for a row of units.
+    one above the first row of numbers, but for a row of units. A row that is mostly of numbers is
+    none, be they such that cannot be read.
     """
 
     def width(index: int) -> int:
@@ -99,11 +159,26 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
 
     plain = [index for index, (_, line) in enumerate(lines) if not is_comment(line)]
     named: list[int] = []
+
+    def is_row(order: int) -> bool:
+        line = lines[plain[order]][1]
+        if row_of_numbers(line):
+            return True
+        # one such line alone may be a remark
+        mostly = row_mostly_of_numbers(line)
+        below = [lines[index][1] for index in plain[order + 1 : order + 2]]
+        return mostly is not None and all(
+            mostly in (row_of_numbers(next_line), row_mostly_of_numbers(next_line))
+            for next_line in below
+        )
+
     for order, index in enumerate(plain[:_MOST_ABOVE]):
-        if row_of_numbers(lines[index][1]):
+        if is_row(order):
             above = range(max(plain[order - 1] + 1 if order else 0, index - _NEAR), index)
             for comment in reversed(above):
-                if row_of_numbers(lines[index][1], width(comment) or -1):
+                mostly = row_mostly_of_numbers(lines[index][1])
+                count = width(comment) or -1
+                if row_of_numbers(lines[index][1], count) or (mostly and mostly[1] == count):
                     return comment
             break
         if count := width(index):
@@ -119,12 +194,14 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
     return next(iter(named or texts[-1:]), None)
 
 
-def _above_the_rows(lines: Sequence[Line], plain: Sequence[int]) -> int:
-    """Return the index of the line above the longest run of as many cells, with a number each."""
-    widths = []
-    for index in plain[:_MOST_ABOVE]:
-        cells = headings_in(lines[index][1])
-        widths.append(len(cells) if len(cells) > 1 and any(map(begins_number, cells)) else 0)
+def _above_the_rows(lines: Sequence[Line], plain: Sequence[int]) -> int | None:
+    """Return the index of the line above the longest run of as many cells, with a number each.
+
+    None if there is no line above it without a number, or the run begins with the first line of
+    all, unless that has words and counts columns.
+    """
+    rows = [headings_in(lines[index][1]) for index in plain[:_MOST_ABOVE]]
+    widths = [len(row) if len(row) > 1 and any(map(begins_number, row)) else 0 for row in rows]
     ends, longest, start = 0, 0, 0
     for width, run in groupby(widths):
         count = len(list(run))
@@ -132,9 +209,14 @@ def _above_the_rows(lines: Sequence[Line], plain: Sequence[int]) -> int:
             longest, start = count, ends
         ends += count
     above = start - 1
-    if above > 0 and any(map(is_unit, headings_in(lines[plain[above]][1]))):
+    # a row of another width is no header
+    while above >= 0 and any(map(begins_number, rows[above])):
         above -= 1
-    return plain[max(above, 0)]
+    if above > 0 and any(map(is_unit, rows[above])):
+        above -= 1
+    counts = [cell.isdecimal() for cell in rows[0] if begins_number(cell)]
+    names_columns = not begins_number(rows[0][0]) and all(counts)
+    return plain[above] if above >= 0 else plain[0] if names_columns else None
 
 
 def unquoted(line: str) -> str:

@@ -22,8 +22,10 @@ from hotlever.tables.headings import (
     headings_in,
     is_comment,
     is_row_of_units,
+    is_underline,
     may_end_early,
     names_above,
+    row_mostly_of_numbers,
     row_of_numbers,
     separator_in,
     units_beside,
@@ -31,9 +33,9 @@ from hotlever.tables.headings import (
     with_units,
     without_marks,
 )
-from hotlever.tables.table import Dialect, Line, TextTable, filled_lines
+from hotlever.tables.table import Dialect, Line, TextTable, filled_lines, is_readable
 from hotlever.types import Array
-from hotlever.units import NUMBER, is_unit, key_and_value
+from hotlever.units import NUMBER, differ, is_unit, key_and_value, name_and_unit
 
 # --- a file of one table --------------------------------------------------------------------------
 
@@ -43,6 +45,7 @@ def read_table(
     expected: str,
     header: bool = True,
     is_heading: Callable[[str], bool] | None = None,
+    group: str | None = None,
 ) -> TextTable:
     """Read a table of cells separated by tabs, semicolons, commas or, some, by blanks.
 
@@ -62,6 +65,8 @@ def read_table(
         looked for (`hotlever.tables.headings.header_row`): lines above it are comments, numbers
         alone have none, and lines without numbers between it and the first row are remarks. Else
         it is the first line that is no comment, and rows may be words alone.
+    group : str, optional
+        Of a TDMS file, if it has several.
 
     Raises
     ------
@@ -69,7 +74,7 @@ def read_table(
         If there is no such table; the text names file and line.
     """
     raw = read_bytes(path)
-    lines = lines_of_binary(raw, str(path)) or filled_lines(raw, str(path))
+    lines = lines_of_binary(raw, str(path), group) or filled_lines(raw, str(path))
     if is_heading is not None and lines:
         lines = below_a_header(lines)
     first = next((i for i, (_, line) in enumerate(lines) if not is_comment(line)), None)
@@ -92,6 +97,8 @@ def read_table(
     if named and any(names):
         names = reader.with_units(comments)
     dialect = reader.dialect(rows)
+    if row is None:
+        _check_commas(rows, dialect, str(path))
     return TextTable(
         path=str(path),
         dialect=dialect,
@@ -134,7 +141,11 @@ class _Reader:
             # the heading may be separated in another way than the rows
             row = next(text for _, text in lines if not is_comment(text))
             self.names = headings_in(line) if named else []
-            separator, width = row_of_numbers(row, len(self.names) or None) or (separator, 0)
+            separator, width = (
+                row_of_numbers(row, len(self.names) or None)
+                or row_mostly_of_numbers(row)
+                or (separator_in(row), len(headings_in(row)))
+            )
             self.names = self.names or [""] * width
         elif separator is None:
             self.names = headings_in(line)
@@ -172,12 +183,11 @@ class _Reader:
             return False
         if len(cells) < width and may_end_early(self.names):
             cells += [""] * (width - len(cells))
-        has_number = self._words or any(map(begins_number, cells))
-        if not (self.rows or has_number) and len(cells) <= width:
+        if not (self.rows or self._is_row(cells)) and len(cells) <= width:
             units = [cell.strip("()[]{}<> ") for cell in cells]
             if not self._units and any(map(is_unit, units)):
                 self._units = units
-            else:
+            elif not is_underline(cells):
                 self.remarks.append((number, line))
             return True
         if len(cells) != width:
@@ -190,13 +200,27 @@ class _Reader:
         self.rows.append((number, line))
         return True
 
+    def _is_row(self, cells: list[str]) -> bool:
+        """Whether cells below the header row are a row: any is a number, or all are no value."""
+        if self._words or any(map(begins_number, cells)):
+            return True
+        says_something = is_underline(cells) or any(map(is_unit, cells))
+        return all(map(is_readable, cells)) and not says_something
+
     def with_units(self, comments: list[Line]) -> list[str]:
         """Return the headings with the units that stand in a row of their own."""
         rows = [self._units]
         rows += [
             self._cells(*line, self._separator) for line in comments if is_row_of_units(line[1])
         ]
-        names = with_units(self.names, next((row for row in rows if any(map(is_unit, row))), []))
+        units = next((row for row in rows if any(map(is_unit, row))), [])
+        for name, unit in zip(self.names, units, strict=False):
+            if (own := name_and_unit(name)[1]) is not None and differ(own, unit):
+                raise InputError(
+                    f"{self._path}: line {self._header}: the unit of '{excerpt(name)}' is "
+                    f"'{excerpt(unit)}' in the row of units, expected the same"
+                )
+        names = with_units(self.names, units)
         cells = [self._cells(*line, self._separator) for line in self.rows]
         try:
             return with_units(names, units_beside(names, cells))
@@ -254,12 +278,7 @@ def find_tables(raw: bytes, path: str) -> list[TextTable]:
         size += 0 if row is None else row.size
         if size > MOST_NUMBERS:
             raise InputError(f"{path}: more than {MOST_NUMBERS} numbers, expected fewer")
-    split = [line for _, line in lines if "." not in line and _SPLIT.search(line)]
-    if dialect.separator == "," and len(split) > 1:
-        raise InputError(
-            f"{path}: decimal commas between commas (line '{excerpt(split[0])}'), expected decimal "
-            "points or another separator"
-        )
+    _check_commas(lines, dialect, path)
     widths = Counter(row.size for row in rows if row is not None)
     if widths.total() < 2:
         raise InputError(
@@ -293,6 +312,16 @@ def find_tables(raw: bytes, path: str) -> list[TextTable]:
             )
         )
     return tables
+
+
+def _check_commas(lines: list[Line], dialect: Dialect, path: str) -> None:
+    """Refuse decimal commas between cells that commas separate: the cells are halves of numbers."""
+    split = [line for _, line in lines if "." not in line and _SPLIT.search(line)]
+    if dialect.separator == "," and len(split) > 1:
+        raise InputError(
+            f"{path}: decimal commas between commas (line '{excerpt(split[0])}'), expected decimal "
+            "points or another separator"
+        )
 
 
 def _to_one_width(

@@ -24,6 +24,7 @@ from hotlever.units import (
     conversion,
     key_and_value,
     name_and_unit,
+    plain_minus,
     unknown_unit,
 )
 
@@ -35,15 +36,32 @@ Line = tuple[int, str]
 
 #: Lines by which a file's dialect is told.
 _SAMPLE_LINES = 40
+#: How XML and HTML begin.
+_MARKUP = re.compile(r"\s*<(?:\?xml|!doctype|!--|html|head|body|table|lsx_)\b", re.I)
 #: A line of nothing but numbers, in any dialect.
-_PLAIN = re.compile(r"[-+.0-9eE\s;,|]*", re.ASCII)
-_MISSING = {"", "nan", "-", "--", "n/a", "na"}
-#: What SCPI instruments write for "not a number".
-_NOT_A_NUMBER = 9.91e37
+_PLAIN = re.compile(r"[-+.0-9eE \t;,|]*")
+#: What separates cells without another mark, but for blanks within a number; and blanks before an
+#: exponent.
+_BLANKS, _EXPONENT = re.compile(r"[^\S\u00a0\u2007\u202f]+"), re.compile(r"(?<=\d) +(?=E[-+]\d)")
+#: Cells that say that there is no value, in small letters and without a sign: of databases and
+#: programs; of meters, recorders and oscilloscopes beyond their range; and of open inputs.
+_NO_VALUE = {
+    *("", "nan", "n/a", "na", "null", "none", "nil", "missing", "invalid"),
+    *("inf", "infinity", "infinite", "∞", "overflow", "overflw", "ovrflw", "ovflw", "ovfl", "ovf"),
+    *("overload", "ovld", "ovl", "ol", "o.l", "o.l.", "overrange", "over range", "over", "o.r."),
+    *("o.f.", "underflow", "underrange", "under range", "under", "burnout", "burn out"),
+}
+#: The same as patterns: marks in place of digits, the names of C's libraries for numbers that are
+#: none, and errors of spreadsheets in any language.
+_NO_VALUES = re.compile(r"\*{2,}|#{2,}|nan\(\w*\)|1\.#[a-z]+\d*|#(?:n/a|nv|[^\W\d]+(?:/0)?[!?])")
+#: What SCPI instruments write for "not a number" and for infinity, and a B1500 for no value.
+_OF_NO_VALUE = {9.91e37, 9.9e37, 1.99999e101}
 
 
 def decode(raw: bytes, where: str) -> str:
-    """Decode UTF-8 (with or without mark), UTF-16 or, failing those, Windows' Latin-1.
+    """Decode UTF-8 (with or without mark), UTF-16, UTF-32 or, failing those, Windows' Latin-1.
+
+    Marks of an encoding are left out wherever files were joined.
 
     Raises
     ------
@@ -57,14 +75,16 @@ def decode(raw: bytes, where: str) -> str:
     """
     head = raw[:4096]
     marked = head.startswith((b"\xff\xfe", b"\xfe\xff"))
-    encoding = "utf-16" if marked else "utf-8-sig"
-    if b"\x00" in head and not marked:
+    encoding = "utf-16" if marked else "utf-8"
+    if head.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
+        encoding = "utf-32"
+    elif b"\x00" in head and not marked:
         # UTF-16 without its mark: every other byte of western text is zero
         zeros = {"utf-16-le": head[1::2], "utf-16-be": head[0::2]}
         encoding = next((e for e, part in zeros.items() if part.count(0) > 0.8 * len(part)), "")
     try:
         if encoding:
-            return raw.decode(encoding)
+            return raw.decode(encoding).replace("\ufeff", "")
     except UnicodeDecodeError:
         control = sum(byte < 9 or 13 < byte < 32 for byte in head)
         if not marked and control <= 0.02 * len(head):
@@ -78,9 +98,13 @@ def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
     Raises
     ------
     InputError
-        If it is no text, or has too many lines or too long a line.
+        If it is no text or markup, or has too many lines or too long a line.
     """
-    lines = decode(raw, where).splitlines()
+    text = decode(raw, where)
+    if _MARKUP.match(text):
+        # numbers among its tags are parts of arrays, or settings
+        raise InputError(f"{where}: an XML or HTML file, expected a table in text, such as CSV")
+    lines = text.splitlines()
     if len(lines) > most:
         raise InputError(f"{where}: {len(lines)} lines, expected at most {most}")
     for number, line in enumerate(lines, start=1):
@@ -92,9 +116,13 @@ def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
 
 
 def filled_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[Line]:
-    """Return the lines of `text_lines` that hold more than separators, with their numbers."""
+    """Return the lines of `text_lines` that hold more than separators, with their numbers.
+
+    DOS ends a file with the mark 0x1a.
+    """
     numbered = enumerate(text_lines(raw, where, most), start=1)
-    return [(number, line) for number, line in numbered if line.strip(' \t,;"\u00a0').strip()]
+    empty = ' \t,;"\u00a0\x1a'
+    return [(number, line) for number, line in numbered if line.strip(empty).strip()]
 
 
 def number(cell: str, decimal_comma: bool = False) -> float | None:
@@ -102,18 +130,27 @@ def number(cell: str, decimal_comma: bool = False) -> float | None:
 
     Examples
     --------
-    >>> number("1.5e3"), number("1,5", decimal_comma=True), number("--"), number("1_000")
-    (1500.0, 1.5, nan, None)
+    >>> number("−1.5e3"), number("1,5", decimal_comma=True), number("OVERFLOW"), number("1_000")
+    (-1500.0, 1.5, nan, None)
     """
-    if len(cell) <= LONGEST_NUMBER and NUMBER.fullmatch(cell):
+    cell = plain_minus(cell[: LONGEST_NUMBER + 1])
+    if len(cell) > LONGEST_NUMBER:
+        return None
+    if NUMBER.fullmatch(cell):
         sign, other = (",", ".") if decimal_comma else (".", ",")
         if other in cell:
             return None
         value = float(cell.replace(sign, ".").lower().replace("d", "e"))
-        if value == _NOT_A_NUMBER:
+        if abs(value) in _OF_NO_VALUE:
             return math.nan
         return value if abs(value) <= LARGEST_NUMBER else None
-    return math.nan if cell.lower() in _MISSING else None
+    word = cell.lstrip("+-").casefold()
+    return math.nan if word in _NO_VALUE or _NO_VALUES.fullmatch(word) else None
+
+
+def is_readable(cell: str) -> bool:
+    """Whether a cell is a number, with either decimal sign, or says that there is none."""
+    return number(cell) is not None or number(cell, decimal_comma=True) is not None
 
 
 @dataclass(frozen=True)
@@ -143,7 +180,9 @@ class Dialect:
         """Return a line's cells, None if quotes do not end."""
         line = line.strip(" ")
         if self.separator is None:
-            return [cell.strip('"') for cell in line.split()]
+            # an exponent belongs to the number before it
+            line = _EXPONENT.sub("", line) if "E" in line else line
+            return [cell.strip('"') for cell in _BLANKS.split(line.strip())]
         if '"' not in line:
             return [cell.strip() for cell in line.split(self.separator)]
         quotes = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
@@ -171,11 +210,18 @@ class Dialect:
             for read in (float, _number_or_blank):
                 with suppress(ValueError):
                     row = np.array(list(map(read, cells)))
-                    # fmax leaves NaN out
-                    return row if np.fmax.reduce(np.abs(row)) <= LARGEST_NUMBER else None
-        values = [self.number(cell) for cell in self.cells(line) or []]
-        row = np.array(values, dtype=float)
-        return None if None in values or np.isnan(row).all() else row
+                    # fmax leaves NaN out; what is larger may say that there is no value
+                    if np.fmax.reduce(np.abs(row)) <= LARGEST_NUMBER:
+                        return row
+                    break
+        values: list[float] = []
+        for cell in self.cells(line) or []:
+            value = self.number(cell)
+            if value is None:
+                return None
+            values.append(value)
+        row = np.array(values)
+        return None if np.isnan(row).all() else row
 
 
 def _number_or_blank(cell: str) -> float:
@@ -190,8 +236,9 @@ DIALECTS = [
     if (separator, decimal_comma) != (",", True)
 ]
 
-#: A number with a mark of thousands, or with three decimals; and a small whole number.
+#: A number with a mark of thousands, or with three decimals; and a small whole number, and any.
 _GROUPED, _SMALL = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}"), re.compile(r"[+-]?[1-9]\d{0,2}")
+_WHOLE = re.compile(r"[+-]?\d+")
 
 
 @dataclass(frozen=True)
@@ -298,12 +345,13 @@ class TextTable:
                     f"{hint * self.dialect.decimal_comma}"
                 )
         if self.dialect.decimal_comma:
-            cells = [row[column] for row in self.rows]
+            cells = [plain_minus(row[column]) for row in self.rows]
             commas = [row for row, cell in enumerate(cells) if "," in cell]
+            # numbers of three decimals all the way have no whole ones beside them
             if (
                 commas
                 and all(_GROUPED.fullmatch(cells[row]) for row in commas)
-                and any(map(_SMALL.fullmatch, cells))
+                and (any(map(_SMALL.fullmatch, cells)) or self._may_have_thousands)
             ):
                 cell = cells[commas[0]]
                 raise InputError(
@@ -311,6 +359,13 @@ class TextTable:
                     f"or {cell.replace(',', '')}, expected numbers without marks of thousands"
                 )
         return values
+
+    @cached_property
+    def _may_have_thousands(self) -> bool:
+        """Whether commas may be marks of thousands, since there are whole numbers and no others."""
+        cells = [plain_minus(cell) for row in self.rows for cell in row]
+        commas = [cell for cell in cells if "," in cell and self.dialect.number(cell) is not None]
+        return all(map(_GROUPED.fullmatch, commas)) and any(map(_WHOLE.fullmatch, cells))
 
     def values(self, column: int, inside: str, name: str, unit: str = "") -> Array:
         """Return a column's numbers in the unit `inside`, NaN where there is none.
