@@ -7,6 +7,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from elements import named, of, tell_columns
 from nicegui import ui
@@ -213,6 +214,43 @@ def test_columns_belong_to_the_file_that_they_were_typed_for(tmp_path: Path) -> 
         await user.should_see(f"hotlever calibrate {words}", retries=50)
 
     visit(tmp_path, story)
+
+
+def test_the_group_of_a_tdms_file_is_asked_for_and_kept(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    bias = np.linspace(0.5, 4.0, 8)
+    with nptdms.TdmsWriter(tmp_path / "two.tdms") as writer:
+        writer.write_segment(
+            [
+                nptdms.ChannelObject(f"lever {number}", name, values, {"unit_string": unit})
+                for number in (1, 2)
+                for name, unit, values in (("V_b", "V", bias), ("I_h", "mA", bias / (6 + number)))
+            ]
+        )
+
+    async def first(user: User, session: Session) -> None:
+        await user.open("/fit")
+        of(user, ui.select, "Measurement").set_value("two.tdms")
+        await user.should_see("2 groups, each a measurement of its own", retries=50)
+        group = named(user, "Group of the file")
+        assert group.visible
+        assert group.options == ["lever 1", "lever 2"]
+        group.set_value("lever 2")
+        words = "hotlever fit two.tdms --column 'group=lever 2' -o two.fit.json"
+        await user.should_see(words, retries=50)
+        session.keep()
+
+    async def second(user: User, session: Session) -> None:
+        await user.open("/fit")
+        await until(lambda: named(user, "Group of the file").value == "lever 2")
+        # what is told of a column is told beside it
+        await until(lambda: named(user, "Column I_h (mA) is") is not None)
+        named(user, "Column I_h (mA) is").set_value("")
+        expected = ["group=lever 2", "unused=I_h (mA)"]
+        await until(lambda: session.metadata_of("two.tdms")["columns"] == expected)
+
+    visit(tmp_path, first)
+    visit(tmp_path, second)
 
 
 def test_a_pulse_belongs_to_the_file_that_it_was_told_for(tmp_path: Path) -> None:

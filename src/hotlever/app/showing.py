@@ -33,6 +33,7 @@ from hotlever.measurands import FITTED
 from hotlever.measurement import (
     FileColumn,
     file_columns,
+    file_groups,
     parse_columns,
     read_measurement,
     read_measurement_of,
@@ -113,6 +114,11 @@ def columns(report: Report, name: str, metadata: Mapping[str, Any]) -> list[File
     except InputError:
         assigned = {}
     return file_columns(Path(name), assigned, driven=bool(metadata.get("waveform")))
+
+
+def groups(report: Report, name: str) -> list[str]:
+    """Return the groups of a TDMS file, of which one is a measurement; see `file_groups`."""
+    return file_groups(Path(name))
 
 
 def page(report: Report, kind: str, name: str) -> None:

@@ -35,7 +35,7 @@ from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
 from hotlever.measurands import MEASURANDS
 from hotlever.measurement import FileColumn
-from hotlever.measurement.columns import UNUSED, quantity_of
+from hotlever.measurement.columns import GROUP, UNUSED, quantity_of
 from hotlever.units import name_and_unit
 
 #: What is shown where there is no measurement.
@@ -166,12 +166,14 @@ class MeasuredPage(Page):
         self._reads += 1
         turn, understood, name = self._reads, None, self.chosen["data"]
         columns: list[FileColumn] = []
+        groups: list[str] = []
         self._read_of = name, self.chosen.get("probe")
         self.banner.clear()
         metadata = {key: self.metadata[key] for key in self.tellable}
         metadata["probe"] = self.chosen.get("probe")
         if name is not None:
             with suppress(HotleverError):
+                groups = await self.session.ask("full", "showing:groups", name)
                 columns = await self.session.ask("full", "showing:columns", name, metadata)
         try:
             file = name or str(EXAMPLES / _EXAMPLE)
@@ -181,7 +183,7 @@ class MeasuredPage(Page):
                 self.banner.say(str(error))
         if turn != self._reads:  # something else has been chosen meanwhile
             return
-        self._columns.show(columns, self.metadata["columns"], understood is not None)
+        self._columns.show(columns, self.metadata["columns"], understood is not None, groups)
         self._show_understood(understood)
         if job := self.session.jobs.by_page.get(self.name):
             self._follow(job)
@@ -290,6 +292,8 @@ class _ResultBlocks:
 class ColumnPicker:
     """Which column is which; `tell` is told the words of ``--column`` for those that are picked.
 
+    Of a TDMS file of several groups that whose columns they are is picked first.
+
     Fields stay while the file is read anew: the next one may be open meanwhile.
     """
 
@@ -297,18 +301,33 @@ class ColumnPicker:
         self._tell = tell
         #: What was told, a quantity and perhaps its unit, by the column.
         self._assignments: dict[str, str] = {}
+        self._group: str | None = None
         self._columns: dict[str, FileColumn] = {}
         self._fields: dict[str, tuple[ui.select, ui.select]] = {}
         opened = ui.expansion("Columns of the file").props("header-class=text-bold")
         with opened as self._opened:
+            self._groups = ui.select([], label="Group").classes("w-64")
+            self._groups.props('aria-label="Group of the file"')
+            self._groups.on_value_change(lambda event: self._pick_group(event.value))
             caption("The first values of each, and what it is used as.")
             self._rows = ui.column().classes("w-full gap-1")
 
-    def show(self, columns: list[FileColumn], assignments: list[str], is_understood: bool) -> None:
+    def show(
+        self,
+        columns: list[FileColumn],
+        assignments: list[str],
+        is_understood: bool,
+        groups: list[str],
+    ) -> None:
         """Show the columns of a file; they are open where the file is not understood."""
-        parts = (text.partition("=") for text in assignments)
-        self._assignments = {name.strip(): quantity for quantity, _, name in parts}
-        self._opened.set_visibility(bool(columns))
+        parts = [text.partition("=") for text in assignments]
+        self._assignments = {
+            name.strip(): quantity for quantity, _, name in parts if quantity.strip() != GROUP
+        }
+        self._group = next((name for quantity, _, name in parts if quantity.strip() == GROUP), None)
+        self._groups.set_visibility(len(groups) > 1)
+        self._groups.set_options(groups, value=self._group if self._group in groups else None)
+        self._opened.set_visibility(bool(columns) or len(groups) > 1)
         if not is_understood:
             self._opened.set_value(True)
         before = [(column.name, column.heading, column.cells) for column in self._columns.values()]
@@ -369,9 +388,14 @@ class ColumnPicker:
             for heading, quantity in self._assignments.items()
             if heading != name and quantity_of(quantity, assigned=True) != symbol
         } | ({name: own} if own else {})
-        return self._tell(
-            [f"{quantity}={heading}" for heading, quantity in self._assignments.items()]
-        )
+        group = [f"{GROUP}={self._group}"] if self._group is not None else []
+        assigned = [f"{quantity}={heading}" for heading, quantity in self._assignments.items()]
+        return self._tell([*group, *assigned])
+
+    def _pick_group(self, group: str | None) -> Any:
+        """Tell which group is picked; another one may have other columns."""
+        is_new = group is not None and group != self._group
+        return self._tell([f"{GROUP}={group}"]) if is_new else None
 
     def _pick_unit(self, name: str, unit: str | None) -> Any:
         is_new = unit is not None and unit != self._unit_of(name)
