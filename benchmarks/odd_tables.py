@@ -131,6 +131,13 @@ def no_values() -> Iterator[OddTable]:
         HEADER + rows(told(BIAS, {0: "OVERFLOW"}), told(CURRENT, {0: "---"})),
         bias=None,
     )
+    first = rows(told(BIAS, {0: "ERR"}), ["F"] * 25, CURRENT)
+    third = {"V_b (V)": "1", "I_h (mA)": "3"}
+    yield odd("an unknown word first, and a flag", first, third, bias=None)
+    blanks = rows(volts, BIAS, CURRENT, sep="  ")
+    yield odd("Excel, errors and blanks", "V_r (V)  V_b (V)  I_h (mA)\n" + blanks)
+    point = rows(BIAS, told(CURRENT, {24: "9@91E+37"}), sep=";", comma=True).replace("@", ".")
+    yield odd("decimal commas, no value with a point", point, NUMBERED, (24,))
     clipped = told(CURRENT, {0: "COMPL"})
     yield odd("a word that nobody knows", rows(BIAS, clipped), NUMBERED, bias=None)
     yield odd(

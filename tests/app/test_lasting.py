@@ -232,7 +232,7 @@ def test_the_group_of_a_tdms_file_is_asked_for_and_kept(tmp_path: Path) -> None:
         await user.open("/fit")
         of(user, ui.select, "Measurement").set_value("two.tdms")
         await user.should_see("2 groups, each a measurement of its own", retries=50)
-        group = named(user, "Group of the file")
+        group = of(user, ui.select, "Group of the file")
         assert group.visible
         assert group.options == ["lever 1", "lever 2"]
         group.set_value("lever 2")
@@ -242,7 +242,7 @@ def test_the_group_of_a_tdms_file_is_asked_for_and_kept(tmp_path: Path) -> None:
 
     async def second(user: User, session: Session) -> None:
         await user.open("/fit")
-        await until(lambda: named(user, "Group of the file").value == "lever 2")
+        await until(lambda: of(user, ui.select, "Group of the file").value == "lever 2")
         # what is told of a column is told beside it
         await until(lambda: named(user, "Column I_h (mA) is") is not None)
         named(user, "Column I_h (mA) is").set_value("")

@@ -30,6 +30,7 @@ CELLS = {
     "HP 4145, status before the first row": r"line 2: V_b: found 'CV\+4.0E-01', expected a number",
     "units in cells, headerless": "line 1: V_b: found '0.40 V', expected a number",
     "thousands with narrow blanks": "line 1: I_h: found '52 598.4', expected a number",
+    "an unknown word first, and a flag": "line 1: V_b: found 'ERR', expected a number",
     "a word that nobody knows": "line 1: I_h: found 'COMPL', expected a number",
     "dates, headerless, a short row": "line 10: 2 cells, expected 3 as in line 1",
 }

@@ -33,7 +33,10 @@ _REMARKS = "comment"
 #: Marks of a comment, around it, and quotes.
 _MARKS = ' \t"#%!'
 #: A first cell in which a spreadsheet says that there is no value, which begins no comment.
-_FIRST_CELL = re.compile(r"#(?:N/A|NV|[A-ZÀ-Ý]{3,}(?:/0)?[!?]|#+)\"?\s*[\t;,|]")
+_FIRST_CELL = re.compile(
+    r"#(?:(?:N/A|DIV/0!|NUM!|VALUE!|REF!|NULL!|NAME\?)[\"\s]|"
+    r"(?:N/A|NV|[A-ZÀ-Ý]{3,}(?:/0)?[!?]|#+)\"?\s*[\t;,|])"
+)
 #: What begins as numbers do, behind marks or the letters with which some meters tell their state:
 #: ``(1.5)``, ``~1``, ``='2``, ``CV+4.0E-01``; and a date, a time or a number with its unit.
 _BEGINS_NUMBER = re.compile(r"[\W_]*[.,]?\d|[A-Za-z]{1,3}[+-]?\d+[.,]\d")
@@ -180,6 +183,9 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
                 count = width(comment) or -1
                 if row_of_numbers(lines[index][1], count) or (mostly and mostly[1] == count):
                     return comment
+            # rows above it with a word in place of a number
+            while order and _has_a_number(headings_in(lines[plain[order - 1]][1])):
+                order -= 1
             break
         if count := width(index):
             cells = headings_in(lines[plain[order + 1]][1]) if order + 1 < len(plain) else []
@@ -192,6 +198,13 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
     if len(texts) > 1 and any(map(is_unit, headings_in(lines[texts[-1]][1]))):
         texts.pop()
     return next(iter(named or texts[-1:]), None)
+
+
+def _has_a_number(cells: Sequence[str]) -> bool:
+    """Whether cells have a number that counts no columns, or say that there is no value."""
+    filled = [cell for cell in cells if cell and not is_unit(cell)]
+    readable = [cell for cell in filled if is_readable(cell) and not cell.isdecimal()]
+    return len(cells) > 1 and bool(readable) and not is_underline(cells)
 
 
 def _above_the_rows(lines: Sequence[Line], plain: Sequence[int]) -> int | None:

@@ -137,12 +137,11 @@ def number(cell: str, decimal_comma: bool = False) -> float | None:
     if len(cell) > LONGEST_NUMBER:
         return None
     if NUMBER.fullmatch(cell):
-        sign, other = (",", ".") if decimal_comma else (".", ",")
-        if other in cell:
-            return None
-        value = float(cell.replace(sign, ".").lower().replace("d", "e"))
+        value = float(cell.replace(",", ".").lower().replace("d", "e"))
         if abs(value) in _OF_NO_VALUE:
             return math.nan
+        if ("." if decimal_comma else ",") in cell:
+            return None
         return value if abs(value) <= LARGEST_NUMBER else None
     word = cell.lstrip("+-").casefold()
     return math.nan if word in _NO_VALUE or _NO_VALUES.fullmatch(word) else None

@@ -306,8 +306,7 @@ class ColumnPicker:
         self._fields: dict[str, tuple[ui.select, ui.select]] = {}
         opened = ui.expansion("Columns of the file").props("header-class=text-bold")
         with opened as self._opened:
-            self._groups = ui.select([], label="Group").classes("w-64")
-            self._groups.props('aria-label="Group of the file"')
+            self._groups = ui.select([], label="Group of the file").classes("w-64")
             self._groups.on_value_change(lambda event: self._pick_group(event.value))
             caption("The first values of each, and what it is used as.")
             self._rows = ui.column().classes("w-full gap-1")
