@@ -35,8 +35,8 @@ from hotlever.estimation.over_a_sample import with_distances
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
-from hotlever.measurands import FITTED
 from hotlever.probe.parameters import usual_parameters
+from hotlever.quantities import FITTED
 from problems import table
 
 #: Noise of the current, and what is known of the material.

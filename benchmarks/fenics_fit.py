@@ -33,9 +33,9 @@ from hotlever.estimation import fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.lever.reduced.training import cached_reduction
 from hotlever.materials import PARAMETERS
-from hotlever.measurands import OBSERVABLES
 from hotlever.measurement import with_measured_circuit
 from hotlever.probe import Probe
+from hotlever.quantities import OBSERVABLES
 from problems import EXAMPLE, fit_command, peer_problem, peer_server, processor_time, table
 
 #: Relative step of the finite differences is its root: far above the solver's tolerance.

@@ -20,9 +20,9 @@ from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.transient import pulse
 from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.materials import PARAMETERS
-from hotlever.measurands import observables_of
 from hotlever.probe import Probe
 from hotlever.probe.priors import default_priors
+from hotlever.quantities import observables_of
 from problems import table
 
 NOISE = float(sys.argv[1]) if len(sys.argv) > 1 else 1e-3

@@ -31,8 +31,16 @@ PACKAGES = {f"hotlever.{path.parent.name}" for path in SOURCE.glob("*/__init__.p
 #: on the floors of single modules.
 FLOORS = {
     "ground": ("colours", "errors", "memory", "plotting", "threads", "types"),
-    "numbers and files": ("files", "piecewise", "records", "spieser2017", "steps", "units"),
-    "texts": ("cache", "datasets", "measurands", "text"),
+    "numbers and files": (
+        "files",
+        "piecewise",
+        "quantities",
+        "records",
+        "spieser2017",
+        "steps",
+        "units",
+    ),
+    "texts": ("cache", "datasets", "text"),
     "tables and processes": ("cluster", "processes", "tables"),
     "materials": ("materials",),
     "probe": ("probe",),

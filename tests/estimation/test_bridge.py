@@ -15,8 +15,8 @@ from hotlever.estimation import Measurement, fit, read_measurement
 from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient import simulate, spectrum, step
-from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Circuit, Probe
+from hotlever.quantities import OBSERVABLES
 
 BRIDGE = {"bridge_upper_ohm": 4700.0, "bridge_lower_ohm": 1500.0, "bridge_gain": 20.0}
 BRIDGE["bridge_offset_V"] = 1.0

@@ -13,10 +13,10 @@ from hotlever.estimation import Measurement, read_fit, read_measurement
 from hotlever.estimation.experiment import ExperimentAtRest
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
-from hotlever.measurands import observables_of
 from hotlever.measurement import given_measurement
 from hotlever.probe import MeshOptions
 from hotlever.probe.parameters import usual_parameters
+from hotlever.quantities import observables_of
 
 BIAS = np.array([-7.5, -4.0, 0.0, 1.0, 5.0, 8.0])
 #: Relative steps of the Taylor test.

@@ -9,8 +9,8 @@ from hotlever.estimation.experiment import experiment_of
 from hotlever.estimation.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Probe
+from hotlever.quantities import OBSERVABLES
 
 NAMES = ("n_d", "heater_width_um", "series_resistance_ohm")
 

@@ -23,10 +23,10 @@ from hotlever.lever import Lever
 from hotlever.lever.contact import out_of_contact, sweep_in_contact
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
-from hotlever.measurands import FITTED
 from hotlever.measurement import read_measurement
 from hotlever.measurement.rows import averaged
 from hotlever.probe.parameters import usual_parameters
+from hotlever.quantities import FITTED
 
 TIP = {"tip.height_um": 0.7, "tip.half_angle_deg": 20.0, "tip.apex_radius_um": 0.05}
 TRUE_K_PER_MW = 4e3

@@ -10,8 +10,8 @@ import pytest
 from hotlever.air.operator import air_operator
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
-from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Probe
+from hotlever.quantities import OBSERVABLES
 
 BIAS = [4.0, 8.268, 10.748]
 

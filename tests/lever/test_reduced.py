@@ -17,8 +17,8 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.response_surface import ParameterDomain
 from hotlever.lever.reduced.training import cached_reduction
-from hotlever.measurands import observables_of
 from hotlever.probe import Probe
+from hotlever.quantities import observables_of
 
 BIAS = np.linspace(0.0, 11.0, 12)
 

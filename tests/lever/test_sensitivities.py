@@ -7,8 +7,8 @@ import pytest
 
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
-from hotlever.measurands import OBSERVABLES
 from hotlever.probe import MeshOptions, Probe
+from hotlever.quantities import OBSERVABLES
 
 #: States of the branch (360, 600 and 1170 K): between them sensitivities are those of nearby ones.
 #: None is where many quadrature points pass the step of the thermal conductivity.

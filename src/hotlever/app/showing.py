@@ -29,7 +29,6 @@ from hotlever.errors import HotleverError, InputError
 from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
 from hotlever.lever.transient.waveform import waveform_from_text
-from hotlever.measurands import FITTED
 from hotlever.measurement import (
     FileColumn,
     file_columns,
@@ -38,6 +37,7 @@ from hotlever.measurement import (
     read_measurement,
     read_measurement_of,
 )
+from hotlever.quantities import FITTED
 from hotlever.raman import measure, read_lines, read_spectra
 from hotlever.raman.lineshape import WINDOW, in_window
 from hotlever.raman.reading import read_file, spectrum_files

@@ -47,10 +47,10 @@ from hotlever.estimation.outcome import (
     Vector,
     array,
 )
-from hotlever.measurands import FITTED
 from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import PriorUse
+from hotlever.quantities import FITTED
 from hotlever.records import Number, StandardError, stored_as
 from hotlever.text import value_with_error
 from hotlever.types import Array

@@ -20,7 +20,7 @@ from hotlever.calibration.procedure import calibrate
 from hotlever.calibration.pulses import PulseTiming
 from hotlever.calibration.table import STATED, interpolated
 from hotlever.calibration.uncertainty_budget import BudgetOf
-from hotlever.datasets import QUANTITIES, frame_text, labelled
+from hotlever.datasets import frame_text, labelled
 from hotlever.errors import HotleverError
 from hotlever.estimation import FitOptions
 from hotlever.estimation.batch import Batch, Work, estimate_many
@@ -35,6 +35,7 @@ from hotlever.estimation.summary import (
 from hotlever.files import CALIBRATION
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, known_beforehand
+from hotlever.quantities import QUANTITIES
 from hotlever.text import value_with_error
 
 #: What levers are compared by beside the tip temperature somewhere: of a knee,
@@ -125,7 +126,7 @@ class Setting(NamedTuple):
     @property
     def text(self) -> str:
         """The value with its unit."""
-        return f"{self.value:.4g} {QUANTITIES[self.along][0]}"
+        return f"{self.value:.4g} {QUANTITIES[self.along].unit}"
 
 
 def highest_common_bias(calibrations: Mapping[str, Calibration]) -> Setting:
@@ -213,7 +214,7 @@ def _why_none(calibration: Calibration, at: Setting, tip: Mapping[str, float]) -
     if at.along == "power_mW" and calibration.power_law is None:
         return "its tip temperature does not follow from a power; expected a bias"
     low, high = calibration.heating[at.along].values[[0, -1]]
-    unit = QUANTITIES[at.along][0]
+    unit = QUANTITIES[at.along].unit
     return f"{at.text} is out of its range, {low:.4g} to {high:.4g} {unit}, or where it jumps"
 
 

@@ -27,9 +27,9 @@ from hotlever.estimation.surrogate import CurveSurrogate, Rows
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
-from hotlever.measurands import FITTED
 from hotlever.probe import Probe
 from hotlever.probe.priors import SCALES, Prior, known_beforehand
+from hotlever.quantities import FITTED
 from hotlever.spieser2017 import RAMAN_ERROR_K, RAMAN_ERROR_SHARE
 from hotlever.text import BAND
 from hotlever.types import Array

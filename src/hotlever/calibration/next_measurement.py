@@ -22,9 +22,9 @@ from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.estimation.optimal_design import Candidate, Information, best_first
 from hotlever.estimation.surrogate import Rows
-from hotlever.measurands import FITTED
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
+from hotlever.quantities import FITTED
 from hotlever.text import aligned
 from hotlever.types import Array
 

@@ -9,10 +9,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import QUANTITIES, labelled
+from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.estimation.outcome import array
 from hotlever.probe import Circuit
+from hotlever.quantities import QUANTITIES
 from hotlever.text import BAND
 from hotlever.types import Array, Mask
 
@@ -136,7 +137,7 @@ def even_rows(
     InputError
         If the column does not rise, or there would be more than `MOST_ROWS`.
     """
-    values, (unit, meaning) = table[along].values, QUANTITIES[along]
+    values, unit, meaning = table[along].values, QUANTITIES[along].unit, QUANTITIES[along].meaning
     if not np.all(np.diff(values) > 0.0):
         raise InputError(f"a table by {meaning}: it does not rise all along, expected by bias")
     if step is None:

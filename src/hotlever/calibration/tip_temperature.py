@@ -30,11 +30,11 @@ from hotlever.estimation.posterior import Posterior, standard_errors
 from hotlever.estimation.profile import profile_of_tip
 from hotlever.lever import Branch
 from hotlever.materials.parameters import is_of_material, own_name
-from hotlever.measurands import FITTED, OF_A_CONTACT
 from hotlever.measurement import Measurement
 from hotlever.piecewise import spline_through
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.surroundings import Surroundings
+from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
 

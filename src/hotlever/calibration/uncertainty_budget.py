@@ -25,9 +25,9 @@ from hotlever.estimation.outcome import IF_ANY, Correlations, Section
 from hotlever.estimation.posterior import CurvedQuantity
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.surrogate import Rows
-from hotlever.measurands import FITTED, OBSERVABLES
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import SCALES, PriorUse
+from hotlever.quantities import FITTED, OBSERVABLES
 from hotlever.records import Number
 from hotlever.text import BAND
 from hotlever.types import Array

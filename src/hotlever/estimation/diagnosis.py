@@ -23,12 +23,12 @@ from hotlever.estimation.surrogate import CurveSurrogate, Rows
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
-from hotlever.measurands import FITTED, OF_A_CONTACT
 from hotlever.measurement import Measurement
 from hotlever.measurement.data import noise_about_neighbours
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import Prior, known_beforehand
+from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.types import Array
 
 #: Data are not described where they differ from the model by more than this share of the largest

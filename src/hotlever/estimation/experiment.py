@@ -27,10 +27,10 @@ from hotlever.lever.observables import Linearised, by_parameter
 from hotlever.lever.reduced.lever import BranchSolver
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
 from hotlever.lever.similar import SimilarLevers
-from hotlever.measurands import FITTED
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
 from hotlever.probe.parameters import usual_parameters
+from hotlever.quantities import FITTED
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
@@ -51,7 +51,7 @@ class Prediction:
     ----------
     probe : Probe
     values : ndarray, shape (observables, n)
-        `hotlever.measurands.OBSERVABLES` at the rows of the measurement, and behind them those of
+        `hotlever.quantities.OBSERVABLES` at the rows of the measurement, and behind them those of
         a contact, if there is one.
     slopes : ndarray, shape (observables, n, k)
         Derivatives by the experiment's parameters.

@@ -21,10 +21,10 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.sensitivities import derivable, with_sensitivities
 from hotlever.lever.transient.waveform import Piece, Waveform
-from hotlever.measurands import observables_of
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
+from hotlever.quantities import observables_of
 from hotlever.types import Array, Index
 
 #: Times per decade since the last corner at which a lever is followed for very many rows.

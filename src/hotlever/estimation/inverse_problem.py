@@ -35,13 +35,13 @@ from hotlever.estimation.posterior import Posterior
 from hotlever.estimation.prior_density import FLAT, PriorDensity
 from hotlever.estimation.residuals import Residuals
 from hotlever.lever.branch import Branch
-from hotlever.measurands import FITTED, OF_A_CONTACT
 from hotlever.measurement import Measurement, with_measured_circuit
 from hotlever.measurement.data import check_sample
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
 from hotlever.probe.priors import ALL_DIMENSIONS, Prior, PriorUse, default_priors, priors_of
+from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.types import Array, Progress
 
 #: The share of the sum of squares that another step would take away, below which a search that has

@@ -8,11 +8,11 @@ from typing import Any, Literal, cast, get_args
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
-from hotlever.measurands import FITTED
 from hotlever.probe import Probe
 from hotlever.probe.parameters import heat_capacities, of_materials, parameter_of, usual_parameters
 from hotlever.probe.priors import SCALES, Prior
 from hotlever.probe.surroundings import Medium
+from hotlever.quantities import FITTED
 
 Weights = Literal["maximum", "errors"]
 #: What the medium is called if nobody knows it: either is tried.

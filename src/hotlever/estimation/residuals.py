@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from hotlever.errors import InputError
 from hotlever.estimation.noise import CommonCovariance, CommonError, DataErrors
 from hotlever.estimation.options import Weights
-from hotlever.measurands import FITTED
 from hotlever.measurement import Measurement
 from hotlever.probe.priors import PriorShift
+from hotlever.quantities import FITTED
 from hotlever.types import Array
 
 #: Observables that have a zero.

@@ -45,11 +45,11 @@ from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.lever import Lever
 from hotlever.lever.transient import simulate
 from hotlever.materials import full_name
-from hotlever.measurands import FITTED, OF_A_CONTACT, Observable
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameter_of, parameters_of, usual_parameters
 from hotlever.probe.priors import Prior, PriorUse, priors_of
+from hotlever.quantities import FITTED, OF_A_CONTACT, Observable
 from hotlever.records import Number, stored_as
 from hotlever.text import value_with_error, with_unit
 from hotlever.types import Array

@@ -25,10 +25,10 @@ from hotlever.lever.branch import TIP_RISE, Branch, branch_end, shifted
 from hotlever.lever.laws import BASE
 from hotlever.lever.observables import Linearised, at_fixed_bias, observed, observed_by
 from hotlever.lever.reduced.lever import ReducedLever
-from hotlever.measurands import OBSERVABLES
 from hotlever.piecewise import Piecewise, crossing, spline_through
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import parameters_of
+from hotlever.quantities import OBSERVABLES
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
@@ -47,7 +47,7 @@ class Rows:
     ----------
     bias_V : ndarray, shape (n,)
     measured : ndarray, shape (observables, n), optional
-        What was measured, `hotlever.measurands.OBSERVABLES`; NaN where nothing was. Without it the
+        What was measured, `hotlever.quantities.OBSERVABLES`; NaN where nothing was. Without it the
         states are those of a slow ramp.
     """
 
@@ -163,7 +163,7 @@ def _reaching(branch: Branch, u: Array, short: Array) -> Array:
 
 
 class ContactTemperatures:
-    """Adds `hotlever.measurands.OF_A_CONTACT` to what levers like one show, if it is in contact.
+    """Adds `hotlever.quantities.OF_A_CONTACT` to what levers like one show, if it is in contact.
 
     Parameters
     ----------

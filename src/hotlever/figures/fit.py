@@ -30,7 +30,7 @@ from hotlever.figures.style import (
     values_by_lever,
 )
 from hotlever.materials.parameters import parameter_named
-from hotlever.measurands import FITTED, OBSERVABLES
+from hotlever.quantities import FITTED, OBSERVABLES
 from hotlever.text import BAND, value_with_error
 from hotlever.types import Array
 

@@ -16,10 +16,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
-from hotlever.datasets import QUANTITIES
 from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, whole_file
 from hotlever.materials.parameters import INVERSION, parameter_named
+from hotlever.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,16 +34,6 @@ MEASURED: Any = {"ls": "none", "marker": "o", "mfc": "none", "color": BLACK, "la
 MOST_NAMES = 24
 #: Points of a curve that are marked at most.
 _MARKED = 40
-#: What quantities are called that the paper has a symbol for.
-_SYMBOLS = {
-    **dict.fromkeys(("bias", "bias_V"), "bias V$_b$"),
-    "current_mA": "heater current I$_h$",
-    "lever_V": "lever voltage V$_l$",
-    "reader_V": "reader voltage V$_r$",
-    "bridge_output_V": "bridge voltage V$_{bridge}$",
-    "power_mW": "power P$_l$",
-}
-
 #: How figures are drawn, in terms of matplotlib's settings.
 STYLE: Any = {
     "font.size": 9,
@@ -181,8 +171,7 @@ def axis_label(name: str) -> str:
     >>> axis_label("bias_V"), axis_label("doping")
     ('bias V$_b$ (V)', 'doping concentration (cm⁻³)')
     """
-    unit, meaning = QUANTITIES[name]
-    return f"{_SYMBOLS.get(name, meaning)} ({unit})"
+    return QUANTITIES[name].axis_label
 
 
 def parameter_label(name: str) -> tuple[str, float]:

@@ -35,10 +35,10 @@ from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.observables import with_bridge
 from hotlever.materials import Kind
 from hotlever.materials.sections import LAWS
-from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.parts import SECTIONS
+from hotlever.quantities import OBSERVABLES
 from hotlever.types import Array, Mask
 
 if TYPE_CHECKING:

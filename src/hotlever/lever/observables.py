@@ -17,10 +17,10 @@ from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.space import TIP, Constraint, Factors
-from hotlever.measurands import OBSERVABLES
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
+from hotlever.quantities import OBSERVABLES
 from hotlever.types import Array
 
 _BRIDGE = OBSERVABLES["bridge"].name
@@ -29,7 +29,7 @@ _AT_ONCE = 20
 
 
 def observed(circuit: Circuit, outputs: Array) -> Array:
-    """Return `hotlever.measurands.OBSERVABLES` in the order of that table, (observables, n).
+    """Return `hotlever.quantities.OBSERVABLES` in the order of that table, (observables, n).
 
     Parameters
     ----------

@@ -6,11 +6,11 @@ import numpy as np
 
 from hotlever.errors import InputError
 from hotlever.lever.transient.waveform import Polyline, Waveform
-from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.columns import constant_bias
 from hotlever.measurement.contents import NOISE, Contents
 from hotlever.measurement.data import LEVER, TIME, noise_about_neighbours
 from hotlever.probe import Circuit
+from hotlever.quantities import FITTED, MEASURANDS
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from hotlever.errors import InputError, excerpt, unknown_name
 from hotlever.files import read_bytes
-from hotlever.measurands import FITTED, MEASURANDS, PLAIN
 from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
+from hotlever.quantities import FITTED, MEASURANDS, PLAIN
 from hotlever.tables import TextTable, read_table
 from hotlever.tables.table import text_lines
 from hotlever.types import Array
@@ -126,8 +126,8 @@ def assignments(
         if symbol is None:
             names = [*MEASURANDS, UNUSED, GROUP]
             raise unknown_name("quantity", name_and_unit(quantity)[0], names, where)
-        if unit is not None and conversion(unit, MEASURANDS[symbol].unit) is None:
-            raise unknown_unit(unit, MEASURANDS[symbol].unit, f"{where}: {symbol}")
+        if unit is not None and conversion(unit, MEASURANDS[symbol].typed_unit) is None:
+            raise unknown_unit(unit, MEASURANDS[symbol].typed_unit, f"{where}: {symbol}")
         if any(symbol == each.symbol for each in assigned):
             raise InputError(f"{where}: {symbol} is given twice, expected once")
         assigned.append(Assignment(symbol, unit, quantity, heading))
@@ -150,7 +150,7 @@ def _quantity(heading: str, assigned: bool = False) -> tuple[str | None, str | N
     The name alone is no time, unless it is assigned: settings of instruments are called so too.
     """
     name, unit = name_and_unit(heading)
-    of_time = assigned or conversion(unit or "", MEASURANDS[TIME].unit)
+    of_time = assigned or conversion(unit or "", MEASURANDS[TIME].typed_unit)
     is_time = name.casefold() in TIMES and of_time
     return TIME if is_time else symbol_of(name), unit
 
@@ -247,7 +247,7 @@ def _take_the_only_ones(
     """Let a plain heading be the bias, or the current, if nothing else in its unit may be it."""
     for symbol, headings in PLAIN.items():
         used = {*unused, *(column.index for column in columns.values())}
-        unit = MEASURANDS[symbol].unit
+        unit = MEASURANDS[symbol].typed_unit
         may_be = [
             index
             for index, heading in enumerate(table.names)
@@ -261,7 +261,7 @@ def _take_the_only_ones(
 
 def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> Column:
     """Return a column with its unit, which the file or the user gives."""
-    heading, inside = table.names[index], MEASURANDS[symbol].unit
+    heading, inside = table.names[index], MEASURANDS[symbol].typed_unit
     where = f"{table.where(-1)}: column '{excerpt(heading or str(index + 1))}'"
     written = name_and_unit(heading)[1]
     if table.names[:1] == [_IN_SI]:
@@ -279,7 +279,9 @@ def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> 
     if assigned and written:
         own = conversion(written, inside, difference)
         # the unit of the heading may be that of any quantity
-        measures = any(conversion(written, measurand.unit) for measurand in MEASURANDS.values())
+        measures = any(
+            conversion(written, measurand.typed_unit) for measurand in MEASURANDS.values()
+        )
         if own != scale and (own is not None or measures):
             raise InputError(
                 f"{where}: its unit is {written}, expected {assigned} as --column says"
@@ -331,7 +333,9 @@ def constant_bias(table: TextTable) -> float | None:
     for key, value in table.settings.items():
         symbol, unit = _quantity(key)
         if symbol == "V_b":
-            return amount(value, unit, MEASURANDS[symbol].unit, f"{table.path}: {excerpt(key)}")
+            return amount(
+                value, unit, MEASURANDS[symbol].typed_unit, f"{table.path}: {excerpt(key)}"
+            )
     return None
 
 
@@ -365,7 +369,7 @@ def note_on_unused(table: TextTable, columns: Mapping[str, Column]) -> list[str]
     missing = [measurand for measurand in MEASURED if measurand.symbol not in columns]
     hints = []
     for heading, unit in unused:
-        likely = next((column for column in missing if conversion(unit, column.unit)), None)
+        likely = next((column for column in missing if conversion(unit, column.typed_unit)), None)
         if likely is not None:
             hints.append(
                 f"if one is {likely.symbol}, say --column '{likely.symbol}={excerpt(heading)}'"

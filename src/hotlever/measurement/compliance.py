@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from hotlever.errors import counted
-from hotlever.measurands import MEASURANDS, OBSERVABLES
 from hotlever.measurement.data import LEVER, Measurement
 from hotlever.measurement.rows import sweeps_of
 from hotlever.probe import Circuit
+from hotlever.quantities import MEASURANDS, OBSERVABLES
 from hotlever.types import Array, Mask
 
 
@@ -267,7 +267,7 @@ def _left_out(
     """Return a measurement without what was measured at a limit, and a note on it."""
     at = [f"{value:.4g}" for value in np.unique(column.along[rows]).tolist()]
     where = f"{at[0]} to {at[-1]}" if len(at) > options.named else ", ".join(at)
-    unit, other = (MEASURANDS[symbol].unit for symbol in (column.symbol, column.along_symbol))
+    unit, other = (MEASURANDS[symbol].typed_unit for symbol in (column.symbol, column.along_symbol))
     note = (
         f"{measurement.path or 'measurement'}: {column.symbol} is clipped at "
         f"{np.abs(column.values[rows]).max():.4g} {unit}, by the compliance of its source or the "

@@ -11,10 +11,10 @@ import numpy as np
 
 from hotlever.errors import InputError, excerpt
 from hotlever.materials.air import ATMOSPHERE
-from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.columns import Column
 from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
 from hotlever.probe import Circuit
+from hotlever.quantities import FITTED, MEASURANDS
 from hotlever.tables import TextTable
 from hotlever.types import Array, Mask
 from hotlever.units import (
@@ -348,7 +348,7 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
     values, settings = contents.values, contents.settings.values
     for symbol in (each.symbol for each in MEASURED if each.symbol in contents.columns):
         of, data = symbol.removeprefix("d"), values[symbol]
-        unit, (low, high) = MEASURANDS[of].unit, MEASURANDS[of].plausible
+        unit, (low, high) = MEASURANDS[of].typed_unit, MEASURANDS[of].plausible
         size = np.nanmax(np.abs(values[of]), initial=0.0)
         if symbol != of:
             expected = f"a standard error above 0 and up to {high:g} {unit}, or an empty cell"

@@ -13,9 +13,9 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.lever.dataset import circuit_of
 from hotlever.lever.transient.history import checked_times
 from hotlever.lever.transient.waveform import Waveform
-from hotlever.measurands import FITTED, MEASURANDS, OBSERVABLES, OF_A_CONTACT
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.surroundings import Medium
+from hotlever.quantities import FITTED, MEASURANDS, OBSERVABLES, OF_A_CONTACT
 from hotlever.types import Array, Mask
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ class Measurement:
         return labelled(columns, coordinates={"bias": self.bias_V}).sortby("bias")
 
     def observable(self, name: str, *, error: bool = False) -> Array:
-        """Return the data of one of `hotlever.measurands.FITTED`, NaN where there are none.
+        """Return the data of one of `hotlever.quantities.FITTED`, NaN where there are none.
 
         With `error`, their standard errors.
 

@@ -13,7 +13,6 @@ import numpy as np
 from hotlever.errors import InputError, counted, excerpt
 from hotlever.files import read_bytes
 from hotlever.lever.transient.waveform import Waveform
-from hotlever.measurands import FITTED, MEASURANDS
 from hotlever.measurement.bias import check_times, find_bias, find_waveform, leave_out_jumps, mirror
 from hotlever.measurement.columns import (
     assignments,
@@ -30,6 +29,7 @@ from hotlever.measurement.contents import Contents, Settings, check
 from hotlever.measurement.data import DISTANCE, MEASURED, OPTIONAL, TIME, Measurement
 from hotlever.measurement.rows import described, disagreements, sweeps_of
 from hotlever.probe import Circuit, Probe
+from hotlever.quantities import FITTED, MEASURANDS
 from hotlever.tables import groups_in
 from hotlever.units import name_and_unit
 

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.measurands import FITTED
 from hotlever.measurement.data import MEASURED, Measurement
+from hotlever.quantities import FITTED
 from hotlever.types import Array, Index, Mask
 
 #: A turn is where the bias goes back by more than this part of its range.

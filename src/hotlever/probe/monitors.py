@@ -9,9 +9,9 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
-from hotlever.datasets import QUANTITIES
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.probe.layout import Layout
+from hotlever.quantities import QUANTITIES
 from hotlever.records import Record
 from hotlever.types import Array, Mask
 

@@ -14,13 +14,13 @@ from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, REFERENCE, Kind, Ma
 from hotlever.materials.kind import class_name
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.materials.sections import LAWS
-from hotlever.measurands import OBSERVABLES
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Layout
 from hotlever.probe.monitors import Monitor, Monitors
 from hotlever.probe.shapes import SHAPE_SECTIONS, Shape
 from hotlever.probe.surroundings import THE_PAPERS, Physics, Surroundings
 from hotlever.probe.tip import SampleContact, Tip
+from hotlever.quantities import OBSERVABLES
 from hotlever.records import Record
 from hotlever.types import Array
 
@@ -197,7 +197,7 @@ class ProbeParts(Record):
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """Which of `hotlever.measurands.OBSERVABLES` it can show."""
+        """Which of `hotlever.quantities.OBSERVABLES` it can show."""
         without = {
             "reader": "reader" not in self.wiring.measurable,
             "bridge": not self.circuit.has_bridge,

@@ -13,11 +13,11 @@ from hotlever.calibration.levers import calibration_rows, calibration_statements
 from hotlever.calibration.summary import calibration_parts, linear_words
 from hotlever.calibration.table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, even_rows
 from hotlever.calibration.uncertainty_budget import TemperatureBudget
-from hotlever.datasets import QUANTITIES
 from hotlever.errors import InputError
 from hotlever.estimation.batch import Batch
 from hotlever.estimation.gum import Budget, InputQuantity
 from hotlever.materials.parameters import sentence
+from hotlever.quantities import QUANTITIES
 from hotlever.report.fit_pages import add_remarks
 from hotlever.report.page import Block, Page
 from hotlever.text import significant, with_unit
@@ -59,7 +59,7 @@ def calibration_page(
     ]
     columns = even_rows(calibration.heating, names, "tip_K", fewest=_ROWS)
     page.table(
-        [f"{QUANTITIES[name][1]} ({QUANTITIES[name][0]})" for name in names],
+        [f"{QUANTITIES[name].meaning} ({QUANTITIES[name].unit})" for name in names],
         [[f"{value:.4g}" for value in row] for row in zip(*columns.values(), strict=True)],
         "Some rows of the table "
         + ("for the instrument." if described else "of the nearest lever, not for an instrument."),

@@ -1,7 +1,7 @@
 """What stands above the numbers of a table: its header row, its units, and remarks.
 
 Here belongs what instruments write there, such as the lines between the sweeps of a file; what the
-headings mean is said where the quantities are (`hotlever.measurands.MEASURANDS`).
+headings mean is said where the quantities are (`hotlever.quantities.MEASURANDS`).
 """
 
 from __future__ import annotations

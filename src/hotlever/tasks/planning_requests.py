@@ -294,7 +294,7 @@ def parse_noise(texts: Iterable[str] | None) -> dict[str, float]:
     >>> parse_noise(["current=0.2%", "tip=1%"])
     {'current': 0.002, 'tip': 0.01}
     """
-    from hotlever.measurands import OBSERVABLES
+    from hotlever.quantities import OBSERVABLES
 
     noise, expected = dict[str, float](), "NAME=SHARE, such as current=0.2%"
     for name, text in parse_pairs("--noise", texts, expected).items():

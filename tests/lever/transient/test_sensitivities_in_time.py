@@ -10,7 +10,7 @@ from hotlever.lever.transient import pulse, simulate, step, switched_off
 from hotlever.lever.transient.history import time_steps
 from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.materials import PARAMETERS
-from hotlever.measurands import observables_of
+from hotlever.quantities import observables_of
 
 #: So that every observable is there.
 BRIDGE = {"bridge_upper_ohm": 5600.0, "bridge_lower_ohm": 2000.0}

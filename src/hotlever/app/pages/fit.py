@@ -11,7 +11,7 @@ from hotlever.app.pages.frame import download_button
 from hotlever.app.pages.measured import MeasuredPage
 from hotlever.app.pages.page import MEDIA, several
 from hotlever.app.project import FIT, FITS
-from hotlever.measurands import FITTED
+from hotlever.quantities import FITTED
 
 _FLAGS = {
     "robust": ("robust", "Lessen the weight of points far off the others"),

@@ -33,9 +33,9 @@ from hotlever.app.pages.plots import MeasuredPlots
 from hotlever.app.project import DATA, EXAMPLES
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
-from hotlever.measurands import MEASURANDS
 from hotlever.measurement import FileColumn
 from hotlever.measurement.columns import GROUP, UNUSED, quantity_of
+from hotlever.quantities import MEASURANDS
 from hotlever.units import name_and_unit
 
 #: What is shown where there is no measurement.
@@ -342,7 +342,10 @@ class ColumnPicker:
             unit.set_visibility(has_unit)
             if has_unit:
                 assigned_unit = self._unit_of(column.name)
-                units = [*_UNITS[MEASURANDS[column.symbol].unit], *filter(None, [assigned_unit])]
+                units = [
+                    *_UNITS[MEASURANDS[column.symbol].typed_unit],
+                    *filter(None, [assigned_unit]),
+                ]
                 unit.set_options(list(dict.fromkeys(units)), value=assigned_unit)
 
     def _row(self, column: FileColumn) -> tuple[ui.select, ui.select]:

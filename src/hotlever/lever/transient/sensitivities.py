@@ -23,9 +23,9 @@ from hotlever.lever.transient.history import checked_times, time_steps
 from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import INSTANT_RATE, METHOD, LinearSolver, Step
 from hotlever.lever.transient.waveform import Piece, Waveform
-from hotlever.measurands import OBSERVABLES
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
+from hotlever.quantities import OBSERVABLES
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
