@@ -111,8 +111,8 @@ def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Vari
     import xarray as xr
 
     own, array, *stated = values if isinstance(values, tuple) else (dimensions, values)
-    array, known = np.asarray(array), QUANTITIES.get(name)
-    usual = {"units": known.unit, "long_name": known.meaning} if known else {}
+    array, row = np.asarray(array), QUANTITIES.get(name)
+    usual = {"units": row.unit, "long_name": row.meaning} if row else {}
     attributes = stated[0] if stated else usual
     if array.ndim == 0:
         own = ()

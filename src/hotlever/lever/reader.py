@@ -40,7 +40,7 @@ _HEAT_OFF = 0.03
 
 
 class Signal(NamedTuple):
-    """What a reader shows at a distance and a bias, named as in `hotlever.quantities.QUANTITIES`."""
+    """What a reader shows at a distance and a bias, named as in `hotlever.quantities`."""
 
     reader_ohm: float
     reader_V: float
