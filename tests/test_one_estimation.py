@@ -17,7 +17,7 @@ SLOW = pytest.mark.slow
 FOLDER = Path(hotlever.__file__).parent / "examples"
 EXAMPLES = [
     ("lever-a.csv", None),
-    ("uiuc-lever.csv", "uiuc-lever.toml"),
+    pytest.param("uiuc-lever.csv", "uiuc-lever.toml", marks=SLOW),
     pytest.param("lever-b.csv", None, marks=SLOW),
     pytest.param("boron-lever.csv", "boron-lever.toml", marks=SLOW),
     pytest.param("palladium-on-nitride.csv", "palladium-on-nitride.toml", marks=SLOW),

@@ -28,7 +28,7 @@ def test_a_narrow_prior_holds_and_none_at_all_varies_the_material_only(reference
     assert set(free.table.source.values) == {"measurement", "model"}
 
 
-@pytest.mark.parametrize("shape", ["three-leg", "u-shape"])
+@pytest.mark.parametrize("shape", ["three-leg", pytest.param("u-shape", marks=pytest.mark.slow)])
 def test_another_lever_is_within_a_few_stated_errors(shape):
     """Dimensions off by 5 %, another material, doping known to 15 %; I-V only."""
     nominal = Probe.reference() if shape == "three-leg" else Probe.u_shape()
@@ -75,6 +75,7 @@ def test_a_lever_in_air_is_estimated_in_air(lever, reference):
     assert by_rule.k == pytest.approx(calibration.k, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, reference):
     """What the fit knows of material and dimensions narrows the band in air."""
     rng = np.random.default_rng(6)

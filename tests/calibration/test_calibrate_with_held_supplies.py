@@ -44,6 +44,7 @@ def read(calibration: Calibration, column: str, bias: np.ndarray) -> np.ndarray:
     return np.interp(bias, calibration.table.bias_V, calibration.table[column])
 
 
+@pytest.mark.slow
 def test_the_table_is_by_the_bias_of_the_swept_supply(calibration, truth):
     bias = truth.bias_V.values
     off = read(calibration, "tip_K", bias) - truth.tip_K.values

@@ -36,6 +36,7 @@ def calibrated_in(cold):
     return {medium: calibrate(cold, medium=medium) for medium in ("vacuum", "air")}
 
 
+@pytest.mark.slow
 def test_errors_hold_both_media_where_the_data_do_not_tell(cold, calibrated_in, reference):
     either = calibrate(cold, medium="unknown")
     assert "do not tell which" in either.notes[0]

@@ -37,6 +37,7 @@ def test_the_shift_is_that_of_the_density():
     assert pytest.approx(11.0 * by["T"] / density, rel=0.05) == SCALE - 1.0
 
 
+@pytest.mark.slow
 def test_held_they_make_an_error_beyond_all_that_is_stated():
     priors = {"intrinsic_scale": "1 ± 0.01%"}
     branch, data = measured(SCALE)

@@ -17,6 +17,7 @@ from synthetic_curves import measured_curve, measurement_of
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 
 
+@pytest.mark.slow
 def test_priors_are_about_the_circuit_of_the_measurement(reference):
     """Not about the probe file's, where they differ; also as text."""
     circuit = Circuit(series_resistance_ohm=3000.0)
@@ -30,6 +31,7 @@ def test_priors_are_about_the_circuit_of_the_measurement(reference):
     assert own.parameters["series_resistance_ohm"].value == pytest.approx(3000.0, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_edges_that_are_off_together_are_known_by_one_prior():
     """Each dimension by itself would have to be many times its tolerance away."""
     true = Lever(Probe.reference().with_(edge_bias_um=-0.12))

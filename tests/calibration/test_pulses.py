@@ -35,6 +35,7 @@ def calibrated(measured):
         return calibrate(measured, pulse=PulseTiming(5.0))
 
 
+@pytest.mark.slow
 def test_the_true_lever_is_within_the_band(calibrated, lever):
     """At rest its errors are of the order of those stated; in a pulse too."""
     for height in (3.0, 6.0, 8.0):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -116,6 +117,7 @@ def test_broken_drawings_are_solved_or_refused(values):
 
 @few
 @given(levers(), st.booleans())
+@pytest.mark.slow
 def test_valid_drawings_are_solved_in_air(values, chip):
     dataset = solved(values, medium="air", chip=chip)
     assert 0 < dataset.air_heat_mW.item() < dataset.power_mW.item()

@@ -30,6 +30,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_scale_of_the_heat_capacity_is_found(coarse):
     names = ["heat_capacity_scale", "n_d"]
     twin = coarse.with_probe(coarse.probe.replace({"heat_capacity_scale": 1.08, "n_d": 5.9e17}))

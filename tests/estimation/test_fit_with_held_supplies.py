@@ -87,6 +87,7 @@ def corrected(probe: Probe, bias: np.ndarray, full: Lever) -> ExperimentAtRest:
     return ExperimentAtRest(fast, SimilarLevers(full), bias, usual_parameters(probe))
 
 
+@pytest.mark.slow
 def test_a_fit_finds_what_a_file_of_both_polarities_was_made_with(coarse, tmp_path):
     truth = {"c_kappa": 0.62, "n_d": 5.0e17, "p": 2.5}
     true = coarse.probe.replace(truth)

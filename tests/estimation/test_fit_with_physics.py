@@ -39,6 +39,7 @@ def test_a_fit_of_both_polarities_returns_the_material(measured, truth):
         assert abs(parameter.value - true) < 6 * parameter.stderr
 
 
+@pytest.mark.slow
 def test_a_calibration_has_what_is_not_known_of_the_effects_in_its_budget(measured, truth):
     result = calibrate(measured, probe=PROBE)
     assert result.describes_data

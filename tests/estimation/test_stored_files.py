@@ -77,6 +77,7 @@ def of_before(before, after):
 
 
 @each_version
+@pytest.mark.slow
 def test_a_lever_that_was_fitted_is_calibrated(folder):
     fit = read_fit(folder / "fit.json")
     with on_coarse_meshes():

@@ -149,6 +149,7 @@ def test_a_pulse_is_cooler_in_contact(touching):
     assert data.sample_mW[0] > data.sample_mW[1] > 0.0
 
 
+@pytest.mark.slow
 def test_a_solid_shows_what_a_flat_lever_does(touching):
     probe = touching.probe.with_(**{"tip.half_angle_deg": 40.0})
     solid = SolidLever(probe, SolidMeshOptions(refinement=0.4, grading=0.7))

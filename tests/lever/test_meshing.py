@@ -36,6 +36,7 @@ def test_the_usual_mesh_does_for_the_reference_probe():
     assert energy(probe, usual).sum() < TOLERANCE / 2
 
 
+@pytest.mark.slow
 def test_a_border_sharper_than_the_triangles_gets_smaller_ones(sharp):
     usual, chosen = Lever(sharp, MeshOptions()), Lever(sharp)
     assert energy(sharp, usual.space).sum() > 5 * TOLERANCE

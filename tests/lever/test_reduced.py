@@ -104,6 +104,7 @@ def test_full_states_are_expanded_and_found_again(coarse, reduced):
     np.testing.assert_allclose(reduced.space.coordinates(back), coordinates, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_fit_of_data_taken_in_air_finds_the_material(in_air):
     truth = in_air.probe.material.with_(n_d=5.2e17, c_kappa=0.66, delta=0.7)
     data = in_air.with_material(truth).sweep(BIAS)

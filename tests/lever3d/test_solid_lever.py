@@ -38,6 +38,7 @@ def test_without_air_it_is_the_flat_lever(lever):
     assert solid.attrs["medium"] == "vacuum"
 
 
+@pytest.mark.slow
 def test_heat_goes_to_the_leg_ends_and_the_air_and_charge_to_ground(sweep):
     assert sweep.attrs["medium"] == "air"
     lost = sweep.end_heat_mW + sweep.air_heat_mW
@@ -62,6 +63,7 @@ def test_all_heat_that_leaves_the_surface_arrives_at_infinity(state, sweep):
     assert slices["heat_at_infinity_mW"] == pytest.approx(slices["air_heat_mW"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_sensitivities_are_those_of_the_flat_lever(lever):
     solid, flat = SolidLever(Probe.reference(), COARSE), lever
     found, expected = (one.sweep([3.0], sensitivities=True).sensitivity for one in (solid, flat))

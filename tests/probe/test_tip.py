@@ -86,6 +86,7 @@ def test_a_tip_cools_the_heater_at_the_same_bias(coarse):
     assert with_tip.tip_K.item() < coarse.sweep(bias).tip_K.item() - 3
 
 
+@pytest.mark.slow
 def test_the_solid_has_the_volume_of_lever_and_cone():
     layout = tipped().layout()
     mesh = mesh_solid(layout, SolidMeshOptions(refinement=0.5))
@@ -105,6 +106,7 @@ def test_the_solid_has_the_volume_of_lever_and_cone():
             )
 
 
+@pytest.mark.slow
 def test_the_thickening_stands_for_the_cone():
     """benchmarks/tip.py prints it for more sizes and biases."""
     from hotlever.lever3d import SolidLever

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from hotlever import Lever, Probe
 from hotlever.lever.lever import COARSE
@@ -10,6 +11,7 @@ from hotlever.report import transient_pages
 from hotlever.report.transient_pages import transient_page
 
 
+@pytest.mark.slow
 def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path, monkeypatch):
     # few pulses and frequencies are as many pages
     monkeypatch.setattr(transient_pages, "_COUNT", 2)

@@ -30,6 +30,7 @@ def test_levers_that_differ_by_a_factor_have_that_k():
     assert factor.best_error_K.item() == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_surface_far_away_is_free_space_and_a_near_one_takes_more(coarse):
     study = one_sided_study(coarse.probe, (1.0, 1e4, np.inf))
     assert study.gap_um.values.tolist() == [1.0, 1e4, np.inf]

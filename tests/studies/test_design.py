@@ -132,6 +132,7 @@ def test_scale_and_edges_of_a_drawing_are_varied(drawn):
     assert wider.cold_ohm.values[1] == pytest.approx(larger.cold_ohm.values[0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_design_command_of_a_drawing(run, tmp_path):
     Probe.from_sections(reference_points(), "drawn").to_file(tmp_path / "own.toml")
     status, out, err = run("design", "own.toml", "--no-air")
@@ -147,6 +148,7 @@ def test_design_command_of_a_drawing(run, tmp_path):
     assert (tmp_path / "d.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_a_drawing_without_a_knee_has_a_table_too(run):
     status, out, err = run("design", EXAMPLES / "palladium-on-nitride.toml", "--no-air")
     assert status == 0, err

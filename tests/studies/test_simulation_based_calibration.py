@@ -118,6 +118,7 @@ def test_a_reader_is_measured_where_there_is_one():
     assert np.isnan(data_of(0, ["mesh"], "reader", Probe.u_shape()).reader_V).all()
 
 
+@pytest.mark.slow
 def test_a_lever_like_the_model_is_calibrated_within_the_stated_error():
     judged = judge(0, departures=["mesh"])
     assert judged.refused == ""
