@@ -14,8 +14,8 @@ from hotlever.types import Array
 class Instrument:
     """A spectrometer and its silicon line, as in the measurements of Spieser et al. 2017.
 
-    Photons are those at room temperature; the line falls as it widens, the band of disordered
-    silicon at 482 cm⁻¹ grows in proportion to temperature.
+    Photons are those at room temperature; the line falls as it widens, the band, that of disordered
+    silicon at 482 cm⁻¹, grows in proportion to temperature.
     """
 
     start: float = 440.0  # axis, cm⁻¹
@@ -26,6 +26,8 @@ class Instrument:
     background: float = 95.0  # photons at mid-axis
     slope: float = 0.05  # photons per cm⁻¹
     band: float = 16.0  # height, photons
+    band_centre: float = 482.0  # cm⁻¹
+    band_fwhm: float = 23.0  # cm⁻¹
     spike_rate: float = 1.0  # mean number of cosmic rays per spectrum
     gain: float = 1.0  # counts per photon
     read_noise: float = 0.0  # standard deviation, counts
@@ -73,7 +75,7 @@ def spectrum(
     height = it.counts * line_width(300.0) / width
     photons = height * lineshape.line(x, centre, width, it.fano, sigma)[0]
     photons += it.background + it.slope * (x - x.mean())
-    photons += it.band * temperature / 300.0 * lineshape.band(x, 482.0, 23.0)[0]
+    photons += it.band * temperature / 300.0 * lineshape.band(x, it.band_centre, it.band_fwhm)[0]
     y = it.gain * rng.poisson(np.maximum(photons, 0.0)) + it.read_noise * rng.normal(size=x.size)
     for _ in range(rng.poisson(it.spike_rate)):
         at = int(rng.integers(x.size - 1))

@@ -21,7 +21,7 @@ from hotlever.errors import InputError
 from hotlever.files import read_json, write_text
 from hotlever.materials.silicon import MELTING_POINT
 from hotlever.raman import anharmonic
-from hotlever.raman.lineshape import LineShape
+from hotlever.raman.lineshape import LineShape, PeakOptions
 from hotlever.records import Record, explained
 from hotlever.spieser2017 import (
     BASE_TEMPERATURE_K,
@@ -121,6 +121,8 @@ class RamanCalibration(Record):
     range_K: tuple[Number, Number]
     line_shape: LineShape = "lorentzian"
     resolution_cm: Number | None = None
+    #: What the series says for a band beside the line, see `PeakOptions`.
+    band_evidence: Number | None = None
     linear: LinearFit
     anharmonic: AnharmonicFit
     points: list[Point] = Field(default=[])
@@ -135,6 +137,11 @@ class RamanCalibration(Record):
                 f"{self.anharmonic.four_phonon_cm:g} cm⁻¹"
             )
         return self
+
+    @property
+    def options(self) -> PeakOptions:
+        """How the lines of its spectra were fitted, and those of others must be."""
+        return PeakOptions(self.line_shape, self.resolution_cm, band_evidence=self.band_evidence)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the calibration as JSON, whole or not at all."""
@@ -190,6 +197,7 @@ def calibrate_raman(
     line_shape: LineShape = "lorentzian",
     resolution_cm: float | None = None,
     source: str = "hot-plate series",
+    band_evidence: float | None = None,
 ) -> RamanCalibration:
     """Fit both laws to a hot-plate series.
 
@@ -197,8 +205,9 @@ def calibrate_raman(
     ----------
     points : sequence of Point
         At least three temperatures; the coldest one is the room temperature.
-    line_shape, resolution_cm
-        How the peaks were fitted; spectra measured with this calibration are fitted so too.
+    line_shape, resolution_cm, band_evidence
+        How the peaks were fitted, see `PeakOptions`; spectra measured with this calibration are
+        fitted so too.
     source : str
         Named in the calibration file.
 
@@ -264,6 +273,7 @@ def calibrate_raman(
         "range_K": (room, float(temperature.max())),
         "line_shape": line_shape,
         "resolution_cm": resolution_cm,
+        "band_evidence": band_evidence,
         "linear": linear,
         "anharmonic": law,
         "points": list(points),

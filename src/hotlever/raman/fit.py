@@ -1,10 +1,15 @@
 """Where the silicon line of a spectrum is, how wide and how strong, and how sure we are.
 
-The fit needs no start values, but takes the line's place as one. Its model is the line
-(`hotlever.raman.lineshape.line`) on a sloping background, and, where the residuals ask for it, a
-broad band on the low side: disordered silicon near 480 cm⁻¹, or a shoulder from warmer
-surroundings in the laser spot. Left out, such a band pulls the centre of a hot, weak line by more
-than a wavenumber (tens of kelvin).
+The fit needs no start values, but takes the line's place as one. There are two models: the line
+(`hotlever.raman.lineshape.line`) on a sloping background, and the same beside a broad band on
+the low side: disordered silicon near 480 cm⁻¹, or a shoulder from warmer surroundings in the laser
+spot. Left out, such a band pulls the centre of a hot, weak line by more than a wavenumber (tens of
+kelvin).
+
+Where both are possible noise would decide between them. Akaike's criterion gives each model its
+weight (Burnham and Anderson, Model Selection and Multimodel Inference, 2nd ed., 2002, 2.9, 4.3).
+The answer is that of the likelier one; its standard error holds the answer of the other as well, by
+that one's weight.
 """
 
 from __future__ import annotations
@@ -14,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
+from scipy.special import expit
 
 from hotlever.raman import noise
 from hotlever.raman.lineshape import (
@@ -35,11 +41,11 @@ from hotlever.types import Array, Mask
 
 DETECTION_SIGMAS = 5.0  #: a line's area must exceed its standard error so many times
 MISFIT_LIMIT = 1.6  #: from this ratio on the residuals are flagged as more than noise
-_BAND_GAIN = 20.0  # drop of chi-square that a band with three parameters must bring
+_BAND_PENALTY = 6.0  # drop of chi-square that three parameters bring by chance, after Akaike
+_DOUBTFUL = 1.1  # times its own; an error that the other model makes so large is flagged
 _BAND_FWHM, _BAND_SPREAD = 25.0, 0.6  # soft prior of the band: ln fwhm = ln 25 ± 0.6
 _NO_BAND = (0.0, 0.0, math.log(_BAND_FWHM))
 _SMALL_MISFIT = 1.25  # below it the line model is the right one
-_WIDE = 9.0  # cm⁻¹; a line this wide may be two
 _SIGMA_SPREAD = 1.0  # soft prior of an unknown spectrometer response: a factor e
 _NATURAL_WIDTH = (math.log(4.0), 0.7)  # soft prior of ln fwhm, with an unknown response only
 _MIN_FWHM_SAMPLES = 0.5
@@ -47,7 +53,9 @@ _COARSE = 1.5  # samples; a narrower line is hardly seen
 _LONE = 1.2  # samples; a narrower line is no more than one of them
 _NARROWEST = 1.2  # cm⁻¹; silicon's line is wider at any temperature
 _NARROWEST_SEEN = 0.5  # cm⁻¹; far below any line of silicon's, with noise
-_SPIKE_MAX_STEP = 1.2  # cm⁻¹; on a coarser axis a cosmic ray is no narrower than the line
+_COARSE_AXIS = (
+    1.2  # cm⁻¹; with larger steps a cosmic ray, and the response, are as wide as the line
+)
 _MAX_FWHM = 45.0
 _NEAR = 3.0  # cm⁻¹; how far from the start that is given the line may be
 _FLAT = 1e-20  # in whatever unit the intensity is
@@ -91,7 +99,7 @@ def fit_peak(x: Array, y: Array, options: PeakOptions | None = None, where: str 
     inside = in_window(x, prefix, options.window)
     x, y = x[inside], y[inside]
     peak, step = _fit(x, y, options), _step(x)
-    searched = options.start is None and step > _SPIKE_MAX_STEP
+    searched = options.start is None and step > _COARSE_AXIS
     if searched and (peak is None or _spiky(peak, step)):
         peak = _beside_cosmic_ray(x, y, options, peak) or peak
     if peak is None:
@@ -142,10 +150,51 @@ def _fit(x: Array, y: Array, options: PeakOptions) -> Peak | None:
     problem, start = started
     use = problem.unclipped & ~_likely_spikes(x, y, float(np.percentile(y, 20)), options.start)
     variance = np.maximum(noise.robust_sigma(y - np.median(y), np.abs(y)) ** 2, 1e-300)
-    plain = _refine(problem, start, use, variance, passes=2)
+    plain = _refine(problem, start, use, variance)
     # beside a clipped line's flanks a band cannot be told from the hidden shape
     richer = _with_band(plain) if options.band and problem.clipped is None else None
-    return _peak(richer or _refine(problem, plain.p, plain.use, plain.variance))
+    alone, beside = _peak(plain), _peak(richer) if richer is not None else None
+    # a band that shares the line's area makes that uncertain, and not whether there is a line
+    if not any(_stands_out(peak) for peak in (alone, beside) if peak is not None):
+        return None
+    if alone is None or beside is None or richer is None:
+        return alone or beside
+    return _either(
+        alone, beside, _gain(plain, richer) - _BAND_PENALTY, options.band_evidence or 0.0
+    )
+
+
+def _stands_out(peak: Peak) -> bool:
+    # a clipped line has no known height, but it is there
+    return peak.clipped is not None or peak.area > DETECTION_SIGMAS * peak.area_stderr
+
+
+def _either(alone: Peak, beside: Peak, own: float, elsewhere: float) -> Peak:
+    """The likelier of two answers, with errors that hold the other.
+
+    The evidence is how far χ² falls with a band beyond what three parameters bring by chance, in
+    this spectrum and ``elsewhere``. Other spectra may speak for a band and not against it: this
+    one alone may have it, from its own surroundings.
+    """
+    evidence = own + max(elsewhere, 0.0)
+    peak, other = (beside, alone) if evidence > 0.0 else (alone, beside)
+    weight = float(expit(-0.5 * abs(evidence)))  # of the other
+
+    def error(of: str) -> float:
+        stated = getattr(peak, f"{of}_stderr"), getattr(other, f"{of}_stderr")
+        apart = getattr(other, of) - getattr(peak, of)
+        return math.sqrt((1.0 - weight) * stated[0] ** 2 + weight * (stated[1] ** 2 + apart**2))
+
+    centre_error = error("centre")
+    in_doubt = centre_error > _DOUBTFUL * peak.centre_stderr
+    return replace(
+        peak,
+        centre_stderr=centre_error,
+        fwhm_stderr=error("fwhm"),
+        area_stderr=error("area"),
+        band_evidence=own,
+        flags=(*peak.flags, *["band-in-doubt"] * in_doubt),
+    )
 
 
 def _likely_spikes(x: Array, y: Array, base: float, start: float | None) -> Mask:
@@ -153,7 +202,7 @@ def _likely_spikes(x: Array, y: Array, base: float, start: float | None) -> Mask
     spikes = noise.likely_spikes(y, base)
     if start is not None:
         return np.asarray(spikes & ~_near(x, start))
-    return spikes & ~_in_range(x) if _step(x) > _SPIKE_MAX_STEP else spikes
+    return spikes & ~_in_range(x) if _step(x) > _COARSE_AXIS else spikes
 
 
 def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | None:
@@ -193,7 +242,8 @@ def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | 
         free.append(At.FANO)
     if options.resolution is not None:
         log_sigma = math.log(options.resolution * SIGMA_PER_FWHM)
-    elif options.shape == "voigt":
+    elif options.shape == "voigt" or (options.shape == "lorentzian" and step > _COARSE_AXIS):
+        # an instrument with pixels so wide has a response that is no narrower
         log_sigma = math.log(max(step, 0.2 * fwhm) * 2.0 * SIGMA_PER_FWHM)
         # on a coarse axis the two widths are hard to tell apart: keep both near what they are
         priors = [(At.LOG_FWHM, *_NATURAL_WIDTH), (At.LOG_SIGMA, log_sigma, _SIGMA_SPREAD)]
@@ -225,14 +275,17 @@ def _refine(
         if not np.all(np.isfinite(value)):
             break
         used, assumed = use, variance
-        strict, lenient = noise.SPIKE_LINE_TOLERANCE
-        misfit = Solution(problem, p, value, variance, use).misfit
-        tolerance = lenient if misfit > _SMALL_MISFIT else strict
+        strict, lenient, coarse = noise.SPIKE_LINE_TOLERANCE
+        so_far = Solution(problem, p, value, variance, use)
+        tolerance = lenient if so_far.misfit > _SMALL_MISFIT else strict
+        if _step(problem.x) > _COARSE_AXIS:
+            tolerance = coarse
         use = problem.unclipped & ~noise.spikes(y, value, part, used, tolerance)
         # a line seen by one or two samples must not be thrown out as a cosmic ray
         if np.count_nonzero(use) < MIN_SAMPLES:
             use = used
-        seen = noise.variance((y - value)[use], value[use], len(problem.free))
+        freedom = 1.0 - replace(so_far, use=use).leverage
+        seen = noise.variance((y - value)[use], value[use], freedom)
         variance = np.interp(np.arange(y.size), np.flatnonzero(use), seen)
         # in whatever unit the intensity is
         alike = np.allclose(variance, assumed, rtol=0.02, atol=0.0)
@@ -244,7 +297,7 @@ def _refine(
 
 
 def _with_band(plain: Solution) -> Solution | None:
-    """The fit with a broad band on the low side, or None if the residuals ask for none."""
+    """The best fit with a broad band on the low side, or None if there is none."""
     problem, x, y = plain.problem, plain.problem.x, plain.problem.y
     centre, fwhm = float(plain.p[At.CENTRE]), width_of(plain.p[At.LOG_FWHM])
     residual = np.where(plain.use, y - plain.value, 0.0) / np.sqrt(plain.variance)
@@ -259,27 +312,22 @@ def _with_band(plain: Solution) -> Solution | None:
     at = int(np.argmax(np.where(low_side, matched, -np.inf)))
     prior = (At.LOG_BAND_FWHM, math.log(_BAND_FWHM), _BAND_SPREAD)
     richer = replace(problem, free=(*problem.free, *At.BAND), priors=(*problem.priors, prior))
-    starts = []
-    if matched[at] > 3.0:
-        start = plain.p.copy()
-        start[At.BAND_HEIGHT] = np.sqrt(plain.variance[at]) * max(residual[at], 1.0)
-        start[At.BAND_CENTRE] = x[at]
-        starts.append(start)
-    if fwhm > _WIDE:
-        # one wide line may have swallowed a line and a band, and left no residual to see
-        start = plain.p.copy()
-        start[At.CENTRE], start[At.LOG_FWHM] = centre + 0.2 * fwhm, math.log(0.4 * fwhm)
-        start[At.BAND_HEIGHT], start[At.BAND_CENTRE] = 0.4 * plain.p[At.HEIGHT], centre - 0.6 * fwhm
-        starts.append(start)
-    best, best_gain = None, _BAND_GAIN
-    for start in starts:
-        fitted = _refine(richer, start, plain.use, plain.variance)
-        # drop of chi-square on the samples that both use
-        both, drop = fitted.use & plain.use, (y - plain.value) ** 2 - (y - fitted.value) ** 2
-        gain = float(np.sum(drop[both] / fitted.variance[both]))
-        if gain > best_gain and _sound(fitted):
-            best, best_gain = fitted, gain
-    return best
+    beside = plain.p.copy()
+    beside[At.BAND_HEIGHT] = np.sqrt(plain.variance[at]) * max(residual[at], 1.0)
+    beside[At.BAND_CENTRE] = x[at]
+    # the line may have swallowed a part of the band, and left no residual to see
+    within = plain.p.copy()
+    within[At.CENTRE], within[At.LOG_FWHM] = centre + 0.2 * fwhm, math.log(0.4 * fwhm)
+    within[At.BAND_HEIGHT], within[At.BAND_CENTRE] = 0.4 * plain.p[At.HEIGHT], centre - 0.6 * fwhm
+    fits = [_refine(richer, start, plain.use, plain.variance) for start in (beside, within)]
+    return max(filter(_sound, fits), key=lambda fit: _gain(plain, fit), default=None)
+
+
+def _gain(plain: Solution, richer: Solution) -> float:
+    """Drop of chi-square with a band, on the samples that both fits use."""
+    both, y = richer.use & plain.use, plain.problem.y
+    drop = (y - plain.value) ** 2 - (y - richer.value) ** 2
+    return float(np.sum(drop[both] / richer.variance[both]))
 
 
 def _sound(fitted: Solution) -> bool:
@@ -317,8 +365,6 @@ def _peak(solution: Solution) -> Peak | None:
         LINE_RANGE[0] < centre < LINE_RANGE[1]
         # on an axis in nm, which looks alike, a line is forty times narrower
         and max(_MIN_FWHM_SAMPLES * step, _NARROWEST_SEEN) < width < _MAX_FWHM
-        # a clipped line has no known height, but it is there
-        and (clipped is not None or area > DETECTION_SIGMAS * area_error)
         and area > 0.0
     ):
         return None

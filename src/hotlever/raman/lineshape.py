@@ -232,6 +232,14 @@ class Solution:
         return covariance
 
     @property
+    def leverage(self) -> Array:
+        """The share of each used sample's noise that the parameters have taken up."""
+        _, jacobian = self.problem.weighted(self.p, self.variance, self.use)
+        scale = np.linalg.norm(jacobian, axis=0)
+        orthogonal, _ = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))
+        return np.asarray(np.sum(orthogonal[: int(self.use.sum())] ** 2, axis=1))
+
+    @property
     def misfit(self) -> float:
         """Variance of the weighted residuals over half that of their neighbours' differences."""
         weighted = ((self.problem.y - self.value) / np.sqrt(self.variance))[self.use]
@@ -263,6 +271,9 @@ class PeakOptions:
     #: FWHM of the spectrometer's response, cm⁻¹. Left out with "voigt", it is fitted.
     resolution: float | None = None
     band: bool = True  #: whether a broad band on the low side may be added to the model
+    #: What other spectra of the instrument say for a band, the sum of their `Peak.band_evidence`;
+    #: left out, those say it that are measured together.
+    band_evidence: float | None = None
     #: Where the line is, cm⁻¹, near enough for the fit to begin there; left out, it is looked for.
     start: float | None = None
     window: tuple[float, float] = WINDOW  #: part of the spectrum that is fitted, cm⁻¹
@@ -316,13 +327,16 @@ class Peak:
     fano: float = 0.0  #: asymmetry 1/q; 0 unless fitted
     fano_stderr: float = 0.0
     resolution: float = 0.0  #: FWHM of the spectrometer's response in the model; 0 is none
-    band: Band | None = None  #: on the low side, if the data asked for one
+    band: Band | None = None  #: on the low side, if that is likelier than none
+    #: By how much χ² falls with a band, less what its parameters bring by chance.
+    band_evidence: float = 0.0
     #: Residual variance over that of neighbours' differences: 1 where only noise is left.
     misfit: float = 1.0
     samples: int = 0  #: fitted
     spikes: tuple[float, ...] = ()  #: places of the samples left out as cosmic rays
     clipped: tuple[float, float] | None = None  #: ends of the flat top that was left out
-    #: Of "cosmic-ray", "saturated", "low-shoulder", "low-band", "edge", "coarse", "misfit".
+    #: Of "cosmic-ray", "saturated", "low-shoulder", "low-band", "edge", "coarse", "misfit" and
+    #: "band-in-doubt".
     flags: tuple[str, ...] = ()
 
     def model(self, x: Array) -> Array:

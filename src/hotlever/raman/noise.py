@@ -9,8 +9,9 @@ from hotlever.types import Array, Mask
 
 SPIKE_SIGMAS = 6.0  #: a cosmic ray stands this many standard deviations above the fit
 #: How far the true line may differ from the line model, as a part of the line's height, before
-#: a difference is taken for a cosmic ray: where the fit leaves noise alone, and where it does not.
-SPIKE_LINE_TOLERANCE = (0.01, 0.04)
+#: a difference is taken for a cosmic ray: where the fit leaves noise alone, where it does not, and
+#: on a coarse axis, where pixels and the instrument's response shape the line.
+SPIKE_LINE_TOLERANCE = (0.01, 0.04, 0.15)
 SPIKE_MAX_SAMPLES = 5  #: a cosmic ray hits no more neighbouring samples than this
 PLATEAU_TOLERANCE = 0.006  #: part of the line's height within which a clipped top is flat
 PLATEAU_MIN_SAMPLES = 4
@@ -21,8 +22,8 @@ _OFFSETS = np.array([0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 1e6])
 _POISSON_PREFERENCE = 12.0
 
 
-def variance(residual: Array, model: Array, parameters: int) -> Array:
-    """Variance of each sample, from the residuals of a fit with so many parameters.
+def variance(residual: Array, model: Array, freedom: Array) -> Array:
+    """Variance of each sample, from the residuals of a fit.
 
     Photon noise has a variance proportional to the signal, but neither the detector's gain
     nor the level that was subtracted is in the file. So the variance is s²·(model + o) with
@@ -30,12 +31,15 @@ def variance(residual: Array, model: Array, parameters: int) -> Array:
     noise (o = 0) is kept unless the residuals contradict it. No curve is known better than its
     numbers are rounded.
 
+    A sample counts by its degree of ``freedom``, one less its leverage, (n,): of a line that few
+    samples see the fit leaves no residuals, and these say nothing of the noise there.
+
     Examples
     --------
     >>> rng = np.random.default_rng(1)
     >>> model = np.linspace(100.0, 900.0, 2000)
     >>> noise = rng.normal(size=2000) * np.sqrt(2.0 * model)
-    >>> bool(np.allclose(variance(noise, model, 0) / model, 2.0, rtol=0.1))
+    >>> bool(np.allclose(variance(noise, model, np.ones(2000)) / model, 2.0, rtol=0.1))
     True
     """
     largest = float(np.max(np.abs(model))) or 1.0
@@ -43,13 +47,13 @@ def variance(residual: Array, model: Array, parameters: int) -> Array:
     offsets = _OFFSETS if level.min() > 1e-3 else _OFFSETS[1:]
     shape = (level + offsets[:, None]) / (1.0 + offsets[:, None])
     rounded = np.finfo(float).eps * largest
-    scale = np.maximum(np.mean(residual**2 / shape, axis=1), rounded**2)
-    loss = residual.size * np.log(scale) + np.sum(np.log(shape), axis=1)
+    free = max(float(freedom.sum()), 1.0)
+    scale = np.maximum(np.sum(residual**2 / shape, axis=1) / free, rounded**2)
+    loss = free * np.log(scale) + np.log(shape) @ freedom
     best = int(np.argmin(loss))
     if loss[0] - loss[best] < _POISSON_PREFERENCE:
         best = 0
-    freedom = max(residual.size - parameters, 1)
-    return np.asarray(scale[best] * shape[best] * residual.size / freedom)
+    return np.asarray(scale[best] * shape[best])
 
 
 def robust_sigma(residual: Array, model: Array) -> Array:

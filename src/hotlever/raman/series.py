@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,6 +33,8 @@ DIGITS = {
     "temperature_K": 2,
     "temperature_error_K": 2,
 }
+#: Evidence for a band beyond which more of it changes nothing: none has a weight of 0.1 %.
+_BEYOND_DOUBT = 14.0
 #: Header of the Raman CSV.
 COLUMNS = ("file", *(name.replace("_per_cm", "_cm-1") for name in DIGITS), "flags")
 
@@ -67,6 +69,9 @@ def measure(
 ) -> list[Line]:
     """Fit the silicon line of each spectrum.
 
+    Whether there is a band beside it is asked of all of them together, unless the options say what
+    other spectra of the instrument say: noise would decide it for each in another way.
+
     Parameters
     ----------
     spectra : sequence of Spectrum
@@ -86,15 +91,37 @@ def measure(
         If the window of a correction holds too few samples.
     """
     options = options or PeakOptions()
-    lines = []
-    for spectrum in each(spectra, progress):
-        correction, peak = of_spectrum(spectrum, corrections or {}), None
-        if correction.use:
-            with suppress(NoSiliconLine):
-                own = correction.of(options)
-                peak = fit_peak(spectrum.x, spectrum.y, own, spectrum.name)
-        lines.append(Line(spectrum, peak, correction))
-    return lines
+    lines = [
+        _line(spectrum, of_spectrum(spectrum, corrections or {}), options)
+        for spectrum in each(spectra, progress)
+    ]
+    return lines if options.band_evidence is not None else _together(lines, options)
+
+
+def _line(spectrum: Spectrum, correction: Correction, options: PeakOptions) -> Line:
+    peak = None
+    if correction.use:
+        with suppress(NoSiliconLine):
+            peak = fit_peak(spectrum.x, spectrum.y, correction.of(options), spectrum.name)
+    return Line(spectrum, peak, correction)
+
+
+def _together(lines: Sequence[Line], options: PeakOptions) -> list[Line]:
+    """Fit again what is in doubt by itself, with what the others say for a band."""
+    total, together = band_evidence(lines), []
+    for line in lines:
+        own = _BEYOND_DOUBT if line.peak is None else line.peak.band_evidence
+        if own < _BEYOND_DOUBT and total > own:
+            with_others = replace(options, band_evidence=total - own)
+            together.append(_line(line.spectrum, line.correction, with_others))
+        else:
+            together.append(line)
+    return together
+
+
+def band_evidence(lines: Iterable[Line]) -> float:
+    """Return what spectra together say for a band beside the line, see `Peak.band_evidence`."""
+    return sum(line.peak.band_evidence for line in lines if line.peak is not None)
 
 
 def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dataset:
@@ -190,7 +217,8 @@ def calibrate_from(
                 centre_stderr_cm=peak.centre_stderr,
             )
         )
-    return calibrate_raman(points, options.shape, options.resolution, source), lines
+    of_lines = options.shape, options.resolution, source, band_evidence(lines)
+    return calibrate_raman(points, *of_lines), lines
 
 
 def _temperature(spectrum: Spectrum, table: dict[str, float]) -> float:

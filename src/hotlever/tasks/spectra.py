@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -246,6 +246,7 @@ def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
             chosen, hot_plate = series.calibrate_from(
                 spectra, options, table, update, source, by_hand
             )
+        options = chosen.options
         _describe(listener, chosen)
     if chosen is None:
         unused = "reference", "stress", "laser_power", "law"
@@ -264,6 +265,8 @@ def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
         lines = _measure(
             listener, _read(listener, request.reference), options, by_hand, "reference"
         )
+        if options.band_evidence is None:
+            options = replace(options, band_evidence=series.band_evidence(lines))
         peaks = [(line.peak, line.spectrum.temperature) for line in lines if line.peak]
         thermometer = thermometer.with_reference(peaks)
         spectra += [line.spectrum for line in lines]
@@ -275,20 +278,21 @@ def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
 def _options(
     listener: Listener, calibration: RamanCalibration | None, request: ThermometerRequest
 ) -> PeakOptions:
-    """The line shape asked for, else the calibration's: both sides must be fitted alike."""
-    shape, resolution = request.shape, request.resolution
-    if calibration is not None and calibration.points:
-        same = shape in (None, calibration.line_shape)
-        if not same or resolution not in (None, calibration.resolution_cm):
-            listener.note(
-                f"the calibration was made with the line shape {calibration.line_shape}; "
-                "fitting another one shifts the line"
-            )
-        if shape is None:
-            shape = calibration.line_shape
-            resolution = calibration.resolution_cm if resolution is None else resolution
-    line_shape: Any = shape or "lorentzian"
-    return PeakOptions(line_shape, resolution)
+    """As is asked for, else as the calibration was made: both sides must be fitted alike."""
+    shape: Any = request.shape
+    resolution = request.resolution
+    if calibration is None or not calibration.points:
+        return PeakOptions(shape or "lorentzian", resolution)
+    alike = calibration.options
+    if shape not in (None, alike.shape) or resolution not in (None, alike.resolution):
+        listener.note(
+            f"the calibration was made with the line shape {alike.shape}; "
+            "fitting another one shifts the line"
+        )
+    if shape is None:
+        shape = alike.shape
+        resolution = alike.resolution if resolution is None else resolution
+    return replace(alike, shape=shape, resolution=resolution)
 
 
 def _describe(listener: Listener, calibration: RamanCalibration) -> None:

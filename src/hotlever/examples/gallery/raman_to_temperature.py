@@ -11,7 +11,7 @@ from hotlever import (
 )
 
 calibration, hot_plate = calibrate_from(read_spectra(["src/hotlever/examples/raman/hot-plate"]))
-lines = measure(read_spectra(["src/hotlever/examples/raman/tip"]))
+lines = measure(read_spectra(["src/hotlever/examples/raman/tip"]), calibration.options)
 table = read_lines(lines, Thermometer(calibration))
 columns = (table.file, table.temperature_K, table.temperature_error_K)
 for file, T, error in zip(*(column.values for column in columns), strict=True):

@@ -125,7 +125,7 @@ def thermometer_section(page: Findings) -> None:
     """Fig. 2, and what the linear law does beyond its calibration."""
     with as_file(files("hotlever") / "examples" / "raman") as folder:
         calibration, series = calibrate_from(read_spectra([folder / "hot-plate"]))
-        lines = measure(read_spectra([folder / "tip"]))
+        lines = measure(read_spectra([folder / "tip"]), calibration.options)
     table = read_lines(lines, Thermometer(calibration, "anharmonic"))
     page.draw("raman_calibration", thermometry(lines, table, calibration, series))
     check = paper_check()
