@@ -1,0 +1,366 @@
+"""Levers whose laws are not the paper's: are stated errors of calibrations those that are made?
+
+Levers are solved by `foreign_solver`, which shares nothing with hotlever, with laws that depart
+from Eqs. 4 to 11 within what is published:
+
+film      additional thermal resistivity, of which a share of 0 to 1 does not grow with temperature
+carriers  0 to 1 of the way from Eq. 7 to Morin and Maita, Misiakos and Tsamakis, or Barber
+mobility  0 to 1 of the way from Eqs. 8 to 10 to Arora, Hauser and Roulston
+profile   0 to 5 % of the dopant has diffused up to 1.6 times as far
+legs      resistivity bent by up to 20 % at 1000 K, either way
+chip      ends of the legs warm up by 0 to 4 K/mW of the lever's power
+
+Their parameters, dimensions and doping are off the owner's probe file by what is usual (dimensions
+5 %, doping 15 %), currents and reader have 0.2 % of noise, and five Raman temperatures have 5 K
+each, which is stated, and 1.5 % of the rise in common. In air losses are those of a plate in free
+air, whose conductivity is off by 3 %. Of each `hotlever calibrate` is asked, as a user would.
+
+Sources: Asheghi et al., J. Appl. Phys. 91, 5079 (2002) and Liu and Asheghi, J. Heat Transfer 128,
+75 (2006) for films; Arora et al., IEEE Trans. Electron Devices 29, 292 (1982); Chapman et al., J.
+Appl. Phys. 34, 3291 (1963) for legs; those of carriers stand in the solver.
+
+    python benchmarks/foreign_levers.py [LEVERS]          14 if left out; all departures together
+        [--families all|each|none|film,legs,...] [--kinds current,reader,spectra]
+        [--media vacuum,air] [--first K] [--options '--laws paper'] [--processes N]
+        [--results FILE]        append a line for each, and go on with those that are not there
+    python benchmarks/foreign_levers.py --check           levers without departures, beside hotlever
+    python benchmarks/foreign_levers.py --write DIR ...   data and probe files instead
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from foreign_solver import Laws, Lever, Sweep
+from problems import table
+
+FAMILIES = ("film", "carriers", "mobility", "profile", "legs", "chip")
+KINDS, MEDIA = ("current", "reader", "spectra"), ("vacuum", "air")
+#: What the owner believes to have.
+NOMINAL: dict[str, dict[str, float]] = {
+    "three-leg": {
+        "length_um": 54.4,
+        "centre_leg_width_um": 6.44,
+        "outer_leg_width_um": 3.46,
+        "gap_um": 3.2,
+        "bridge_width_um": 3.82,
+        "heater_length_um": 4.0,
+        "heater_width_um": 1.645,
+        "thickness_um": 0.4,
+    },
+    "u-shape": {
+        "length_um": 60.0,
+        "leg_width_um": 6.0,
+        "gap_um": 6.0,
+        "bridge_width_um": 4.0,
+        "heater_length_um": 4.0,
+        "heater_width_um": 1.645,
+        "thickness_um": 0.4,
+    },
+}
+#: By how much levers scatter about it, as shares: of silicon half as much again as Table II.
+DIMENSIONS, DOPING, SERIES, BASE_K, AIR = 0.05, 0.15, 1e-3, 1.0, 0.03
+SILICON = {"c_kappa": 0.085, "delta": 0.17, "p": 0.053, "a0": 0.086, "a1": 0.088}
+ROWS, NOISE = 40, 2e-3
+SPECTRA, SPECTRUM_K, COMMON = 5, 5.0, 0.015
+#: Where the data end: the tip (K), from and to, and the highest bias (V).
+ENDS_K, HIGHEST_V = (1000.0, 1300.0), {"vacuum": 13.0, "air": 15.0}
+#: Borders between the ranges of the true temperature (K) for which errors are compared.
+RANGES = (400.0, 600.0, 800.0, 1000.0, 1300.0)
+#: Half the width of a band of 95 %, in standard deviations.
+BAND = 1.96
+
+
+@dataclass(frozen=True)
+class Task:
+    """A lever that is measured in one way: number, departures, medium and kind of data."""
+
+    number: int
+    family: str
+    medium: str
+    kind: str
+
+
+def foreign_lever(number: int, family: str, medium: str) -> Lever:
+    """Return the lever of a number; the same with all departures, one, or none of them."""
+    rng = np.random.default_rng(number)
+    shape = "three-leg" if number % 2 == 0 else "u-shape"
+
+    def off(value: float, spread: float) -> float:
+        return float(value * np.exp(spread * rng.standard_normal()))
+
+    dimensions = {name: off(size, DIMENSIONS) for name, size in NOMINAL[shape].items()}
+    plain = Laws()
+    silicon = {name: off(getattr(plain, name), spread) for name, spread in SILICON.items()}
+    laws = replace(plain, n_d=off(plain.n_d, DOPING), **silicon)
+    series, base = off(5.6, SERIES), 293.0 + BASE_K * rng.standard_normal()
+    air = off(1.0, AIR)
+    departures: dict[str, dict[str, Any]] = {
+        "film": {"surface_share": rng.uniform(0.0, 1.0)},
+        "carriers": {
+            "carriers": str(rng.choice(["Morin and Maita", "Misiakos and Tsamakis", "Barber"])),
+            "carriers_share": rng.uniform(0.0, 1.0),
+        },
+        "mobility": {"arora_share": rng.uniform(0.0, 1.0)},
+        "profile": {"tail_share": rng.uniform(0.0, 0.05), "tail_length": rng.uniform(1.0, 1.6)},
+        "legs": {"legs_bend": rng.uniform(-0.2, 0.2)},
+    }
+    chip = float(rng.uniform(0.0, 4.0))
+    for name, changes in departures.items():
+        if family in ("all", name):
+            laws = replace(laws, **changes)
+    return Lever(
+        shape,
+        dimensions,
+        laws,
+        series_kohm=series,
+        base_K=base,
+        chip_K_per_mW=chip if family in ("all", "chip") else 0.0,
+        in_air=medium == "air",
+        air_scale=air,
+    )
+
+
+def measured(task: Task, sweep: Sweep, base_K: float) -> tuple[str, np.ndarray]:
+    """Return the text of a measurement file, and its biases."""
+    rng = np.random.default_rng((task.number, 1))
+    end = sweep.bias_V[-1]
+    bias = np.linspace(end / ROWS, end, ROWS)
+    current, reader, tip = sweep.at(bias)
+    current = current * (1.0 + NOISE * rng.standard_normal(ROWS))
+    reader = reader * (1.0 + NOISE * rng.standard_normal(ROWS))
+    columns = {"V_b (V)": bias, "I_h (mA)": current}
+    if task.kind == "reader":
+        columns["V_r (V)"] = reader
+    if task.kind == "spectra":
+        common, alone = rng.standard_normal(), rng.standard_normal(SPECTRA)
+        at = np.linspace(RANGES[0], 0.98 * tip[-1], SPECTRA)
+        rows = np.searchsorted(tip, at).clip(0, ROWS - 1)
+        spectra, errors = np.full(ROWS, np.nan), np.full(ROWS, np.nan)
+        rise = (tip[rows] - base_K) * (1.0 + COMMON * common)
+        spectra[rows], errors[rows] = base_K + rise + SPECTRUM_K * alone, SPECTRUM_K
+        columns |= {"T_tip (K)": spectra, "dT_tip (K)": errors}
+    lines = [f"# medium: {task.medium}", ",".join(columns)]
+    for cells in zip(*columns.values(), strict=True):
+        lines.append(",".join("" if np.isnan(cell) else f"{cell:.7g}" for cell in cells))
+    return "\n".join(lines) + "\n", bias
+
+
+def owners_probe(shape: str, medium: str) -> str:
+    """Return the probe file of the owner."""
+    return "\n".join(
+        [
+            "[probe]",
+            f'shape = "{shape}"',
+            *(f"{name} = {size}" for name, size in NOMINAL[shape].items()),
+            *(["reader_length_um = 4.0"] if shape == "three-leg" else []),
+            "[circuit]",
+            "series_resistance_ohm = 5600",
+            "base_temperature_K = 293",
+            "[material]",
+            *(f"{name} = {getattr(Laws(), name):.6g}" for name in (*SILICON, "n_d")),
+            "[surroundings]",
+            f'medium = "{medium}"',
+            "",
+        ]
+    )
+
+
+def judge(levers: list[Task], options: list[str]) -> list[dict[str, Any]]:
+    """Solve the lever that some tasks share, calibrate it by each, and compare with the truth."""
+    number, family, medium = levers[0].number, levers[0].family, levers[0].medium
+    lever = foreign_lever(number, family, medium)
+    hottest = np.random.default_rng((number, 2)).uniform(*ENDS_K)
+    sweep = lever.sweep(hottest, HIGHEST_V[medium])
+    return [judged(task, lever, sweep, options) for task in levers]
+
+
+def judged(task: Task, lever: Lever, sweep: Sweep, options: list[str]) -> dict[str, Any]:
+    """Calibrate a lever that is solved; return what can be written as JSON.
+
+    By range of the true temperature: ``inside``, the share of rows in the band, and mean squares of
+    the error (``off``), of the stated one (``stated``) and of their ratio.
+    """
+    text, bias = measured(task, sweep, lever.base_K)
+    record: dict[str, Any] = {**task.__dict__, "shape": lever.shape, "ranges": {}}
+    began = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "iv.csv").write_text(text)
+        Path(folder, "probe.toml").write_text(owners_probe(lever.shape, task.medium))
+        words = ["calibrate", "iv.csv", "--probe", "probe.toml", "-o", "out.json", *options]
+        done = subprocess.run(
+            [sys.executable, "-m", "hotlever", *words], cwd=folder, capture_output=True, text=True
+        )
+        record["seconds"] = round(time.perf_counter() - began, 1)
+        if done.returncode:
+            reason = done.stderr.strip().rpartition("\n")[2]
+            return record | {"outcome": "refused", "reason": reason}
+        found = json.loads(Path(folder, "out.json").read_text())
+    outcomes = {True: "described", False: "not described", None: "not converged"}
+    record |= {"outcome": outcomes[found["describes_data"]], "reason": found["reason"]}
+    rows = [r for r in found["table"] if r["tip_K"] is not None and r["tip_low_K"] is not None]
+    rows = [r for r in rows if bias[0] <= r["bias_V"] <= bias[-1]]
+    low, tip, high = (
+        np.array([r[name] for r in rows]) for name in ("tip_low_K", "tip_K", "tip_high_K")
+    )
+    true = sweep.at(np.array([r["bias_V"] for r in rows]))[2]
+    off = tip - true
+    stated = np.where(off > 0, tip - low, high - tip) / BAND
+    for start, end in pairwise(RANGES):
+        there = (true >= start) & (true < end)
+        if there.any():
+            record["ranges"][f"{start:g}"] = {
+                "inside": float(np.mean((low <= true) & (true <= high), where=there)),
+                "off": float(np.mean(off**2, where=there)),
+                "stated": float(np.mean(stated**2, where=there)),
+                "ratio": float(np.mean((off / stated) ** 2, where=there)),
+                "mean": float(np.mean(off, where=there)),
+            }
+    return record
+
+
+def summary(records: list[dict[str, Any]]) -> list[list[str]]:
+    """Return rows of the table, for each range and pooled; each lever counts once."""
+    described = [record for record in records if record["outcome"] == "described"]
+    rows = []
+    for start, end in pairwise(RANGES):
+        some = [r["ranges"][f"{start:g}"] for r in described if f"{start:g}" in r["ranges"]]
+        rows.append([f"{start:g}–{end:g} K", *cells(some)])
+    pooled = []
+    for record in described:
+        if parts := list(record["ranges"].values()):
+            pooled.append({name: np.mean([p[name] for p in parts]) for name in parts[0]})
+    return [*rows, ["pooled", *cells(pooled)]]
+
+
+def cells(parts: list[dict[str, float]]) -> list[str]:
+    """Return the cells of a row: levers, error made, stated, both together, share inside."""
+    if not parts:
+        return ["0", "", "", "", "", ""]
+    mean = {name: float(np.mean([part[name] for part in parts])) for name in parts[0]}
+    made, stated, ratio = (np.sqrt(mean[name]) for name in ("off", "stated", "ratio"))
+    inside, off = f"{mean['inside']:.0%}", f"{mean['mean']:+.0f} K"
+    return [str(len(parts)), f"{made:.1f} K", f"{stated:.1f} K", f"{ratio:.2f}", inside, off]
+
+
+def report(records: list[dict[str, Any]]) -> None:
+    """Print the table of each kind of data and family."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for record in records:
+        groups.setdefault((record["kind"], record["family"]), []).append(record)
+    heads = ["true temperature", "levers", "error made", "stated", "over stated", "inside", "mean"]
+    for (kind, family), group in groups.items():
+        outcomes = Counter(record["outcome"] for record in group)
+        print(f"\n## {kind}, departures: {family}\n")
+        print(f"{outcomes['described']} of {len(group)} described, {dict(outcomes)}\n")
+        table(heads, summary(group))
+        for record in group:
+            if record["outcome"] != "described":
+                print(f"  {record['number']} {record['medium']}: {record['reason'][:150]}")
+
+
+def check() -> None:
+    """Print how far levers without departures are off hotlever's, in currents and temperatures."""
+    from hotlever import Lever as OurLever
+    from hotlever import Probe
+
+    rows = []
+    for shape, probe in (("three-leg", Probe.reference()), ("u-shape", Probe.u_shape())):
+        for medium in MEDIA:
+            lever = Lever(shape, NOMINAL[shape], in_air=medium == "air")
+            sweep = lever.sweep(ENDS_K[1], HIGHEST_V[medium])
+            bias = np.linspace(1.0, sweep.bias_V[-1], 30)
+            current, reader, tip = sweep.at(bias)
+            ours = OurLever(probe.in_medium(medium)).sweep(bias)
+            apart = [np.abs(current / ours.current_mA.values - 1.0).max()]
+            if "reader_V" in ours:
+                apart.append(np.abs(reader / ours.reader_V.values - 1.0).max())
+            cells = [f"{value:.1e}" for value in apart] + [""] * (2 - len(apart))
+            kelvin = np.abs(tip - ours.tip_K.values).max()
+            rows.append([shape, medium, *cells, f"{kelvin:.2f}", f"{tip[-1]:.0f}"])
+    table(["lever", "medium", "I_h (relative)", "V_r (relative)", "T_tip (K)", "up to (K)"], rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("levers", nargs="?", type=int, default=14)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--families", default="all")
+    parser.add_argument("--kinds", default="current")
+    parser.add_argument("--media", default="vacuum")
+    parser.add_argument("--options", default="", help="more words for hotlever calibrate")
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--results", type=Path)
+    parser.add_argument("--write", type=Path, metavar="DIR")
+    parser.add_argument("--check", action="store_true")
+    told = parser.parse_args()
+    if told.check:
+        return check()
+    families = FAMILIES if told.families == "each" else told.families.split(",")
+    tasks = [
+        Task(number, family, medium, kind)
+        for family in families
+        for medium in told.media.split(",")
+        for number in range(told.first, told.first + told.levers)
+        for kind in told.kinds.split(",")
+        if kind != "reader" or number % 2 == 0  # a U-shape has no reader
+    ]
+    records = []
+    if told.results and told.results.exists():
+        records = [json.loads(line) for line in told.results.read_text().splitlines()]
+    done = {tuple(r[name] for name in Task.__dataclass_fields__) for r in records}
+    groups: dict[tuple[int, str, str], list[Task]] = {}
+    for task in tasks:
+        if (task.number, task.family, task.medium, task.kind) not in done:
+            groups.setdefault((task.number, task.family, task.medium), []).append(task)
+    if told.write:
+        return write(told.write, list(groups.values()))
+    with ProcessPoolExecutor(told.processes, get_context("spawn")) as pool:
+        options = shlex.split(told.options)
+        for found in pool.map(judge, groups.values(), [options] * len(groups)):
+            records += found
+            for record in found:
+                words = " ".join(str(record[name]) for name in Task.__dataclass_fields__)
+                print(f"{words}: {record['outcome']}", file=sys.stderr, flush=True)
+                if told.results:
+                    with told.results.open("a") as file:
+                        file.write(json.dumps(record) + "\n")
+    asked = {(t.number, t.family, t.medium, t.kind) for t in tasks}
+    report([r for r in records if (r["number"], r["family"], r["medium"], r["kind"]) in asked])
+    return None
+
+
+def write(folder: Path, groups: list[list[Task]]) -> None:
+    """Write data, probe files and the truth of levers, to try the command line."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for tasks in groups:
+        number, family, medium = tasks[0].number, tasks[0].family, tasks[0].medium
+        lever = foreign_lever(number, family, medium)
+        hottest = np.random.default_rng((number, 2)).uniform(*ENDS_K)
+        sweep = lever.sweep(hottest, HIGHEST_V[medium])
+        name = f"{family}-{medium}-{number}"
+        (folder / f"{name}.toml").write_text(owners_probe(lever.shape, medium))
+        states = np.column_stack([sweep.bias_V, *sweep.rows])
+        np.savetxt(folder / f"{name}-true.csv", states, "%.7g", ",", header="V_b,I_h,V_r,T_tip")
+        for task in tasks:
+            text, _ = measured(task, sweep, lever.base_K)
+            (folder / f"{name}-{task.kind}.csv").write_text(text)
+
+
+if __name__ == "__main__":
+    main()
