@@ -30,12 +30,12 @@ from hotlever import Measurement, Probe, fit
 from hotlever.contact.law import INTERFACE, ContactLaw
 from hotlever.contact.resistances import cold_resistance
 from hotlever.estimation.experiment import ExperimentAtRest
-from hotlever.estimation.noise import METERS
 from hotlever.estimation.over_a_sample import with_distances
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe.parameters import usual_parameters
+from hotlever.probe.priors import METERS
 from hotlever.quantities import FITTED
 from problems import table
 

@@ -392,6 +392,7 @@ QUANTITIES = {
         Quantity("shift_per_cm", "cm-1", "shift of the line against room temperature"),
         Quantity("temperature_K", "K", "tip temperature"),
         Quantity("temperature_error_K", "K", "standard error of the tip temperature"),
+        Quantity("temperature_noise_K", "K", "part of its error independent of the others'"),
         Quantity("error", "K", "line reads less true temperature"),
         Quantity("paper_error", "K", "error stated in the paper"),
     )

@@ -17,6 +17,7 @@ from hotlever.estimation.experiment import TIP
 from hotlever.estimation.surrogate import Rows
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
+from hotlever.probe.priors import THERMOMETER
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 
@@ -116,7 +117,7 @@ def test_of_levers_drawn_from_the_priors_one_in_a_hundred_is_hotter_than_said():
 
 def test_spectra_at_one_bias_do_not_beat_the_scale_of_their_thermometer():
     plan = plan_next(bias=np.array([6.4]), allowed={"spectra": None}, count=60)
-    common, then = 0.02 * (plan.at_K - 293.0), plan.proposals.stderr_then_K.values
+    common, then = THERMOMETER * (plan.at_K - 293.0), plan.proposals.stderr_then_K.values
     assert then[0] > 1.5 * common
     assert then[-1] == pytest.approx(common, rel=0.1)
 

@@ -213,11 +213,22 @@ def test_other_comments_are_no_matter(tmp_path, comment):
         ("medium: air, 1,013 mbar", "line 1: found '1,013 mbar', expected no mark of thousands"),
         ("medium: air, -5 mbar", "line 1: pressure: found -5 mbar"),
         ("pressure (K): 5", "line 1: pressure: unit 'K' is not understood here"),
+        ("raman_scale: 3 K", "line 1: raman_scale = '3 K', expected a value and its spread"),
+        ("raman_scale: ± 3 K", "line 1: raman_scale = '± 3 K', expected a value and its spread"),
+        ("raman_scale = ± 80 %", "line 1: raman_scale = '± 80 %', expected a share such as"),
     ],
 )
 def test_impossible_settings_are_refused(tmp_path, comment, message):
     with pytest.raises(InputError, match=message):
         read(tmp_path, f"# {comment}\n{PLAIN}")
+
+
+def test_the_scale_of_a_thermometer_is_read_and_said(tmp_path):
+    data = read(tmp_path, f"# base temperature (K): 293\n# Raman scale = ± 1.2 %\n{PLAIN}")
+    assert data.raman_scale == pytest.approx(0.012)
+    assert ("raman_scale", "0.012 of the rise", "line 2") in data.understood
+    assert data.notes == ()
+    assert read(tmp_path, PLAIN).raman_scale is None
 
 
 # --- notes, and data that no lever can show ------------------------------------------------

@@ -7,12 +7,14 @@ import pytest
 import xarray as xr
 
 from hotlever.errors import InputError
+from hotlever.estimation.noise import errors_of_scales
 from hotlever.measurement import read_measurement
+from hotlever.probe.priors import THERMOMETER
 from hotlever.raman.tables import join, read_bias_log
 
 
 def read(*spectra):
-    """A table of spectra, each a name or (name, temperature, error)."""
+    """A table of spectra, each a name or (name, temperature, error); these are independent."""
     rows = [(one, 500.0, 3.0) if isinstance(one, str) else one for one in spectra]
     names, temperatures, errors = zip(*rows, strict=True)
     return xr.Dataset(
@@ -20,7 +22,9 @@ def read(*spectra):
             "file": ("spectrum", np.array(names)),
             "temperature_K": ("spectrum", np.array(temperatures)),
             "temperature_error_K": ("spectrum", np.array(errors)),
-        }
+            "temperature_noise_K": ("spectrum", np.array(errors)),
+        },
+        attrs={"room_temperature_K": 293.0},
     )
 
 
@@ -34,9 +38,9 @@ def test_join_gives_the_measurement_file_by_file_column(run, examples, tmp_path)
     lines = out.read_text().splitlines()
     log = (examples / "bias-log.csv").read_text().splitlines()
     assert lines[:4] == log[:4]  # comments as they were
-    assert lines[4] == "V_b (V),I_h (mA),V_r (mV),file,T_tip (K),dT_tip (K)"
-    assert lines[5].startswith("1.0000,0.14338,60.12,tip_00.txt,29")
-    assert all(float(line.split(",")[-1]) > 0 for line in lines[5:])
+    assert lines[5] == "V_b (V),I_h (mA),V_r (mV),file,T_tip (K),dT_tip (K)"
+    assert lines[6].startswith("1.0000,0.14338,60.12,tip_00.txt,29")
+    assert all(float(line.split(",")[-1]) > 0 for line in lines[6:])
     data = read_measurement(out)
     assert data.series_resistance_ohm == 5600.0
     assert np.all(np.diff(data.tip_K) > 0)
@@ -49,6 +53,7 @@ def test_join_by_bias_in_the_name_leaves_other_rows_empty(tmp_path):
     found = read(("tip_11V.txt", 1200.4, 9.04), "tip_5.25V.txt")
     assert join(read_bias_log(log), found).splitlines() == [
         "# medium: vacuum",
+        "# raman_scale: ± 1.5 %",
         "V_b (V),I_h (mA),T_tip (K),dT_tip (K)",
         "1.0000,0.14,,",
         "5.2500,0.80,500.0,3.0",
@@ -63,7 +68,7 @@ def test_a_negative_bias_in_a_name_is_one(tmp_path):
     found = read(
         ("tip_-1V.txt", 310.0, 1.0), ("tip_-2V.txt", 340.0, 1.0), ("tip_1V.txt", 311.0, 1.0)
     )
-    rows = join(read_bias_log(log), found).splitlines()[1:]
+    rows = join(read_bias_log(log), found).splitlines()[2:]
     assert [row.split(",")[2] for row in rows] == ["340.0", "310.0", "311.0"]
 
 
@@ -73,7 +78,7 @@ def test_a_log_of_two_sweeps_names_its_columns_twice(tmp_path):
     table = read_bias_log(log)
     assert (table.names, table.rows) == (["V_b (V)", "I_h (mA)"], [["1", "0.14"], ["2", "0.28"]])
     joined = join(table, read("a_1V.txt", "a_2V.txt")).splitlines()
-    assert joined[1:] == ["1,0.14,500.0,3.0", "2,0.28,500.0,3.0"]
+    assert joined[2:] == ["1,0.14,500.0,3.0", "2,0.28,500.0,3.0"]
 
 
 def test_join_by_order_keeps_the_files_dialect_and_replaces_old_temperatures(tmp_path):
@@ -81,6 +86,7 @@ def test_join_by_order_keeps_the_files_dialect_and_replaces_old_temperatures(tmp
     log.write_text("V_b (mV);T_tip (K);dT_tip (K);I_h (mA)\n1000,5;999;9;0,14\n2000,5;;;0,28\n")
     found = read("a.txt", ("b.txt", np.nan, np.nan))
     assert join(read_bias_log(log), found).splitlines() == [
+        "# raman_scale: ± 1.5 %",
         "V_b (mV);I_h (mA);T_tip (K);dT_tip (K)",
         "1000,5;0,14;500,0;3,0",
         "2000,5;0,28;;",
@@ -116,4 +122,54 @@ def test_an_error_below_a_tenth_of_a_kelvin_is_not_written_as_none(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("V_b (V),I_h (mA)\n1,0.14\n")
     lines = join(read_bias_log(log), read(("a.txt", 295.0, 0.031))).splitlines()
-    assert lines[1] == "1,0.14,295.0,0.031"
+    assert lines[2] == "1,0.14,295.0,0.031"
+
+
+RISE = np.array([10.0, 200.0, 500.0, 800.0])
+
+
+def of_rises(own_K, common_K):
+    """A table of spectra of these rises above 293 K."""
+    found = read(*((f"{number}.txt", 293.0 + rise, 1.0) for number, rise in enumerate(RISE)))
+    found["temperature_noise_K"] = "spectrum", own_K
+    found["temperature_error_K"] = "spectrum", np.hypot(own_K, common_K)
+    return found
+
+
+def joined_measurement(folder, found, head=""):
+    log, out = folder / "log.csv", folder / "joined.csv"
+    log.write_text(f"{head}V_b (V),I_h (mA)\n1,0.14\n2,0.28\n3,0.4\n4,0.5\n")
+    out.write_text(join(read_bias_log(log), found))
+    return read_measurement(out)
+
+
+def test_what_temperatures_have_in_common_is_stated_as_the_scale_and_read_back(tmp_path):
+    """An error of 2 % of each rise, common to all, beside 3 K of each."""
+    own = np.full(4, 3.0)
+    data = joined_measurement(tmp_path, of_rises(own, 0.02 * RISE))
+    np.testing.assert_allclose(data.tip_error_K, 3.0)
+    assert data.raman_scale == pytest.approx(np.hypot(0.02, THERMOMETER))
+    (error,) = errors_of_scales(data, ["tip"], {}, 293.0)
+    np.testing.assert_allclose(error.errors, 0.025 * RISE)
+
+
+def test_an_error_in_common_that_does_not_grow_with_the_rise_is_not_lost(tmp_path):
+    """5 K for all, as by the laser: each stated error holds what its share of the rise does not."""
+    own = np.full(4, 3.0)
+    data = joined_measurement(tmp_path, of_rises(own, np.full(4, 5.0)))
+    share_squared = data.raman_scale**2 - THERMOMETER**2
+    total = data.tip_error_K**2 + share_squared * RISE**2
+    assert np.all(total > 0.97 * (own**2 + 5.0**2))
+    assert data.tip_error_K[0] == pytest.approx(np.hypot(3.0, 5.0), rel=0.02)
+    assert data.tip_error_K[-1] == pytest.approx(3.0)
+
+
+def test_a_log_that_states_the_scale_keeps_it_unless_it_was_joined_before(tmp_path):
+    found = of_rises(np.full(4, 3.0), 0.02 * RISE)
+    data = joined_measurement(tmp_path, found, "# raman_scale: ± 0.5 %\n")
+    assert data.raman_scale == 0.005
+    joined = (tmp_path / "joined.csv").read_text()
+    (tmp_path / "again.csv").write_text(joined)
+    again = join(read_bias_log(tmp_path / "again.csv"), found)
+    assert again.splitlines()[0] == "# raman_scale: ± 2.5 %"
+    assert again.count("raman_scale") == 1

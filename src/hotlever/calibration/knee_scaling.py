@@ -26,7 +26,6 @@ from hotlever.calibration.knee import (
 from hotlever.calibration.power_law import PowerLaw, law_of_model, power_turns
 from hotlever.calibration.table import BUDGETS, table_by_bias
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation.noise import METERS
 from hotlever.lever import Branch, OperatingPoint
 from hotlever.lever.branch import Reach, shifted
 from hotlever.lever.lever import COARSE, Lever
@@ -35,7 +34,7 @@ from hotlever.measurement import Measurement
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
 from hotlever.probe.parameters import RESISTANCE
-from hotlever.probe.priors import default_priors
+from hotlever.probe.priors import METERS, default_priors
 from hotlever.text import value_with_error
 from hotlever.types import Array
 

@@ -18,7 +18,6 @@ from hotlever.calibration.calibration import Calibration
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimation import FitOptions, Measurement
 from hotlever.estimation.experiment import TIP
-from hotlever.estimation.noise import METERS
 from hotlever.estimation.optimal_design import Information, NoiseLaw
 from hotlever.estimation.optimiser import DISCREPANCY
 from hotlever.estimation.posterior import standard_errors
@@ -28,9 +27,9 @@ from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
-from hotlever.probe.priors import SCALES, Prior, known_beforehand
+from hotlever.probe.priors import METERS, SCALES, THERMOMETER, Prior, known_beforehand
 from hotlever.quantities import FITTED
-from hotlever.spieser2017 import RAMAN_ERROR_K, RAMAN_ERROR_SHARE
+from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.text import BAND
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS
@@ -38,7 +37,7 @@ from hotlever.units import MOST_BIAS
 #: Observables whose scale is an unknown, in order.
 _SCALED = {observable: scale for scale, observable in SCALES.items()}
 #: Noise of a thermometer and of meters that nobody has stated.
-_USUAL_NOISE = {"tip": NoiseLaw(RAMAN_ERROR_K, RAMAN_ERROR_SHARE)}
+_USUAL_NOISE = {"tip": NoiseLaw(RAMAN_ERROR_K, 0.0)}
 _USUAL_OF_METERS = NoiseLaw(0.0, 1e-3)
 
 
@@ -115,7 +114,7 @@ class LinearisedLever:
             )
         probe.circuit.need_cold_start("what to measure next")
         values = {name: prior.value for name, prior in priors.items() if name not in SCALES}
-        shares = dict.fromkeys(SCALES, METERS) | {_SCALED["tip"]: RAMAN_ERROR_SHARE}
+        shares = dict.fromkeys(SCALES, METERS) | {_SCALED["tip"]: THERMOMETER}
         scales = {name: Prior(1.0, share) for name, share in shares.items()}
         names = FitOptions(priors=priors).of(probe).varied
         return cls(probe.replace(values), names, {**scales, **priors}, None, {})

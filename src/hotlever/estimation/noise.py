@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from hotlever.measurement import Measurement
 from hotlever.measurement.data import noise_about_neighbours
-from hotlever.probe.priors import SCALES, Prior, PriorShift
-from hotlever.spieser2017 import RAMAN_ERROR_SHARE
+from hotlever.probe.priors import METERS, SCALES, THERMOMETER, Prior, PriorShift
 from hotlever.types import Array
 
 #: Shares of the variance that are in proportion to the square of what is shown; of all of it, data
@@ -31,10 +30,6 @@ _SHARES = np.array([0.0, 0.5, 0.8, 0.95, 0.99])
 _TAILS, _ROUNDS = 4.0, 20
 #: A datum that alone decides a parameter says nothing of its noise.
 _LEAST_FREE = 0.05
-#: Standard error of a meter's scale, relative.
-METERS = 1e-3
-#: Rise (K) from which a stated error tells the scale of a thermometer.
-_WARM_K = 100.0
 #: Huber's weights lessen from here on; the others are full up to, and nothing beyond, so many
 #: standard deviations: data without outliers keep nearly all of theirs, and their scatter.
 _HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
@@ -298,8 +293,9 @@ def errors_of_scales(
 ) -> list[CommonError]:
     """Return the errors of the meters' and the thermometer's scales, as known before.
 
-    That of a thermometer is relative to the rise above the base. Where no prior says how large it
-    is, it is as large as what the measurement states of each temperature, or as the paper's.
+    That of a thermometer is relative to the rise above the base. A prior says how large it is, else
+    the measurement, else it is the usual one. What a measurement states of each temperature is no
+    part of it.
     """
     errors = []
     for name, observable in SCALES.items():
@@ -309,9 +305,8 @@ def errors_of_scales(
         share = METERS
         if observable == "tip":
             magnitudes = np.abs(magnitudes - base_temperature_K)
-            stated = measurement.tip_error_K / np.maximum(magnitudes, _WARM_K)
-            is_stated = np.isfinite(stated).any()
-            share = float(np.nanmedian(stated)) if is_stated else RAMAN_ERROR_SHARE
+            stated = measurement.raman_scale
+            share = THERMOMETER if stated is None else stated
         if name in priors:
             share = priors[name].spread
         errors.append(CommonError(name, observable, share, share * magnitudes))

@@ -142,6 +142,7 @@ class MeasurementSection(Section):
     medium: Medium | None = None
     gas_conductivity: float | None = None
     pressure_mbar: float | None = None
+    raman_scale: float | None = IF_ANY
     columns: dict[str, Vector]
     rows: _Counts | None = IF_ANY
     time_us: _Times | None = IF_ANY

@@ -14,6 +14,7 @@ from hotlever.materials.air import ATMOSPHERE
 from hotlever.measurement.columns import Column
 from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
 from hotlever.probe import Circuit
+from hotlever.probe.priors import share_of
 from hotlever.quantities import FITTED, MEASURANDS
 from hotlever.tables import TextTable
 from hotlever.types import Array, Mask
@@ -36,6 +37,7 @@ _SETTINGS = {
     "medium": ("medium", ""),
     "pressure_mbar": ("pressure", "mbar"),
     "gas_conductivity": ("gas conductivity", "of air's"),
+    "raman_scale": ("raman_scale", "of the rise"),
 }
 #: Those that the probe gives where a file is silent.
 _OF_THE_PROBE = ("series_resistance_ohm", "base_temperature_K", "medium")
@@ -50,6 +52,7 @@ _SPELLINGS = {
     ),
     **dict.fromkeys(("medium", "gas", "atmosphere", "environment", "surroundings"), "medium"),
     "p": "pressure_mbar",
+    "ramanscale": "raman_scale",
 }
 #: Where a comment is split: at ``; ``, and at ``, `` and tabs where another setting follows.
 _BETWEEN = re.compile(r";\s|, (?=(?:[^,=:]|,(?! ))*[=:])|\t(?=[^\t=:]*[=:])")
@@ -188,6 +191,8 @@ def _setting(text: str, where: str) -> dict[str, Any] | None:
     attribute = "pressure_mbar" if bare.endswith("pressure") else _SPELLINGS.get(bare)
     if value and attribute == "medium":
         return _gas(value, where) if bare == "medium" or _words(value) & _GASES else None
+    if value and attribute == "raman_scale":
+        return {attribute: share_of(value[:_LONGEST], f"{where}: {attribute}")}
     if value and attribute:
         setting, inside = _SETTINGS[attribute]
         where = f"{where}: {setting}"

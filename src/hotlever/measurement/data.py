@@ -40,7 +40,7 @@ class Measurement:
     Attributes
     ----------
     bias_V, current_mA, reader_V, tip_K, tip_error_K : ndarray, shape (n,)
-        The last is the standard error of the tip temperature.
+        The last is the standard error of each tip temperature, independent of the others'.
     current_error_mA, reader_error_V : ndarray, shape (n,), or None
         Standard errors of the others.
     bridge_output_V, bridge_output_error_V : ndarray, shape (n,), or None
@@ -58,6 +58,8 @@ class Measurement:
         If the file says it.
     gas_conductivity, pressure_mbar : float or None
         Of the gas, over that of dry air, and its pressure, if the file says them.
+    raman_scale : float or None
+        By what share of the rise all tip temperatures may be off together, if the file says it.
     path, sha256 : str
         Origin; empty for data made in memory.
     notes : tuple of str
@@ -94,6 +96,7 @@ class Measurement:
     distance_um: Array | None = None
     gas_conductivity: float | None = None
     pressure_mbar: float | None = None
+    raman_scale: float | None = None
     unused: tuple[str, ...] = ()
     understood: tuple[tuple[str, ...], ...] = ()
     rows: Array | None = None

@@ -37,6 +37,9 @@ SCALES = {
     "bridge_scale": "bridge",
     "raman_scale": "tip",
 }
+#: Their standard deviations where nothing is said, relative: of a meter, and of a thermometer, by
+#: the rise above the base (the hot plate's own accuracy, gradients in the laser's spot).
+METERS, THERMOMETER = 1e-3, 0.015
 #: The share of a prior's variance below which nothing is told of it.
 _LEAST_CONTRACTION = 1e-3
 #: Relative spreads that mean something.
@@ -246,9 +249,9 @@ def priors_of(
         if isinstance(text, Prior):
             priors[name] = text
         elif name in SCALES:
-            priors[name] = Prior(1.0, _share(text, here, ("share",)))
+            priors[name] = Prior(1.0, share_of(text, here))
         elif name == ALL_DIMENSIONS:
-            spread = _share(text, here, ("share", "factor"))
+            spread = share_of(text, here, ("share", "factor"))
             if not probe.shape.outline_moves:
                 raise InputError(
                     f"{here}: the outline of a drawing is taken as exact so far; expected "
@@ -266,8 +269,19 @@ def priors_of(
     return {name: prior for name, prior in priors.items() if name in counting or name in SCALES}
 
 
-def _share(text: str, where: str, allowed: tuple[Written, ...]) -> float:
-    """Return the spread of all dimensions, or of what an instrument shows, about what it is."""
+def share_of(text: str, where: str, allowed: tuple[Written, ...] = ("share",)) -> float:
+    """Return the spread of all dimensions, or of what an instrument shows, about what it is.
+
+    Raises
+    ------
+    InputError
+        If it is no such share; `where` names it.
+
+    Examples
+    --------
+    >>> share_of("± 1.5 %", "here")
+    0.015
+    """
     value, spread, written = parsed(text, where)
     if not (value is None and written in allowed and _LEAST <= spread <= _LARGEST_SHARE):
         raise InputError(

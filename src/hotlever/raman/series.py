@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -131,7 +131,8 @@ def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dat
     -------
     xarray.Dataset
         On dimension ``spectrum``: ``file``, the numbers of `DIGITS` (NaN where there is none), and
-        ``flags``, separated by semicolons.
+        ``flags``, separated by semicolons; with a thermometer ``temperature_noise_K``, the part of
+        each error that is its own, and the attribute ``room_temperature_K``.
     """
     names = [line.spectrum.name for line in lines]
     if len(set(names)) < len(names):
@@ -142,9 +143,14 @@ def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dat
     for column, peak in zip(numbers.T, (line.peak for line in lines), strict=True):
         if peak is not None:
             column[:3] = peak.centre, peak.centre_stderr, peak.fwhm
+    more: dict[str, Any] = {}
+    room: dict[str, Any] = (
+        {} if thermometer is None else {"room_temperature_K": thermometer.room_temperature_K}
+    )
     if thermometer is not None:
         reading = thermometer.read(numbers[0], numbers[1])
         numbers[3:] = reading.shift, reading.temperature, reading.error
+        more["temperature_noise_K"] = reading.noise
         missing = np.isnan(reading.temperature) & ~np.isnan(numbers[0])
         for flag, where in (("no-temperature", missing), ("extrapolated", reading.outside)):
             for spectrum in where.nonzero()[0].tolist():
@@ -154,13 +160,14 @@ def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dat
         "file": ("spectrum", np.array(names, dtype=str), {"long_name": "file"}),
         **dict(zip(DIGITS, numbers, strict=True)),
         "flags": ("spectrum", joined, {"long_name": "what was noticed"}),
+        **more,
     }
-    return labelled(columns, "spectrum")
+    return labelled(columns, "spectrum", **room)
 
 
 def to_csv(table: xr.Dataset) -> str:
     """The Raman CSV of a table from `read_lines`."""
-    frame = table.to_dataframe()
+    frame = table[["file", *DIGITS, "flags"]].to_dataframe()
     for name, digits in DIGITS.items():
         frame[name] = frame[name].map(f"{{:.{digits}f}}".format, na_action="ignore")
     return frame_text(frame, index=False, header=COLUMNS)

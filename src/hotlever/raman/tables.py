@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import os
 import re
 from collections import defaultdict
@@ -19,9 +20,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.errors import InputError, excerpt, unknown_name
+from hotlever.probe.priors import THERMOMETER
 from hotlever.raman.lineshape import PeakOptions
 from hotlever.raman.spectrum import Spectrum, aliases, file_and_label, sample_temperature
 from hotlever.tables import TextTable, read_table
+from hotlever.types import Array
 from hotlever.units import name_and_unit
 
 if TYPE_CHECKING:
@@ -34,6 +37,7 @@ _USE = {"": True, "yes": True, "no": False}
 TEMPERATURE, ERROR = "T_tip (K)", "dT_tip (K)"
 _BIAS = re.compile(r"(V_?b|bias)\b", re.I)
 _FILE = re.compile(r"(file|spectrum|spectra)\b", re.I)
+_SCALE = re.compile(r"\W*raman_?scale\b", re.I)
 _OLD = re.compile(r"d?T_?tip\b", re.I)
 _IN_NAME = re.compile(r"(?:^|[^0-9A-Za-z.,-])(-?\d+(?:[.,p]\d+)?)\s?V(?![a-zA-Z0-9])")
 
@@ -252,6 +256,11 @@ def join(log: TextTable, spectra: xr.Dataset) -> str:
     of tip temperatures that the log already had are replaced. Rows without a spectrum, or
     whose spectrum gave no temperature, get empty cells.
 
+    The error in its column is of each temperature alone. By how much all are off together, for the
+    calibration, laser heating and stress, is stated as ``raman_scale``, a share of the rise, with
+    what no spectrum tells (`hotlever.probe.priors.THERMOMETER`), unless the log says it. What of
+    those does not grow with the rise counts as of each.
+
     Parameters
     ----------
     log : TextTable
@@ -266,22 +275,40 @@ def join(log: TextTable, spectra: xr.Dataset) -> str:
     """
     matched = _match(log, [str(name) for name in spectra.file.values])
     keep = [j for j, name in enumerate(log.names) if not _OLD.match(name)]
+    comments = [line for _, line in log.comments]
+    if len(keep) < len(log.names):
+        comments = [line for line in comments if not _SCALE.match(line)]
+    errors, share = _own_and_common(spectra)
+    if not any(_SCALE.match(line) for line in comments):
+        comments.append(f"# raman_scale: ± {100.0 * math.hypot(share, THERMOMETER):.2g} %")
     out = io.StringIO()
-    for _, line in log.comments:
+    for line in comments:
         out.write(line + "\n")
     writer = csv.writer(out, delimiter=log.dialect.separator or ",", lineterminator="\n")
     writer.writerow([log.names[j] for j in keep] + [TEMPERATURE, ERROR])
-    temperature, error = spectra.temperature_K.values, spectra.temperature_error_K.values
+    temperature = spectra.temperature_K.values
     for cells, spectrum in zip(log.rows, matched, strict=True):
         numbers = ["", ""]
         if spectrum is not None and np.isfinite(temperature[spectrum]):
             # an error is never written as 0
-            digits = ".1f" if error[spectrum] >= 0.1 else ".2g"
-            numbers = [f"{temperature[spectrum]:.1f}", f"{error[spectrum]:{digits}}"]
+            digits = ".1f" if errors[spectrum] >= 0.1 else ".2g"
+            numbers = [f"{temperature[spectrum]:.1f}", f"{errors[spectrum]:{digits}}"]
             if log.dialect.decimal_comma:
                 numbers = [number.replace(".", ",") for number in numbers]
         writer.writerow([cells[j] for j in keep] + numbers)
     return out.getvalue()
+
+
+def _own_and_common(spectra: xr.Dataset) -> tuple[Array, float]:
+    """Split errors into those (K) of each temperature and the share of the rise common to all.
+
+    The share fits the variances in common best; what these have beyond it is added to each.
+    """
+    noise = spectra.temperature_noise_K.values
+    common = np.maximum(spectra.temperature_error_K.values**2 - noise**2, 0.0)
+    rise = (spectra.temperature_K.values - spectra.room_temperature_K) ** 2
+    share = np.nansum(common * rise) / max(float(np.nansum(rise**2)), 1e-300)
+    return np.sqrt(noise**2 + np.maximum(common - share * rise, 0.0)), math.sqrt(share)
 
 
 def _column(log: TextTable, pattern: re.Pattern[str]) -> int | None:

@@ -26,6 +26,7 @@ class Reading:
     shift: Array  #: (n,), against the line at room temperature, cm⁻¹
     temperature: Array  #: (n,), K; NaN where silicon has no such line
     error: Array  #: (n,), K
+    noise: Array  #: (n,), K; the part of the error that is each one's own: photon noise
     outside: np.ndarray  #: (n,), whether the temperature lies outside the calibrated range
 
 
@@ -61,6 +62,11 @@ class Thermometer:
             )
         _check("laser heating", self.laser_heating, 1e3, "K")
         _check("stress", self.stress, 1e4, "MPa")
+
+    @property
+    def room_temperature_K(self) -> float:
+        """At which the line is that shifts are taken from."""
+        return self.calibration.room_temperature_K
 
     def with_reference(self, peaks: Iterable[tuple[Peak, float | None]]) -> Thermometer:
         """Take the room-temperature line from spectra of the instrument as it is now.
@@ -101,7 +107,7 @@ class Thermometer:
             paper's ±(5 K + 0.02 ΔT) or, where larger, its distance from the anharmonic law;
             for the anharmonic law its distance from a parabola through the same points (the
             paper's band, where the constants are the published ones). Both grow outside the
-            calibrated range.
+            calibrated range. All but the photon noise is common to the lines.
         """
         calibration, room = self.calibration, self.calibration.room_temperature_K
         linear, law = calibration.linear, calibration.anharmonic
@@ -127,12 +133,13 @@ class Thermometer:
             spread = np.einsum("ni,ij,nj->n", gradient, covariance, gradient)
             variance = (noise**2 + np.maximum(spread, 0.0)) / slope**2
             model = self._model_error(at, slope)
+        own = np.abs(noise * (linear.slope_K_cm if self.law == "linear" else 1.0 / slope))
         variance = variance + model**2 + self.laser_heating**2
         variance = variance + (STRESS_SHIFT * self.stress / slope) ** 2
         error = np.where(exists, np.sqrt(variance), np.nan)
         low, high = calibration.range_K
         outside = (temperature < low - 2.0 * error) | (temperature > high)
-        return Reading(shift, temperature, error, outside)
+        return Reading(shift, temperature, error, np.where(exists, own, np.nan), outside)
 
     def _model_error(self, temperature: Array, slope: Array) -> Array:
         """How far the anharmonic law may be off, K: a second law through the same points.

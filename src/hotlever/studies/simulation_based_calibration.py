@@ -163,8 +163,7 @@ def measure(
         (alone, common), base = RAMAN, true.circuit.base_temperature_K
         scale = 1.0 + common * rng.standard_normal() * ("thermometer" in departures)
         rise = (tip - base)[some] * scale * (1.0 + alone * rng.standard_normal(some.size))
-        stated = np.hypot(alone, common) if "thermometer" in departures else alone
-        tips[some], errors[some] = base + rise, stated * (tip[some] - base)
+        tips[some], errors[some] = base + rise, alone * (tip[some] - base)
     current = noisy(sweep.current_mA.values)
     if "outliers" in departures and rng.random() < _SOME:
         outliers = rng.choice(POINTS, rng.integers(1, 3), replace=False)
