@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -143,6 +145,44 @@ def test_a_search_that_was_ended_says_that_it_has_not_converged(coarse):
     optimum = search.solve(far)
     assert not optimum.converged
     assert optimum.decrement > 1e-3 * search.objective.squares(optimum.prediction)
+
+
+def test_levers_of_earlier_searches_count_in_the_bound_of_an_estimate(coarse):
+    far = Probe.reference().with_(n_d=1.2e17, c_kappa=1.0)
+    residuals = Residuals(curve(Probe.reference(), 9.0, 15), ["current"])
+    model = full_experiment(coarse, residuals.bias).measuring(residuals.bias, residuals.measured)
+    predictor = Predictor(model, before=SearchOptions().most_in_estimate - 2)
+    objective = Objective(residuals, far, model.names, list(PARAMETERS))
+    assert not Optimiser(objective, predictor).solve(far).converged
+    assert predictor.evaluations == SearchOptions().most_in_estimate
+
+
+def test_of_the_levers_at_hand_only_the_latest_is_factorised(coarse):
+    model = full_experiment(coarse, np.linspace(0.5, 6.0, 5))
+    predictor = Predictor(model)
+    levers = [Probe.reference().with_(n_d=n_d) for n_d in (5e17, 5.2e17, 5.4e17)]
+    latest = [predictor.predict(lever) for lever in levers][-1]
+    assert latest.linearised.factors is not None
+    assert [other.linearised.factors for other in predictor.others(latest)] == [None, None]
+
+
+@pytest.mark.slow
+def test_a_search_in_air_of_a_lever_in_vacuum_takes_less_than_a_gigabyte(tmp_path):
+    """Freed factorisations stayed in pieces between others: 2.1 GB."""
+    probe = Probe.u_shape().with_(length_um=120.0)
+    data = curve(probe, 7.5, 40)
+    rows = (f"{v:.6g},{i:.7g}" for v, i in zip(data.bias_V, data.current_mA, strict=True))
+    (tmp_path / "iv.csv").write_text("\n".join(["V_b (V),I_h (mA)", *rows]))
+    probe.to_file(tmp_path / "probe.toml")
+    program = (
+        "import resource; from hotlever import fit, Probe; "
+        "fit('iv.csv', Probe.from_file('probe.toml'), medium='air'); "
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert int(done.stdout) < 1e6
 
 
 def test_levers_that_cannot_be_drawn_bound_a_search():

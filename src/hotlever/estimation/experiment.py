@@ -71,6 +71,11 @@ class Prediction:
     columns: dict[str, Array]
     tip_slopes: Array
 
+    @property
+    def light(self) -> Self:
+        """The same without factorised matrices, which only the next lever is solved with."""
+        return self
+
 
 def named(values: Array) -> dict[str, Array]:
     """Return what is shown, (observables, n), by the names that a sweep or a history has."""
@@ -119,11 +124,13 @@ class Predictor:
         Called with each prediction that is compared with the data.
     near : Prediction, optional
         Of a lever similar to that at which a search begins.
+    before : int
+        Levers solved before, by earlier searches of the same estimate.
 
     Attributes
     ----------
     evaluations : int
-        Levers solved.
+        Levers solved, with those.
     """
 
     def __init__(
@@ -132,8 +139,9 @@ class Predictor:
         progress: Progress | None = None,
         seen: Callable[[Prediction], None] | None = None,
         near: Prediction | None = None,
+        before: int = 0,
     ) -> None:
-        self.experiment, self.evaluations = experiment, 0
+        self.experiment, self.evaluations = experiment, before
         self._progress, self._seen = progress, seen
         self._at_hand = {} if near is None else {near.probe: near}
 
@@ -148,6 +156,7 @@ class Predictor:
 
     def _solved(self, probe: Probe) -> Prediction:
         near = next(reversed(self._at_hand.values()), None)
+        self._at_hand = {other: each.light for other, each in self._at_hand.items()}
         self.evaluations += 1
         try:
             prediction = self.experiment.predict(probe, near)
@@ -204,6 +213,12 @@ class PredictionAtRest(Prediction):
     surrogate: CurveSurrogate
     linearised: Linearised
     away: tuple[PredictionAtRest, ...] = ()
+
+    @property
+    def light(self) -> Self:
+        """See `Prediction`."""
+        away = tuple(each.light for each in self.away)
+        return replace(self, linearised=replace(self.linearised, factors=None), away=away)
 
 
 @dataclass(frozen=True)

@@ -272,9 +272,12 @@ class Search:
     progress: Progress | None = None
     seen: Callable[[Prediction], None] | None = None
 
-    def near(self, experiment: Experiment, start: Probe) -> Optimum:
-        """Search from a lever that is not far from the one that was measured."""
-        return self._optimiser(experiment, start).solve_and_confirm(start, self.robust)
+    def near(self, experiment: Experiment, start: Probe, before: int = 0) -> Optimum:
+        """Search from a lever that is not far from the one that was measured.
+
+        The levers that were solved `before` count.
+        """
+        return self._optimiser(experiment, start, before).solve_and_confirm(start, self.robust)
 
     def from_anywhere(self, experiment: ExperimentAtRest, measurement: Measurement) -> Optimum:
         """Search from a lever of which little may be known.
@@ -294,29 +297,31 @@ class Search:
                 ends.append(optimiser.solve_and_confirm(self.start, self.robust))
                 if ends[0].describes_data:
                     return ends[0]
-        grown, nearer = self._grown(experiment, measurement)
+        before = optimiser.predictor.evaluations
+        grown, nearer, before = self._grown(experiment, measurement, before)
         if ends and nearer == self.start:
             # cold rows say nothing else, and the same search would come to the same end
             return ends[0]
         try:
-            ends.append(self.near(grown, nearer))
+            ends.append(self.near(grown, nearer, before))
         except ComputationError:
             if not ends:
                 raise
         return min(ends, key=lambda end: (not end.describes_data, end.misfit))
 
-    def _optimiser(self, experiment: Experiment, start: Probe) -> Optimiser:
+    def _optimiser(self, experiment: Experiment, start: Probe, before: int = 0) -> Optimiser:
         residuals = self.residuals.afresh()
         objective = Objective(residuals, start, experiment.names, self.varied, self.prior)
-        return Optimiser(objective, Predictor(experiment, self.progress, self.seen))
+        predictor = Predictor(experiment, self.progress, self.seen, before=before)
+        return Optimiser(objective, predictor)
 
     def _grown(
-        self, experiment: ExperimentAtRest, measurement: Measurement
-    ) -> tuple[ExperimentAtRest, Probe]:
+        self, experiment: ExperimentAtRest, measurement: Measurement, before: int
+    ) -> tuple[ExperimentAtRest, Probe, int]:
         """Return a lever that shows nearly what was measured, up to the hottest portion of rows.
 
-        With it the experiment is returned that is to be searched on with. Without priors the usual
-        ones close what cold rows leave open.
+        With it the experiment is returned that is to be searched on with, and the levers that were
+        solved, with those `before`. Without priors the usual ones close what cold rows leave open.
         """
         experiment, start = experiment.coarse(), self.start
         prior = (
@@ -339,15 +344,16 @@ class Search:
             of_part = experiment.measuring(*residuals.at_rest)
             objective = Objective(residuals, start, of_part.names, self.varied, prior)
             # what is seen of a portion is not seen at the rows of the measurement
-            predictor = Predictor(of_part, self.progress)
+            predictor = Predictor(of_part, self.progress, before=before)
             try:
                 start = Optimiser(objective, predictor, _OF_PORTIONS).solve(start).probe
+                before = predictor.evaluations
             except ComputationError:
                 if portion == 1:
                     raise
                 break
         mesh_is_outdated = _has_moved(experiment.fast.drawn, start)
-        return (experiment.drawn_anew(start) if mesh_is_outdated else experiment), start
+        return (experiment.drawn_anew(start) if mesh_is_outdated else experiment), start, before
 
 
 def _is_far(residuals: Residuals, at: Prediction) -> bool:

@@ -21,9 +21,6 @@ from hotlever.probe import Probe
 from hotlever.text import with_unit
 from hotlever.types import Array
 
-#: Levers solved for all choices of weights together, after which a search ends where it is; robust
-#: fits without priors, which begin anew, take several times as many.
-_MOST_IN_ALL = 40
 #: A region beyond which only rounding errors are left, in units of `Coordinates.room`.
 _SMALLEST_REGION = 1e-6
 #: The share of the predicted gain from which on the region grows, and below which it shrinks.
@@ -63,6 +60,13 @@ class SearchOptions:
     most_branches : int
         Levers solved for one choice of weights, after which it ends where it is. Good data take 6
         to 15; those of levers of which little is known up to 30.
+    most_in_all : int
+        Levers solved for all choices of weights together, in one search with priors, after which it
+        ends where it is.
+    most_in_estimate : int
+        Levers solved for one estimate, in all of its searches. With priors it is never reached. A
+        robust one without priors, which begins anew with each choice of weights, takes twice as
+        many.
     first_region, largest_region : float
         How far a step goes, in units of `Coordinates.room`: logarithms, where parameters are
         positive. Beyond a factor of two neighbours say little.
@@ -74,6 +78,8 @@ class SearchOptions:
     """
 
     most_branches: int = 25
+    most_in_all: int = 40
+    most_in_estimate: int = 120
     first_region: float = 0.5
     largest_region: float = 0.7
     decrement: float = 1e-2
@@ -165,6 +171,9 @@ class Optimiser:
     ) -> None:
         self.objective, self.residuals, self.predictor = objective, objective.residuals, predictor
         self._options, self.steps = options or SearchOptions(), 0
+        self._most = self._options.most_in_estimate
+        if objective.informed:
+            self._most = min(self._most, predictor.evaluations + self._options.most_in_all)
         #: What was wrong with the latest lever that could not be drawn or solved.
         self.refused = ""
 
@@ -178,6 +187,8 @@ class Optimiser:
         ComputationError
             If the lever cannot be solved at the start, or confirmations do not settle.
         """
+        if robust and not self.objective.informed:
+            self._most = 2 * self._options.most_in_estimate
         optimum = self.solve(start)
         unknown = self.residuals.errors.without.any() and not self.objective.informed
         for _ in range(self._options.scatter_rounds if unknown else 0):
@@ -233,9 +244,7 @@ class Optimiser:
         """
         objective, options = self.objective, self._options
         self._check_start(start)
-        # without priors a robust search begins anew with each choice of weights
-        in_all = _MOST_IN_ALL * (1 if objective.informed else _GENTLE_ROUNDS)
-        most = min(self.predictor.evaluations + options.most_branches, in_all)
+        most = min(self.predictor.evaluations + options.most_branches, self._most)
         # the noise of some observables may be found with the optimum
         unknown = bool(self.residuals.errors.without.any())
         takes_scatter = unknown and objective.informed and options.scatter_rounds > 0
