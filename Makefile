@@ -54,6 +54,9 @@ lock: env
 	$(BIN)/pip install "pip-tools>=7.4"
 	$(BIN)/pip-compile --quiet --strip-extras --generate-hashes --no-emit-index-url --no-emit-find-links \
 	    --no-header --all-extras --output-file requirements.lock pyproject.toml
+# pip-compile leaves out where an extra's requirement counts
+	sed -i "s/^nbklu==[^ ]*/& ; sys_platform == 'win32' or (sys_platform == 'linux' and platform_machine == 'x86_64')/" \
+	    requirements.lock
 
 clean:
 	rm -rf .venv build reproduce validate docs/_build benchmarks/results tests/app/screenshots

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,3 +13,11 @@ Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 # Told the steps done and their number.
 Progress = Callable[[int, int], None]
+
+
+class LinearSolver(Protocol):
+    """A factorised matrix."""
+
+    def solve(self, right_hand_side: Array, transposed: bool = False) -> Array:
+        """Solve for one right-hand side (n,) or several (n, k), or with the transposed matrix."""
+        ...

@@ -11,21 +11,28 @@ import math
 from collections.abc import Callable
 from copy import copy
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.linalg import SuperLU
 
 from hotlever.air.operator import AirOperator
 from hotlever.air.stores import HeatInAir
 from hotlever.errors import ComputationError
-from hotlever.types import Array, Index
+from hotlever.types import Array, Index, LinearSolver
 
 #: Krylov's method stops at this residual, relative to the right-hand side; what is left is small
 #: beside that of a kept Jacobian, and both are removed by the next step.
 _TOLERANCE = 1e-5
 _MOST_DIRECTIONS, _MOST_RESTARTS = 200, 5
+
+
+class LocalLosses(Protocol):
+    """What losses at points, by the temperature there, add to the matrices of elements."""
+
+    def add_to(self, element_matrices: Array, slopes: Array) -> None:
+        """Add those of losses with these slopes (points,)."""
+        ...
 
 
 class AirLoss:
@@ -41,8 +48,8 @@ class AirLoss:
         Unknowns of the temperatures of the element at each site; −1 where the node is held.
     shares : ndarray, shape (sites, nodes)
         Their weights in the temperature at the site.
-    losses : csr_matrix, shape (entries, sites)
-        What the slope of a loss at each site adds to the entries of the sparse Jacobian.
+    losses : LocalLosses, optional
+        What losses at the sites add to the matrices of elements.
     size : int
         Number of unknowns, V_l included.
 
@@ -59,7 +66,12 @@ class AirLoss:
     around: Callable[[float], HeatInAir] | None = None
 
     def __init__(
-        self, operator: Any, unknowns: Index, shares: Array, losses: csr_matrix, size: int
+        self,
+        operator: Any,
+        unknowns: Index,
+        shares: Array,
+        size: int,
+        losses: LocalLosses | None = None,
     ) -> None:
         self._take(operator)
         self._nothing_around = HeatInAir.nothing(size)
@@ -82,7 +94,7 @@ class AirLoss:
         """Return that of a lever in vacuum: air that takes nothing from anywhere."""
         vacuum = AirOperator(np.empty((0, 2)), np.empty((0, 0)), filling=0.0)
         unknowns, shares = np.empty((0, 1), dtype=np.intp), np.empty((0, 1))
-        return cls(vacuum, unknowns, shares, csr_matrix((0, 0)), size)
+        return cls(vacuum, unknowns, shares, size)
 
     @property
     def medium(self) -> str:
@@ -125,14 +137,15 @@ class AirLoss:
         heat = self.operator.matrix @ theta
         return np.asarray(heat.sum(axis=0)), np.asarray(self._held @ heat)
 
-    def local_entries(self, kappa: Array) -> Array | float:
-        """Return what a loss ∝ the temperature at each site adds to the sparse Jacobian.
+    def add_local_loss(self, element_matrices: Array, kappa: Array) -> None:
+        """Add a loss ∝ the temperature at each site to the matrices of elements.
 
         Each site loses as it would in a lever of one temperature.
         """
-        return self._losses @ (self._local * kappa) if len(kappa) else 0.0
+        if self._losses is not None:
+            self._losses.add_to(element_matrices, self._local * kappa)
 
-    def solver(self, factors: SuperLU, kappa: Array, taken_up: Array | None) -> Any:
+    def solver(self, factors: LinearSolver, kappa: Array, taken_up: Array | None) -> LinearSolver:
         """Return what solves the whole linear system, of the factors of its local part."""
         return AirSolver(factors, self, kappa, taken_up) if len(kappa) else factors
 
@@ -194,7 +207,7 @@ class AirSolver:
     """
 
     def __init__(
-        self, factors: SuperLU, air: AirLoss, kappa: Array, taken_up: Array | None = None
+        self, factors: LinearSolver, air: AirLoss, kappa: Array, taken_up: Array | None = None
     ) -> None:
         sites, modes, more = len(kappa), np.empty((0, air.sampling.shape[1])), np.empty((0, 0))
         if taken_up is not None:
@@ -213,11 +226,11 @@ class AirSolver:
             return spread(kappa * (air.rest @ t[:sites]), t)
 
         self._ways = {
-            "N": _Directions(lambda b: factors.solve(b), lost, sampled),
-            "T": _Directions(lambda b: factors.solve(b, "T"), lost_transposed, sampled),
+            False: _Directions(lambda b: factors.solve(b), lost, sampled),
+            True: _Directions(lambda b: factors.solve(b, True), lost_transposed, sampled),
         }
 
-    def solve(self, right_hand_side: Array, how: str = "N") -> Array:
+    def solve(self, right_hand_side: Array, transposed: bool = False) -> Array:
         """Solve for one right-hand side (size + 1,) or several (size + 1, k).
 
         Raises
@@ -225,7 +238,7 @@ class AirSolver:
         ComputationError
             If the directions do not suffice.
         """
-        way = self._ways[how]
+        way = self._ways[transposed]
         if right_hand_side.ndim == 1:
             return way.solve(right_hand_side)
         return np.stack([way.solve(column) for column in right_hand_side.T], axis=1)
@@ -288,5 +301,7 @@ class _Directions:
 
 def _columnwise(matrix: Any, x: Array) -> Array:
     """Return a matrix times an array of one, two or three axes."""
+    if 0 in matrix.shape:  # in vacuum there are no sites; SciPy takes its time over nothing
+        return np.zeros((matrix.shape[0], *x.shape[1:]))
     product = matrix @ x.reshape(len(x), math.prod(x.shape[1:]))
     return np.asarray(product).reshape(len(product), *x.shape[1:])

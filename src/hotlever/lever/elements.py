@@ -74,6 +74,8 @@ class FiniteElements:
         Number of nodal values of one field.
     dofs : ndarray of int, shape (elements, nodes)
         Global number of each element's nodes.
+    inner : int
+        How many of each element's nodes are inside it; they are its last ones.
     nodes : ndarray, shape (dimension, size)
         Positions of the nodes.
     weights : ndarray, shape (points,)
@@ -98,6 +100,7 @@ class FiniteElements:
         self.basis = CellBasis(mesh, element or ElementTriP3(), **rule)
         self.size = int(self.basis.N)
         self.dofs = np.ascontiguousarray(self.basis.element_dofs.T)
+        self.inner = int(self.basis.elem.interior_dofs)
         self.nodes = self.basis.doflocs
         elements, self.per_element = self.basis.dx.shape
         self.weights = np.ascontiguousarray(self.basis.dx).ravel()
@@ -346,6 +349,8 @@ class LinearMap:
 
     def at_points(self, x: Array) -> Array:
         """Return the samples (kinds, points, ...) of states (size + 1, ...)."""
+        if not self.matrix.shape[0]:  # there are no points; SciPy takes its time over nothing
+            return np.zeros((self.kinds, 0, *x.shape[1:]))
         chosen = x[self.columns]
         samples = np.asarray(self.matrix @ chosen.reshape(len(chosen), -1))
         return samples.reshape(self.kinds, -1, *x.shape[1:])

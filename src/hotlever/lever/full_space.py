@@ -13,21 +13,22 @@ from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse import csr_matrix
 
 from hotlever.air.coupling import AirLoss
 from hotlever.air.operator import AirOperator
 from hotlever.air.stores import HeatInAir
 from hotlever.lever.elements import FacetPoints, FiniteElements, LinearMap, numbered
+from hotlever.lever.factorisation import FactorisationOptions
 from hotlever.lever.films import Rim, placed_films
 from hotlever.lever.space import Constraint, Space, SurfaceTangent
+from hotlever.lever.sparse_jacobian import ElementLosses, SparseJacobian
 from hotlever.lever.transport import Tangent
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Part
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.probe.solid import SolidMesh
-from hotlever.types import Array, Index
+from hotlever.types import Array, Index, LinearSolver
 
 
 class FullSpace(Space):
@@ -41,6 +42,8 @@ class FullSpace(Space):
         Made on ``mesh.elements`` by default.
     wiring : Wiring, optional
         Which terminals are what; by default as in the paper.
+    factorisation : FactorisationOptions, optional
+        How Jacobians are factorised.
 
     Attributes
     ----------
@@ -59,6 +62,7 @@ class FullSpace(Space):
         mesh: ProbeMesh | SolidMesh,
         elements: FiniteElements | None = None,
         wiring: Wiring | None = None,
+        factorisation: FactorisationOptions | None = None,
     ) -> None:
         self.mesh = mesh
         self.wiring = wiring or Circuit().wiring(mesh.terminal_facets)
@@ -85,8 +89,10 @@ class FullSpace(Space):
         self.tip = (self._T[self.elements.dofs[element]], weights)
         self.held = {name: int(self._V[self.contact_nodes[name][0]]) for name in self.wiring.held}
         unknowns = np.stack([self._T, self._V])
-        self._jacobian = SparseJacobian(self.elements, unknowns, self.size, self.held, self.tip)
-        self._losses: dict[str, csr_matrix] = {}
+        self._jacobian = SparseJacobian(
+            self.elements, unknowns, self.size, self.held, self.tip, factorisation
+        )
+        self._losses: dict[str, ElementLosses] = {}
         self.air = AirLoss.nothing(self.size + 1)
         self.reader = None
         if "reader" in self.wiring.measurable:
@@ -169,11 +175,11 @@ class FullSpace(Space):
             return Rim.nothing(self.size)
         return Rim.under_a_cone(layout, self.elements, _selection(self._T, self.size))
 
-    def _losses_at(self, name: str) -> csr_matrix:
-        """Return the matrix from slopes of what leaves at the rim or footprint to the entries."""
+    def _losses_at(self, name: str) -> ElementLosses:
+        """Return the losses at the points of the rim or footprint."""
         if name not in self._losses:
             facets: FacetPoints = getattr(self, name).facet_points
-            self._losses[name] = self._jacobian.of_losses(facets.elements, facets.shares)
+            self._losses[name] = ElementLosses(facets.elements, facets.shares)
         return self._losses[name]
 
     # --- the air ----------------------------------------------------------------------------------
@@ -212,8 +218,7 @@ class FullSpace(Space):
     def _loss_to(self, air: Any, element: Index, shares: Array) -> AirLoss:
         """Return the loss to air at sites in elements, with their basis functions there."""
         unknowns = self._T[self.elements.dofs[element]]
-        losses = self._jacobian.of_losses(element, shares)
-        return AirLoss(air, unknowns, shares, losses, self.size + 1)
+        return AirLoss(air, unknowns, shares, self.size + 1, ElementLosses(element, shares))
 
     def factorised(
         self, tangent: Tangent, surface: SurfaceTangent, constraint: Constraint, conductance: Array
@@ -222,11 +227,12 @@ class FullSpace(Space):
         solvers = []
         for state in range(tangent.sigma.shape[-1]):
             kappa = surface.kappa[:, state]
-            entries = self._jacobian.entries(tangent.of(state), conductance)
-            entries += self.air.local_entries(kappa)
+            matrices = self._jacobian.element_matrices(tangent.of(state))
+            self.air.add_local_loss(matrices, kappa)
             for name, slopes in surface.at_points.items():
-                entries += self._losses_at(name) @ slopes[:, state]
-            factors = self._jacobian.factorised(entries, constraint.among(state))
+                self._losses_at(name).add_to(matrices, slopes[:, state])
+            own_constraint = constraint.among(state)
+            factors = self._jacobian.factorised(matrices, conductance, own_constraint)
             solvers.append(self.air.solver(factors, kappa, surface.taken_up))
         return SparseFactors(solvers)
 
@@ -245,120 +251,18 @@ def _sampled_sum(elements: FiniteElements, nodes: Index) -> Array:
     return np.asarray((elements.sampling @ indicator).reshape(-1, elements.weights.size))
 
 
-class SparseJacobian:
-    """The structure of the Jacobian of a lever of finite elements.
-
-    Its last row is that of a constraint.
-
-    Parameters
-    ----------
-    elements : FiniteElements
-    unknowns : ndarray of int, shape (2, nodes)
-        Those of temperature and potential at each node, -1 where they are held.
-    size : int
-        How many there are, without the lever voltage, which has this number itself.
-    held : mapping of str to int
-        Unknowns on whose diagonal there are conductances, by terminal.
-    tip : tuple of (ndarray of int, ndarray)
-        Unknowns and weights that give the rise of the tip temperature.
-
-    Attributes
-    ----------
-    slots : ndarray of int, shape (elements, 2 nodes, 2 nodes)
-        Where the entries of each element stand, temperatures first.
-    """
-
-    def __init__(
-        self,
-        elements: FiniteElements,
-        unknowns: Index,
-        size: int,
-        held: Mapping[str, int],
-        tip: tuple[Index, Array],
-    ) -> None:
-        self._elements, self._count, self._tip = elements, size + 1, tip[1]
-        count, number = self._count, np.concatenate(unknowns[:, elements.dofs], axis=1)
-        keys = np.where(
-            # the row of V_l is the current, which the constraint replaces
-            (number[:, :, None] >= 0) & (number[:, :, None] < size) & (number[:, None, :] >= 0),
-            number[:, None, :] * count + number[:, :, None],
-            count**2,  # after all others: dropped
-        )
-        of_constraint = np.append(tip[0], size) * count + size
-        diagonal = np.array(list(held.values()), dtype=int) * (count + 1)
-        every = np.concatenate([keys.ravel(), of_constraint, diagonal])
-        unique, slots = np.unique(every, return_inverse=True)
-        unique = unique[unique < count**2]
-        self._entries = unique.size
-        self.slots = slots[: keys.size].reshape(keys.shape)
-        self._constraint_slots, self._held_slots = np.split(
-            slots[keys.size :], [of_constraint.size]
-        )
-        self._rows = (unique % count).astype(np.int32)
-        self._starts = np.searchsorted(unique // count, np.arange(count + 1)).astype(np.int32)
-
-    def entries(self, tangent: Tangent, conductance: Array) -> Array:
-        """Return the entries of one state's Jacobian, without the constraint."""
-        elements, nodes = self._elements.dofs.shape
-        matrices = self._elements.matrices
-        element = np.empty((elements, 2 * nodes, 2 * nodes))
-        element[:, :nodes, :nodes] = matrices(
-            value_value=tangent.heat_source_T,
-            value_slope=tangent.heat_source_slope,
-            slope_value=tangent.heat_flux_T,
-            slope_slope=tangent.kappa,
-        )
-        element[:, :nodes, nodes:] = matrices(
-            value_slope=tangent.heat_source_V, slope_slope=tangent.heat_V
-        )
-        element[:, nodes:, :nodes] = matrices(
-            slope_value=tangent.charge_flux_T, slope_slope=tangent.charge_T
-        )
-        element[:, nodes:, nodes:] = matrices(slope_slope=tangent.sigma)
-        # numpy's stubs overlook that weights make the counts floats
-        sums: Any = np.bincount(self.slots.ravel(), element.ravel(), minlength=self._entries + 1)
-        entries: Array = sums[: self._entries]
-        entries[self._held_slots] += conductance
-        return entries
-
-    def of_losses(self, element: Index, shares: Array) -> csr_matrix:
-        """Return the matrix (entries, points) from slopes of local losses to what they add.
-
-        Each point lies in an element, (points,), with its basis functions there, (points, nodes);
-        the slopes are by the temperature.
-        """
-        nodes = shares.shape[1]
-        slots = self.slots[element, :nodes, :nodes]
-        products = shares[:, :, None] * shares[:, None, :]
-        points = np.broadcast_to(np.arange(len(element))[:, None, None], slots.shape)
-        counted = (products != 0) & (slots < self._entries)
-        return csr_matrix(
-            (products[counted], (slots[counted], points[counted])),
-            shape=(self._entries, len(element)),
-        )
-
-    def factorised(self, entries: Array, constraint: Constraint) -> SuperLU:
-        """Factorise; the unknowns are already ordered for little fill."""
-        entries[self._constraint_slots] = np.append(constraint.tip * self._tip, constraint.lever)
-        return splu(
-            csc_matrix((entries, self._rows, self._starts), shape=(self._count, self._count)),
-            permc_spec="NATURAL",
-            diag_pivot_thresh=0.01,
-            options={"SymmetricMode": True},
-        )
-
-
 class SparseFactors:
     """The factorised Jacobian of each of some states; see `Factors`."""
 
-    def __init__(self, solvers: list[Any]) -> None:
+    def __init__(self, solvers: list[LinearSolver]) -> None:
         self._solvers = solvers
 
     def solve(self, right_hand_side: Array, states: Index, *, transposed: bool = False) -> Array:
         """Solve for right-hand sides (size + 1, n) or (size + 1, n, k) of these n states."""
-        solution, how = np.empty_like(right_hand_side), "T" if transposed else "N"
+        solution = np.empty_like(right_hand_side)
         for column, state in enumerate(states):
-            solution[:, column] = self._solvers[state].solve(right_hand_side[:, column], how)
+            of_state = right_hand_side[:, column]
+            solution[:, column] = self._solvers[state].solve(of_state, transposed)
         return solution
 
     def replaced(self, states: Index, other: SparseFactors) -> SparseFactors:
