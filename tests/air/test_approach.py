@@ -9,7 +9,7 @@ import pytest
 
 from hotlever.air.laplace import Approach, Laplace
 from hotlever.air.operator import AirOperator, PanelledAir, air_operator
-from hotlever.air.panels import Panels
+from hotlever.air.panels import Panels, square_distances
 from hotlever.materials.air import temperature_jump_length
 from hotlever.probe import Probe
 from hotlever.probe.drawing import Drawing, Layer
@@ -45,16 +45,14 @@ def check(first: np.ndarray, second: np.ndarray, motion: np.ndarray) -> None:
 
     def far(share: float) -> float:
         displaced_panels = Panels((second + share * motion)[None])
-        offsets = (fixed.centres - displaced_panels.centres)[:, None]
-        return Laplace().far_pairs(fixed, displaced_panels, offsets)[0, 0]
+        square = square_distances(fixed, displaced_panels)
+        return Laplace().far_pairs(fixed, displaced_panels, square)[0, 0]
 
     there = Panels(second[None])
-    offsets = (fixed.centres - there.centres)[:, None]
+    square = square_distances(fixed, there)
     found = moving.near_pairs(fixed, there, pair, pair)[0]
     assert found == pytest.approx(slope(near, 1e-4), rel=1e-7)
-    assert moving.far_pairs(fixed, there, offsets)[0, 0] == pytest.approx(
-        slope(far, 1e-4), rel=1e-7
-    )
+    assert moving.far_pairs(fixed, there, square)[0, 0] == pytest.approx(slope(far, 1e-4), rel=1e-7)
 
 
 @pytest.mark.parametrize("one", range(3))

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.air.panels import Panels
+from hotlever.air.panels import COINCIDENT, Panels, spreads, traces
 from hotlever.air.single_layer import pairs_by_points
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
@@ -43,13 +43,12 @@ class Laplace:
     shape: tuple[int, ...] = ()
     dtype, far = np.dtype(float), FAR
 
-    def far_pairs(self, first: Panels, second: Panels, offsets: Array) -> Array:
+    def far_pairs(self, first: Panels, second: Panels, square: Array) -> Array:
         """Return ∫∫ 1/R over distant pairs, to second order in size over distance."""
-        square = np.einsum("nmd,nmd->nm", offsets, offsets)
-        inverse = 1.0 / np.sqrt(np.maximum(square, _TINY))
-        spread, traces = _spreads(first, second, offsets)
-        correction = 0.5 * (3.0 * spread * inverse**2 - traces) * inverse**2
-        expanded: Array = np.outer(first.areas, second.areas) * inverse * (1.0 + correction)
+        inverse = 1.0 / np.maximum(square, COINCIDENT)
+        correction = 3.0 * spreads(first, second) * inverse - traces(first, second)
+        expanded: Array = np.outer(first.areas, second.areas) * np.sqrt(inverse)
+        expanded *= 1.0 + 0.5 * correction * inverse
         return expanded
 
     def near_pairs(self, first: Panels, second: Panels, i: Index, j: Index) -> Array:
@@ -78,14 +77,17 @@ class Approach:
     def __init__(self, motion: Array) -> None:
         self._motion, self._upwards = motion, not motion[:2].any()
 
-    def far_pairs(self, first: Panels, second: Panels, offsets: Array) -> Array:
+    def far_pairs(self, first: Panels, second: Panels, square: Array) -> Array:
         """Return the integrals over distant pairs: the derivative of the same expansion."""
-        inverse = 1.0 / np.maximum(np.einsum("nmd,nmd->nm", offsets, offsets), _TINY)
-        along = offsets @ self._motion
-        spread, traces = _spreads(first, second, offsets)
-        turned = np.einsum("nmd,nd->nm", offsets, first.moments @ self._motion)
-        turned += np.einsum("nmd,md->nm", offsets, second.moments @ self._motion)
-        slope = along * (1.0 + inverse * (7.5 * spread * inverse - 1.5 * traces))
+        inverse, middle = 1.0 / np.maximum(square, COINCIDENT), first.centres.mean(axis=0)
+        at, others_at = first.centres - middle, second.centres - middle
+        along = np.subtract.outer(at @ self._motion, others_at @ self._motion)
+        # the offsets times the moments of both along the motion
+        mine, others = (panels.moments @ self._motion for panels in (first, second))
+        turned = at @ others.T - mine @ others_at.T
+        turned += np.subtract.outer((at * mine).sum(axis=1), (others_at * others).sum(axis=1))
+        spread, both = spreads(first, second), traces(first, second)
+        slope = along * (1.0 + inverse * (7.5 * spread * inverse - 1.5 * both))
         slope -= 3.0 * turned * inverse
         return np.asarray(np.outer(first.areas, second.areas) * slope * inverse**1.5)
 
@@ -338,16 +340,6 @@ def _box(a: Array, b: Array, c: Array) -> Array:
 
 def _asinh(length: Array, square: Array) -> Array:
     return np.asarray(np.arcsinh(length / np.maximum(np.sqrt(square), _TINY)))
-
-
-def _spreads(first: Panels, second: Panels, offsets: Array) -> tuple[Array, Array]:
-    """Return the sums of the moments of pairs, along their offsets and their traces, (n, m)."""
-    # pairs of moments with offsets as matrix products: this is done for all pairs of panels
-    flat = (offsets[..., :, None] * offsets[..., None, :]).reshape(*offsets.shape[:2], 9)
-    spread = np.einsum("nmk,nk->nm", flat, first.moments.reshape(-1, 9))
-    spread += np.einsum("nmk,mk->nm", flat, second.moments.reshape(-1, 9))
-    mine, others = (np.trace(panels.moments, axis1=1, axis2=2) for panels in (first, second))
-    return spread, mine[:, None] + others
 
 
 @one_blas_thread

@@ -12,15 +12,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
+from scipy.sparse import csr_matrix
 
 from hotlever.air.bodies import BaseLine, chip_panels
 from hotlever.air.laplace import Approach, Laplace, layer_potential
-from hotlever.air.panels import Mirror, Panels, mirror_group
+from hotlever.air.panels import IDENTITY, Mirror, Panels, mirror_group
 from hotlever.air.single_layer import Numbers, Screened, single_layer_matrix
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
@@ -28,6 +29,9 @@ from hotlever.probe.layout import Layout
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    from hotlever.air.surface import LeverSurface
 
 #: Panels of a lever that takes no finer ones than the default: its matrix has half a gigabyte.
 _MOST_PANELS = 8000
@@ -158,15 +162,9 @@ class PanelledAir:
         refinement: float = 1.0,
         progress: Progress | None = None,
     ) -> None:
-        # only air that is not in the cache needs panels, and with them Shapely
-        from hotlever.air.surface import lever_surface
-
         symmetric = surroundings.symmetric and layout.cone_in_air is None
-        self.surface = lever_surface(layout, refinement, mirrored=symmetric)
-        chip = [chip_panels(layout, refinement)] if surroundings.chip else []
-        self.panels = Panels(
-            np.concatenate([panels.corners for panels in (self.surface.panels, *chip)])
-        )
+        bodies = _bodies(layout, refinement, symmetric, surroundings.chip)
+        self.surface, self.panels = bodies.surface, bodies.panels
         most = int(_MOST_PANELS * refinement**2)
         if len(self.panels) > most:
             raise ComputationError(
@@ -182,7 +180,13 @@ class PanelledAir:
         jump = np.full(len(self.panels), surroundings.jump_length_um(base_temperature_K))
         jump[own] = surroundings.jump_length_um(surroundings.jump_temperature_K)
         self._over_thickness = float(jump[0]) / layout.thickness_um
-        layer = single_layer_matrix(self.panels, Laplace(), self.mirrors, progress)
+        if below:
+            # at other distances the lever itself is the same
+            images = [mirror for mirror in self.mirrors if mirror is not IDENTITY]
+            layer = single_layer_matrix(self.panels, Laplace(), images, progress)
+            layer += bodies.layer
+        else:
+            layer = single_layer_matrix(self.panels, Laplace(), self.mirrors, progress)
         self._layer = self._outside(layer)
         self._resistances = jump * self.panels.areas
         self._layer[np.diag_indices_from(self._layer)] += self._resistances
@@ -190,8 +194,10 @@ class PanelledAir:
         on_tip = own[len(own) - len(through_tip) :]
         areas = self.panels.areas[on_tip]
         self._layer[np.ix_(on_tip, on_tip)] += through_tip * np.outer(areas, areas)
-        self._moments = np.zeros((len(self.panels), len(self.surface.sites)))
-        self._moments[own, self.surface.site] = self.surface.panels.areas
+        self._moments = csr_matrix(
+            (self.surface.panels.areas, (own, self.surface.site)),
+            shape=(len(self.panels), len(self.surface.sites)),
+        )
 
     def _outside(self, layer: Numbers) -> Numbers:
         """Return a single layer of which a jump lets through only what flows outside the plate.
@@ -220,10 +226,10 @@ class PanelledAir:
             raise ComputationError("the air operator of this geometry is not positive") from error
         return factors
 
-    def _solve(self, right: Array, *, transposed: bool = False) -> Array:
+    def _solve(self, right: Array) -> Array:
         """Return the densities whose layer has some moments."""
         if self._over_thickness and self.surface.across.size:
-            return np.asarray(lu_solve(self._factors, right, trans=int(transposed)))
+            return np.asarray(lu_solve(self._factors, right))
         return np.asarray(cho_solve(self._factors, right))
 
     def densities(self, theta: Array) -> Array:
@@ -235,7 +241,7 @@ class PanelledAir:
 
     def operator(self) -> AirOperator:
         """Return the matrix from θ at the sites to heat, and how full of air the lever seems."""
-        flux = self._solve(self._moments)
+        flux = self._solve(self._moments.toarray())
         heat = self._halves * (self._moments.T @ flux)
         # of a lever of one temperature: θ of the air at the surface as a share of the lever's; the
         # energy of the air inside goes with its square
@@ -248,9 +254,13 @@ class PanelledAir:
         )
         if math.isnan(self._gap):
             return operator
-        change = self._outside(self._layer_by_gap())
-        more = -self._halves * (self._solve(self._moments, transposed=True).T @ (change @ flux))
-        jumped_more = -shares @ self._solve(change @ whole)[:own]
+        # What tells faces apart acts on the rows alone, those of the moments are the same for both
+        # faces: so the derivative of the layer itself stands between two solutions of one kind.
+        change = self._layer_by_gap()
+        more = -self._halves * (flux.T @ (change @ flux))
+        by_face = np.zeros(len(self.panels))
+        by_face[:own] = shares
+        jumped_more = -self._solve(by_face) @ (change @ whole)
         return replace(
             operator,
             matrix_by_gap=0.5 * (more + more.T),
@@ -294,6 +304,33 @@ class PanelledAir:
         for mirror in self.mirrors:
             total += mirror.sign * layer_potential(points, self.panels.reflected(mirror), flux)
         return total
+
+
+@dataclass(frozen=True)
+class _Bodies:
+    """A lever's surface, and all panels, those of its chip included, wherever a surface is below.
+
+    The single layer of a lever in free space is kept with them.
+    """
+
+    surface: LeverSurface
+    panels: Panels
+
+    @cached_property
+    def layer(self) -> Numbers:
+        """The single layer of the panels alone."""
+        return single_layer_matrix(self.panels, Laplace())
+
+
+# distances to a surface come one after the other
+@lru_cache(maxsize=1)
+def _bodies(layout: Layout, refinement: float, mirrored: bool, chip: bool) -> _Bodies:
+    # only air that is not in the cache needs panels, and with them Shapely
+    from hotlever.air.surface import lever_surface
+
+    surface = lever_surface(layout, refinement, mirrored=mirrored)
+    of_chip = [chip_panels(layout, refinement).corners] if chip else []
+    return _Bodies(surface, Panels(np.concatenate([surface.panels.corners, *of_chip])))
 
 
 def _mirrors_below(

@@ -18,6 +18,8 @@ from hotlever.types import Array, Index
 
 #: Share of its radius by which a rectangle's corners may be off.
 _RECTANGLE = 1e-6
+#: Square of the distance (µm²) for that of panels in one place, which are never expanded.
+COINCIDENT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -81,8 +83,13 @@ class Panels:
         return len(self.corners)
 
     def chosen(self, index: NDArray[Any]) -> Panels:
-        """Return some of the panels, by number or by mask."""
-        return Panels(self.corners[index])
+        """Return some of the panels, by number or by mask; what is known of them stays known."""
+        some = Panels(self.corners[index])
+        for name in vars(self).keys() & {"areas", "centres", "radii", "moments"}:
+            vars(some)[name] = vars(self)[name][index]
+        if "frame" in vars(self):
+            vars(some)["frame"] = tuple(each[index] for each in self.frame)
+        return some
 
     def reflected(self, mirror: Mirror) -> Panels:
         """Return the images of the panels."""
@@ -162,6 +169,39 @@ class Panels:
         along, across = (b - a) + t * (c - d - b + a), far - near
         areas = np.linalg.norm(np.cross(along, across), axis=2)
         return near + t * across, areas * np.outer(weights, weights).ravel() / 4
+
+
+def square_distances(first: Panels, second: Panels) -> Array:
+    """Return the squares of the distances of all centroids from all others (µm²), (n, m)."""
+    square = np.zeros((len(first), len(second)))
+    for mine, others in zip(first.centres.T, second.centres.T, strict=True):
+        square += np.subtract.outer(mine, others) ** 2
+    return square
+
+
+def spreads(first: Panels, second: Panels) -> Array:
+    """Return rᵀ(M + M')r of all pairs, of their centroids' offsets r and their moments, (n, m).
+
+    As one product of matrices, about the middle of the first: this is done for all pairs of a
+    surface. Digits that are lost are those of panels near each other, which are not expanded.
+    """
+    middle = first.centres.mean(axis=0)
+    mine, others = (_powers(panels, panels.centres - middle) for panels in (first, second))
+    return np.asarray(mine[0] @ others[1].T + mine[1] @ others[0].T)
+
+
+def _powers(panels: Panels, at: Array) -> tuple[Array, Array]:
+    """Return what rᵀMr is made of where the moments are the panels' own, and the other's."""
+    along = np.einsum("nde,ne->nd", panels.moments, at)
+    own = [np.einsum("nd,nd->n", at, along)[:, None], -2.0 * along, panels.moments.reshape(-1, 9)]
+    squares = (at[:, :, None] * at[:, None, :]).reshape(-1, 9)
+    return np.hstack(own), np.hstack([np.ones((len(at), 1)), at, squares])
+
+
+def traces(first: Panels, second: Panels) -> Array:
+    """Return the sums of the traces of the moments of pairs, (n, m)."""
+    mine, others = (np.trace(panels.moments, axis1=1, axis2=2) for panels in (first, second))
+    return np.add.outer(mine, others)
 
 
 def divided(at: Array, size: Array) -> Array:

@@ -20,7 +20,15 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.air.panels import IDENTITY, Mirror, Panels
+from hotlever.air.panels import (
+    COINCIDENT,
+    IDENTITY,
+    Mirror,
+    Panels,
+    spreads,
+    square_distances,
+    traces,
+)
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index, Progress
 
@@ -53,8 +61,8 @@ class Kernel(Protocol):
     dtype: Any
     far: float
 
-    def far_pairs(self, first: Panels, second: Panels, offsets: Array) -> Numbers:
-        """Return ∫∫ G over all pairs that are far, (..., n, m), of their centroids' offsets."""
+    def far_pairs(self, first: Panels, second: Panels, square: Array) -> Numbers:
+        """Return ∫∫ G over all pairs that are far, (..., n, m), by their `square_distances`."""
         ...
 
     def near_pairs(self, first: Panels, second: Panels, i: Index, j: Index) -> Numbers:
@@ -94,10 +102,10 @@ def single_layer_matrix(
         for start in range(0, count, _ROWS):
             rows = np.arange(start, min(start + _ROWS, count))
             some = panels.chosen(rows)
-            offsets = some.centres[:, None] - images.centres
-            image[..., rows, :] = kernel.far_pairs(some, images, offsets)
-            reach = kernel.far * (some.radii[:, None] + images.radii)
-            i, j = np.nonzero(np.einsum("nmd,nmd->nm", offsets, offsets) < reach**2)
+            square = square_distances(some, images)
+            image[..., rows, :] = kernel.far_pairs(some, images, square)
+            reach = kernel.far * np.add.outer(some.radii, images.radii)
+            i, j = np.nonzero(square < reach**2)
             half = rows[i] <= j
             near.append(np.stack([rows[i][half], j[half]]))
         pairs = np.concatenate(near, axis=1)
@@ -109,8 +117,9 @@ def single_layer_matrix(
             if progress is not None:
                 share = int(100 * min(start + _PAIRS, pairs.shape[1]) / pairs.shape[1])
                 progress(100 * done + share, 100 * len(mirrors))
-        matrix += mirror.sign * image
-    return np.asarray(matrix / (4.0 * np.pi))
+        image *= mirror.sign / (4.0 * np.pi)
+        matrix += image
+    return matrix
 
 
 def pairs_by_points(
@@ -171,13 +180,11 @@ class Screened:
     def __init__(self, q: Numbers) -> None:
         self._q, self.shape, self.dtype = q, q.shape, q.dtype
 
-    def far_pairs(self, first: Panels, second: Panels, offsets: Array) -> Numbers:
+    def far_pairs(self, first: Panels, second: Panels, square: Array) -> Numbers:
         """Integrate over distant pairs, (k, n, m), to second order in size over distance."""
-        square = np.maximum(np.einsum("nmd,nmd->nm", offsets, offsets), 1e-12)
-        distance = np.sqrt(square)
-        moments = first.moments[:, None] + second.moments
-        along = np.einsum("nmd,nmde,nme->nm", offsets, moments, offsets, optimize=True) / square
-        across = np.trace(moments, axis1=2, axis2=3) - along
+        square = np.maximum(square, COINCIDENT)
+        distance, along = np.sqrt(square), spreads(first, second) / square
+        across = traces(first, second) - along
         x = np.multiply.outer(self._q, distance)
         less = np.expm1(-x)
         more = x * (1.0 + less)
