@@ -217,12 +217,23 @@ def processor_seconds(action: Callable[[], object], runs: int = 1) -> float:
     return median(times)
 
 
-def run_python(arguments: Sequence[str], folder: str | Path, cache: str | Path) -> None:
-    """Run Python with some arguments in a folder, quietly, with hotlever's cache in another."""
+def run_python(
+    arguments: Sequence[str],
+    folder: str | Path,
+    cache: str | Path,
+    source: str | Path | None = None,
+) -> None:
+    """Run Python with some arguments in a folder, quietly, with hotlever's cache in another.
+
+    Modules may come from a source folder, before all others.
+    """
+    environment = os.environ | {CACHE_VARIABLE: str(cache)}
+    if source is not None:
+        environment["PYTHONPATH"] = str(source)
     subprocess.run(
         [sys.executable, *arguments],
         cwd=folder,
-        env=os.environ | {CACHE_VARIABLE: str(cache)},
+        env=environment,
         check=True,
         capture_output=True,
     )
