@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import comb
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hotlever.types import Array
+from hotlever.types import Array, Index
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -200,10 +201,8 @@ def smooth_curve(u: Array, values: Array, slopes: Array, steps: Array | tuple = 
 
 def _coefficients(u: Array, values: Array, slopes: Array) -> Array:
     """Return the coefficients of the polynomials between nodes, the highest power first."""
-    width = min(3, u.size)
-    first = np.clip(np.arange(u.size) - 1, 0, u.size - width)
-    stencil = first[:, None] + np.arange(width)
-    weights = hermite_weights(u[stencil], u, derivative=2)
+    stencil, weights = _bend_weights(tuple(u.tolist()))
+    width = stencil.shape[1]
     bends = np.einsum("kj,kj...->k...", weights[:, :width], values[stencil])
     bends += np.einsum("kj,kj...->k...", weights[:, width:], slopes[stencil])
     h = np.diff(u).reshape(-1, *(1,) * (values.ndim - 1))
@@ -220,6 +219,17 @@ def _coefficients(u: Array, values: Array, slopes: Array) -> Array:
             values[:-1],
         ]
     )
+
+
+# many curves in turn have one set of nodes
+@lru_cache(maxsize=32)
+def _bend_weights(nodes: tuple[float, ...]) -> tuple[Index, Array]:
+    """Return the neighbours of each node, (k, 3), and their weights in its second derivative."""
+    u = np.array(nodes)
+    width = min(3, u.size)
+    first = np.clip(np.arange(u.size) - 1, 0, u.size - width)
+    stencil = first[:, None] + np.arange(width)
+    return stencil, hermite_weights(u[stencil], u, derivative=2)
 
 
 def spline_through(u: Array, values: Array, most: int = 3) -> BSpline:
@@ -265,9 +275,14 @@ def crossing(curve: Piecewise, low: float, high: float, values: Array) -> Array:
     before = np.clip(np.searchsorted(heights, values) - 1, 0, at.size - 2)
     left, right = at[before], at[before + 1]
     u = np.interp(values, heights, at)
+    # between two samples it is one polynomial
+    piece = np.clip(np.searchsorted(curve.x, left, side="right") - 1, 0, curve.x.size - 2)
+    start, (highest, *lower) = curve.x[piece], curve.c[:, piece]
     for _ in range(_NEWTON_STEPS):
-        slope = np.maximum(curve(u, 1), 1e-12)
-        u = np.clip(u - (curve(u) - values) / slope, left, right)
+        away, height, slope = u - start, highest, np.zeros(u.shape)
+        for coefficients in lower:
+            height, slope = height * away + coefficients, slope * away + height
+        u = (u - (height - values) / np.maximum(slope, 1e-12)).clip(left, right)
     return np.where(values <= heights[0], low, u)
 
 
