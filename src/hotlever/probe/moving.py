@@ -196,17 +196,20 @@ def _in_order(like: Layout, layout: Layout) -> Layout | None:
         return None
     if sorted(layout.terminal_names) != sorted(like.terminal_names):
         return None
-    pairs = [[_region(old, new) for new in layout.regions] for old in like.regions]
+    what = [(_made_of(region), region) for region in layout.regions]
+    pairs = [
+        [_region(old, new) if of_new == of_old else (_UNLIKE, new) for of_new, new in what]
+        for of_old, old in ((_made_of(region), region) for region in like.regions)
+    ]
     chosen = _cheapest(pairs)
     return None if chosen is None else replace(layout, regions=tuple(chosen))
 
 
 def _region(like: Region, region: Region) -> tuple[float, Region]:
-    """Return how far a region is from another, and the region with its corners in that order."""
-    alike = _made_of(region) == _made_of(like)
+    """Return how far a region is from one like it, and it with its corners in that order."""
     cost, outline = _ring(like.outline, region.outline)
     holes = None
-    if alike and cost < _UNLIKE and len(region.holes) == len(like.holes):
+    if cost < _UNLIKE and len(region.holes) == len(like.holes):
         holes = _cheapest([[_ring(old, new) for new in region.holes] for old in like.holes])
     if holes is None:
         return _UNLIKE, region
