@@ -7,9 +7,12 @@ import pydoc
 import re
 import subprocess
 import sys
+import tomllib
+from collections import Counter
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +20,7 @@ import pytest
 from scipy.sparse.csgraph import connected_components
 
 import hotlever
+from documents import ROOT
 from hotlever.errors import InputError
 
 SOURCE = Path(hotlever.__file__).parent
@@ -93,6 +97,47 @@ def test_importing_the_package_loads_nothing_heavy():
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert not {"numpy", "scipy", "xarray", "skfem", "matplotlib"} & set(done.stdout.split())
+
+
+#: What a sweep imports of that which hotlever requires, with at most how many modules each: what
+#: it costs to start. Whatever comes with these, as pandas with xarray, is theirs.
+IMPORTED_BY_A_SWEEP = {
+    "hotlever": 115,
+    "numpy": 180,
+    "scipy": 230,
+    "skfem": 140,
+    "netgen": 20,
+    "xarray": 130,
+    "pydantic": 60,
+    "typer": 40,
+    "platformdirs": 10,
+    "threadpoolctl": 1,
+    "nbklu": 6,
+}
+
+
+def test_a_plain_sweep_imports_what_it_needs_and_no_more(tmp_path):
+    """Not matplotlib, nor Shapely, nor SciPy's optimisers: each takes as long as all levers."""
+    script = (
+        "import runpy, sys; sys.argv = ['hotlever', *sys.argv[1:]];\n"
+        "try: runpy.run_module('hotlever', run_name='__main__')\n"
+        "except SystemExit as end: assert not end.code\n"
+        "print(*sys.modules, file=sys.stderr)"
+    )
+    command = [sys.executable, "-c", script, "sweep", "--bias", "1:3:3", "-o", "sweep.csv"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    modules = done.stderr.split()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    every = [*project["dependencies"], *chain(*project["optional-dependencies"].values())]
+    named = {re.split(r"[^\w-]", requirement)[0].replace("-", "_") for requirement in every}
+    required = named | {"hotlever", "netgen", "skfem", "nbklu"}
+    counts = Counter(name.partition(".")[0] for name in modules)
+    found = {name: count for name, count in counts.items() if name in required}
+    assert found.keys() <= IMPORTED_BY_A_SWEEP.keys()
+    dearer = {name: count for name, count in found.items() if count > IMPORTED_BY_A_SWEEP[name]}
+    assert dearer == {}
+    of_scipy = {".".join(name.split(".")[:2]) for name in modules if name.startswith("scipy.")}
+    assert not {"scipy.optimize", "scipy.interpolate", "scipy.stats", "scipy.spatial"} & of_scipy
 
 
 def test_datasets_offer_figures_before_matplotlib_is_loaded():
