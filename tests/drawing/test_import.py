@@ -70,7 +70,7 @@ def test_the_file_is_found_from_another_folder(run, tmp_path):
 def test_a_dxf_with_names_for_layers(run, tmp_path):
     pointed_lever(tmp_path / "lever.dxf")
     probe, out, err = imported(run, tmp_path, "lever.dxf")
-    assert err == ""
+    assert err == "note: silicon: 1 hole, cut by polygon 1\n"
     assert "one unit of the file is 1 µm" in out
     names = {terminal.name for terminal in probe.layout().terminals}
     assert names == {"supply", "ground"}

@@ -55,7 +55,7 @@ def test_a_drawing_in_mm_that_states_no_unit_is_doubted_and_read_in_mm(run, tmp_
     )
     assert not (tmp_path / "own.toml").exists()
     status, out, err = run("probe", "import", "own.dxf", "-o", "own.toml", "--unit", "mm")
-    assert (status, err) == (0, "")
+    assert (status, err) == (0, "note: silicon: 1 hole, cut by polygon 1\n")
     assert "one unit of the file is 1000 µm" in out
     # the unit is in the probe file, so that the drawing is read in it again
     assert "unit_um = 1000 " in (tmp_path / "own.toml").read_text(encoding="utf-8")

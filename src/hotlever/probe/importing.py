@@ -12,7 +12,7 @@ import numpy as np
 from hotlever.errors import InputError
 from hotlever.probe.drawing.layer_inference import FILM, Drawn, LayerInference, infer_layers
 from hotlever.probe.drawing.layers import BODY, DRAWN, HEATER, REQUIRED, SILICON, terminal_part
-from hotlever.probe.drawing.outlines import Ring
+from hotlever.probe.drawing.outlines import DrawingError, Ring, polygons, together
 from hotlever.probe.drawing.shape import TOLERANCE_UM, relative
 from hotlever.probe.drawing.sheet import (
     UNITS,
@@ -38,6 +38,8 @@ _ASSUMED = {
     FILM: {"kind": "metal-film", "preset": "Pd"},
 }
 _FILM_UM = 0.05
+#: How another unit is stated.
+_UNIT_BY = "--unit {unit}"
 _UNSAID, _MISSING = "assumed: a drawing does not say", "not found in the drawing, such as {}"
 
 
@@ -100,7 +102,9 @@ def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None 
         If the file cannot be read, or what it holds is no lever in its unit.
     """
     unit_um = None if unit is None else UNITS[unit]
-    sheet = read_sheet(path, cell, unit_um=unit_um, tolerance_um=TOLERANCE_UM)
+    sheet = read_sheet(
+        path, cell, unit_um=unit_um, tolerance_um=TOLERANCE_UM, unit_stated_by=_UNIT_BY
+    )
     inference = infer_layers(sheet, TOLERANCE_UM)
     _check_unit(sheet, inference, unit)
     listing = _listing(sheet, inference)
@@ -109,7 +113,8 @@ def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None 
     fault: InputError | None = None
     notes: list[str] = []
     try:
-        notes = Probe.from_sections(tomllib.loads(text), str(path), folder).shape.notes()
+        shape = Probe.from_sections(tomllib.loads(text), str(path), folder).shape
+        notes = [note for note in shape.notes() if note not in listing]
     except InputError as error:
         fault = error
     return Imported(sheet, inference, listing, text, fault, notes)
@@ -136,7 +141,7 @@ def _check_unit(sheet: Sheet, inference: LayerInference, unit: str | None) -> No
         if HEATER not in inference.layers and any(map(is_lever, extents.values())):
             return
         better = sensible_unit(extents[name], sheet.unit_um)
-    words = doubt(extents[name], sheet.unit_um, better, "--unit {unit}")
+    words = doubt(extents[name], sheet.unit_um, better, _UNIT_BY)
     raise InputError(f"{sheet.file}: layer {name}: {words}")
 
 
@@ -178,16 +183,22 @@ def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         number = f"{len(layer.rings)}" + (f" + {len(layer.lines)} open" if layer.lines else "")
         extent = [f"{x0:.6g} to {x1:.6g}", f"{y0:.6g} to {y1:.6g}"]
-        area = f"{sum(ring_area(np.array(ring)) for ring in layer.rings):.4g}"
+        area = f"{_area(name, sheet.rings(layer)):.4g}"
         rows.append([name, number, area, *extent, of_layer.get(name, "–")])
     lines += aligned(rows)
     if len(sheet.layers) > _MOST_LISTED:
         lines.append(f"and {len(sheet.layers) - _MOST_LISTED} more layers")
     lines += [f"{label}: {reason}" for label, reason in inference.reasons.items()]
-    if sheet.left_out:
-        kinds = ", ".join(f"{count} {kind}" for kind, count in sheet.left_out.items())
-        lines.append(f"left out, since they draw no outline: {kinds}")
+    lines += [text for _, text in sheet.remarks]
     return lines + [f"to be checked: {doubt}" for doubt in inference.doubts]
+
+
+def _area(name: str, rings: tuple[Ring, ...]) -> float:
+    """Return the area of a layer, or of all its outlines if one is at fault."""
+    try:
+        return float(together(polygons(name, rings, TOLERANCE_UM), TOLERANCE_UM).area)
+    except DrawingError:
+        return float(sum(ring_area(np.array(ring)) for ring in rings if len(ring) > 2))
 
 
 def _probe_file(

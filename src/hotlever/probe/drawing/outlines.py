@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
 from itertools import product
 from typing import Any
 
 import numpy as np
 import shapely
+from scipy import spatial
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
@@ -134,24 +136,87 @@ def _unfolded(polygon: Polygon, part: str, number: int) -> Polygon:
     raise DrawingError("an outline that crosses or touches itself", part, number, point)
 
 
-def together(areas: list[Polygon]) -> BaseGeometry:
+def _levels(areas: Sequence[Polygon], tolerance: float) -> dict[int, int]:
+    """Return how many polygons lie around each, by its index; of the same ones the first counts.
+
+    Of polygons that lie around one, those that lie around each other count.
+    """
+    shapes = np.array(areas, dtype=object)
+    boxes = spatial.cKDTree(shapely.bounds(shapes).reshape(-1, 4))
+    levels = dict.fromkeys(range(len(areas)), 0)
+    for first, second in boxes.query_pairs(tolerance, p=math.inf):
+        rims = areas[first].boundary, areas[second].boundary
+        if shapely.hausdorff_distance(*rims) <= tolerance:
+            levels.pop(max(first, second), None)
+    around: dict[int, list[int]] = {index: [] for index in levels}
+    for inner, outer in zip(*STRtree(shapes).query(shapes, predicate="covered_by"), strict=True):
+        if inner != outer and inner in levels and outer in levels:
+            around[int(inner)].append(int(outer))
+    for index in sorted(levels, key=lambda index: -areas[index].area):
+        levels[index] = 1 + max((levels[outer] for outer in around[index]), default=-1)
+    return levels
+
+
+def together(areas: Sequence[Polygon], tolerance: float) -> BaseGeometry:
     """Return the union of polygons; one that lies inside another is a hole in it."""
-    unique = list({area.normalize().wkb: area for area in areas}.values())
-    inner, outer = STRtree(unique).query(unique, predicate="within")
-    depth = np.bincount(inner[inner != outer], minlength=len(unique))
     whole: BaseGeometry = Polygon()
-    for level in range(depth.max() + 1):
-        here = shapely.union_all(
-            [unique[index] for index in np.flatnonzero(depth == level)], grid_size=GRID
-        )
+    by_level: dict[int, list[Polygon]] = {}
+    for index, level in _levels(areas, tolerance).items():
+        by_level.setdefault(level, []).append(areas[index])
+    for level in sorted(by_level):
+        here = shapely.union_all(by_level[level], grid_size=GRID)
         whole = whole.difference(here) if level % 2 else whole.union(here)
     return whole
 
 
+def holes(areas: Sequence[Polygon], tolerance: float) -> list[int]:
+    """Return the numbers of polygons, from 1, that are holes in others (`together`)."""
+    levels = _levels(areas, tolerance)
+    return sorted(1 + index for index, level in levels.items() if level % 2)
+
+
+def united(
+    rings: tuple[Ring, ...], fills: Sequence[tuple[tuple[Ring, ...], str]], tolerance: float
+) -> tuple[Ring, ...]:
+    """Return outlines of what lies inside some, or in areas that are filled.
+
+    Parameters
+    ----------
+    rings : tuple of rings
+        One inside another is a hole in it.
+    fills : sequence of (rings, str)
+        Outlines of one area each, and which part of them is filled: ``even-odd``, between the
+        ``outer`` ones and those next to them, or ``all``.
+    tolerance : float
+        Slits and holes that are narrower are closed.
+    """
+    if not fills:
+        return rings
+    try:
+        drawn = together(polygons("", rings, tolerance), tolerance)
+    except DrawingError:
+        # what is wrong is told where the layer is used, with its place
+        return rings
+    areas = [drawn, *(_filled(own, rule) for own, rule in fills)]
+    whole = _closed(shapely.union_all(areas, grid_size=GRID), tolerance)
+    return tuple(ring for ring in rings_of(whole) if Polygon(ring).area > tolerance**2)
+
+
+def _filled(rings: tuple[Ring, ...], rule: str) -> BaseGeometry:
+    """Return the area that outlines enclose by a rule of `united`; they may cross themselves."""
+    areas = [shapely.make_valid(Polygon(ring)) for ring in rings]
+    if rule == "all":
+        return shapely.union_all(areas, grid_size=GRID)
+    if rule == "outer":
+        levels = _levels(areas, 0.0)
+        areas = [areas[index] for index in sorted(levels) if levels[index] < 2]
+    return reduce(lambda whole, area: whole.symmetric_difference(area, grid_size=GRID), areas)
+
+
 def without_nested(rings: tuple[Ring, ...]) -> tuple[Ring, ...]:
     """Return the outlines of a GDSII layer without those inside others, where they add nothing."""
-    shapes = [Polygon(ring) if len(ring) > 2 else Polygon() for ring in rings]
-    sound = [polygon if polygon.is_valid else Polygon() for polygon in shapes]
+    # those that run along themselves around a hole are taken apart
+    sound = [shapely.make_valid(Polygon(ring) if len(ring) > 2 else Polygon()) for ring in rings]
     inner, outer = STRtree(sound).query(sound, predicate="within")
     # of equal ones the first stays
     nested = {
@@ -164,7 +229,19 @@ def without_nested(rings: tuple[Ring, ...]) -> tuple[Ring, ...]:
 
 def healed(part: str, areas: list[Polygon], tolerance: float) -> BaseGeometry:
     """Return the union of polygons, slits of less than the tolerance closed."""
-    whole = together(areas)
+    whole = _closed(together(areas, tolerance), tolerance).simplify(STANDS_OUT * tolerance)
+    corners = shapely.count_coordinates(whole)
+    if corners > _MOST_CORNERS:
+        raise DrawingError(
+            f"{corners} corners, expected at most {_MOST_CORNERS}; a larger tolerance_um than "
+            f"{tolerance:g} makes curves of fewer",
+            part,
+        )
+    return whole
+
+
+def _closed(whole: BaseGeometry, tolerance: float) -> BaseGeometry:
+    """Return a shape whose slits of less than the tolerance are closed."""
     half = tolerance / 2
     style = {"join_style": "mitre"}
     closed = whole.buffer(half * 1.01, **style).buffer(-half * 1.01, **style)
@@ -177,14 +254,6 @@ def healed(part: str, areas: list[Polygon], tolerance: float) -> BaseGeometry:
     if added:
         whole = shapely.union_all(
             [whole, *(gap.buffer(GRID, **style) for gap in added)], grid_size=GRID
-        )
-    whole = whole.simplify(STANDS_OUT * tolerance)
-    corners = shapely.count_coordinates(whole)
-    if corners > _MOST_CORNERS:
-        raise DrawingError(
-            f"{corners} corners, expected at most {_MOST_CORNERS}; a larger tolerance_um than "
-            f"{tolerance:g} makes curves of fewer",
-            part,
         )
     return whole
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from hotlever.errors import InputError, quoted
+from hotlever.errors import InputError, counted, quoted
 from hotlever.files import whole_file
 from hotlever.probe.drawing.edges import covered
 from hotlever.probe.drawing.layers import (
@@ -24,7 +24,14 @@ from hotlever.probe.drawing.layers import (
     terminal_values,
 )
 from hotlever.probe.drawing.layout_builder import build_layout
-from hotlever.probe.drawing.outlines import DrawingError, Ring, parts_of, polygons, together
+from hotlever.probe.drawing.outlines import (
+    DrawingError,
+    Ring,
+    holes,
+    parts_of,
+    polygons,
+    together,
+)
 from hotlever.probe.drawing.sheet import (
     FARTHEST_UM,
     Sheet,
@@ -45,6 +52,8 @@ GRID_UM, _MOST_STEPS = 1e-4, 2**31 - 1
 _CELL = "LEVER"
 #: Number of the layer of the first terminal, if there are not more of others.
 _TERMINALS = 10
+#: Holes that are named by their polygons.
+_MOST_HOLES = 10
 
 
 #: A place that is drawn, and an outline or a line, as lists or tuples (µm).
@@ -99,7 +108,7 @@ class DrawnShape(DrawingFile, Shape):
     """
 
     outline_moves: ClassVar[bool] = False
-    read_with: ClassVar[tuple[str, ...]] = ("file", "cell", "unit_um")
+    read_with: ClassVar[tuple[str, ...]] = ("file", "cell", "unit_um", "remarks")
 
     shape: Literal["drawing"] = "drawing"
     thickness_um: float = thickness("of the lever, without films on it")
@@ -111,6 +120,9 @@ class DrawnShape(DrawingFile, Shape):
     )
     edge_bias_um: float = edge_bias()
     tip_um: Point = Field(description="place of the tip, as drawn")
+    remarks: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
+        default=None, description="what of the file does not count, or not as it is drawn"
+    )
     layers: tuple[DrawnLayer, ...]
     terminals: tuple[DrawnTerminal, ...]
 
@@ -157,10 +169,15 @@ class DrawnShape(DrawingFile, Shape):
         return replace(layout, thickness_um=self.thickness_um)
 
     def notes(self) -> list[str]:
-        """Say which contacts cover more of a leg than they count for."""
+        """Say what of the file does not count, what is a hole, and which contacts count as ends."""
+        notes = list(self.remarks or ())
+        for each in (*self.layers, *(end for end in self.terminals if end.by_area)):
+            areas = polygons(each.part, each.drawn, self.tolerance_um)
+            if cut := holes(areas, self.tolerance_um):
+                notes.append(f"{each.part}: {_cut_by(cut)}")
         films = self._scaled(layer for layer in self.layers if layer.is_film)
         rings = [ring for film in films for ring in film.drawn]
-        return covered(self.layout(), self._scaled(self.terminals), rings)
+        return notes + covered(self.layout(), self._scaled(self.terminals), rings)
 
     @classmethod
     def read(
@@ -205,6 +222,8 @@ class DrawnShape(DrawingFile, Shape):
         named = {part: own[DRAWN] for part, own in parts.items() if isinstance(own[DRAWN], str)}
         stated = {key: values[key] for key in DrawingFile.model_fields if key in values}
         sheet = DrawingFile.from_values(stated, here).sheet(here, folder) if named else None
+        if sheet is not None:
+            values["remarks"] = tuple(sheet.notes(named.values())) or None
         for own in layers.values():
             own[DRAWN] = _rings(sheet, own, f"{where}: [layers] {own['name']}")
         for own in terminals.values():
@@ -224,6 +243,15 @@ class DrawnShape(DrawingFile, Shape):
                 drawn=named.get(error.part),
                 outlines={part.part: part.drawn for part in (*drawn_layers, *ends)},
             ) from None
+
+
+def _cut_by(numbers: list[int]) -> str:
+    """Say which polygons are holes."""
+    first = [str(number) for number in numbers[:_MOST_HOLES]]
+    if len(numbers) > _MOST_HOLES:
+        first.append("…")
+    polygons_ = ", ".join(first)
+    return f"{counted(len(numbers), 'hole')}, cut by polygon{'s'[: len(numbers) - 1]} {polygons_}"
 
 
 def _check_unit(sheet: Sheet, body: DrawnLayer) -> None:
@@ -315,7 +343,7 @@ def save_drawing(drawn: DrawnShape, path: str | os.PathLike[str], folder: Path) 
         if farthest > _MOST_STEPS * GRID_UM:
             what = f"{farthest:g} µm from the origin, expected {_MOST_STEPS * GRID_UM:.0f} µm"
             raise DrawingError(f"{what} at most", name)
-        for area in parts_of(together(polygons(name, rings, 0.0))):
+        for area in parts_of(together(polygons(name, rings, 0.0), 0.0)):
             outline, *holes = (
                 gdstk.Polygon(ring.coords[:-1], layer=number)
                 for ring in (area.exterior, *area.interiors)

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +18,16 @@ import shapely
 from scipy import spatial
 from shapely import LineString
 
-from hotlever.errors import InputError, quoted, unknown_name
+from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.files import read_bytes
-from hotlever.probe.drawing.outlines import Ring, rings_of, without_nested
+from hotlever.probe.drawing.outlines import Ring, rings_of, united, without_nested
+from hotlever.probe.drawing.reader import WARNS
 from hotlever.probe.layout import Point
 
 #: Bytes that a file may have, and of memory and seconds that reading it may take.
 _LARGEST, _MEMORY, _PATIENCE_S = 64 * 2**20, 4 * 2**30, 60.0
+#: Warnings of libraries that are told, and their length.
+_MOST_WARNINGS, _LONGEST_WARNING = 5, 200
 #: Coordinates (µm) beyond which nothing is drawn on a wafer.
 FARTHEST_UM = 1e6
 #: Extent of a lever (µm).
@@ -40,7 +43,7 @@ class Layer:
     Attributes
     ----------
     rings : tuple of rings
-        Closed outlines.
+        Closed outlines; of what is filled those of the area that it makes with what lies beside it.
     lines : tuple of rings
         Open ones, which a DXF file may have.
     """
@@ -69,8 +72,11 @@ class Sheet:
         Of the file's numbers.
     unit_stated : bool
         Whether somebody said so: a DXF file need not.
-    left_out : dict of str to int
-        How many entities of a DXF file draw nothing.
+    remarks : list of (str, str)
+        What was left out, or is read otherwise than it may be meant, each with its layer, an empty
+        text if it is of none; and what the libraries that read files warn of.
+    hidden : dict of str to str
+        Layers of a DXF file that are ``off`` or ``frozen``, of which nothing is read.
     """
 
     file: str
@@ -82,19 +88,38 @@ class Sheet:
     labels: list[tuple[str, str, Point]]
     unit_um: float = 1.0
     unit_stated: bool = True
-    left_out: dict[str, int] = field(default_factory=dict)
+    remarks: list[tuple[str, str]] = field(default_factory=list)
+    hidden: dict[str, str] = field(default_factory=dict)
 
     def layer(self, name: str, where: str) -> Layer:
-        """Return a layer by its name.
+        """Return a layer by its name, which in DXF does not differ by case.
 
         Raises
         ------
         InputError
-            If there is none; the text gives the nearest one.
+            If there is none, the text giving the nearest one, or it is hidden.
         """
+        name = self._own_name(name)
+        if name in self.hidden:
+            raise InputError(
+                f"{where}: layer {name} is {self.hidden[name]} in {self.file}, where nothing of it "
+                "is seen: expected one that is seen, or it switched on and thawed"
+            )
         if name not in self.layers:
             raise unknown_name("layer", name, sorted(self.layers), where)
         return self.layers[name]
+
+    def notes(self, names: Iterable[str]) -> list[str]:
+        """Return what should be known of some layers, and of no layer."""
+        own = {"", *map(self._own_name, names)}
+        return [text for layer, text in self.remarks if layer in own]
+
+    def _own_name(self, name: str) -> str:
+        """Return the name of a layer as the file spells it."""
+        if self.kind != "DXF":
+            return name
+        names = (*self.layers, *self.hidden)
+        return next((own for own in names if own.lower() == name.lower()), name)
 
     def rings(self, layer: Layer, *, lines: bool = False) -> tuple[Ring, ...]:
         """Return the outlines of a layer; with `lines` the steps of open ones too."""
@@ -109,6 +134,7 @@ def read_sheet(
     *,
     unit_um: float | None = None,
     tolerance_um: float,
+    unit_stated_by: str = "unit_um = {unit_um:g} in [probe]",
 ) -> Sheet:
     """Read a GDSII, OASIS or DXF file.
 
@@ -121,6 +147,8 @@ def read_sheet(
         What one unit of the file is; what it says if left out, and µm if it says nothing.
     tolerance_um : float
         How far the straight lines that stand for a curve may be from it.
+    unit_stated_by : str, optional
+        How another unit is stated, for `doubt`.
 
     Raises
     ------
@@ -129,10 +157,14 @@ def read_sheet(
     """
     content = read_bytes(path, _LARGEST)
     parsed = _read_apart(content, str(path), cell, unit_um, tolerance_um)
+    _check_places(parsed, str(path), unit_stated_by)
     layers = {}
     for name, outlines in sorted(parsed["layers"].items()):
-        joined, lines = _joined(_points(outlines["lines"], str(path)), tolerance_um)
-        layers[name] = Layer((*_points(outlines["rings"], str(path)), *joined), lines)
+        joined, lines = _joined(_rings(outlines["lines"]), tolerance_um)
+        fills = [(_rings(fill["rings"]), fill["rule"]) for fill in outlines["fills"]]
+        layer = Layer(united((*_rings(outlines["rings"]), *joined), fills, tolerance_um), lines)
+        if layer.rings or layer.lines:
+            layers[name] = layer
     labels = [(layer, text, (x, y)) for layer, text, x, y in parsed["labels"]]
     sheet = Sheet(str(path), **{**parsed, "layers": layers, "labels": labels})
     if sheet.kind == "DXF":
@@ -148,7 +180,8 @@ def read_sheet(
     elif sheet.cell not in sheet.cells:
         raise unknown_name("cell", sheet.cell, sheet.cells, str(path))
     if not layers:
-        raise InputError(f"{path}: holds no outline")
+        why = "; ".join(["holds no outline", *(text for _, text in sheet.remarks[:_MOST_WARNINGS])])
+        raise InputError(f"{path}: {why}")
     return sheet
 
 
@@ -160,6 +193,7 @@ def _read_apart(
         "cell": cell,
         "unit_um": unit_um,
         "tolerance_um": tolerance_um,
+        "largest_um": LARGEST_UM,
         "memory": _MEMORY,
     }
     with tempfile.TemporaryDirectory() as folder:
@@ -188,18 +222,44 @@ def _read_apart(
         raise InputError(f"{path}: a damaged file, which cannot be read") from None
     if "error" in sheet:
         raise InputError(f"{path}: {' '.join(sheet['error'].split())}")
+    # the libraries write their warnings there, gdstk not by way of Python
+    lines = done.stderr.decode(errors="replace").splitlines()
+    warned = list(dict.fromkeys(line for line in lines if line.startswith(WARNS)))
+    remarks = [
+        ("", f"warning while the file was read: {excerpt(line, _LONGEST_WARNING)}")
+        for line in warned[:_MOST_WARNINGS]
+    ]
+    if len(warned) > _MOST_WARNINGS:
+        remarks.append(("", f"and {len(warned) - _MOST_WARNINGS} more warnings"))
+    sheet["remarks"] = [(layer, text) for layer, text in sheet.pop("notes", ())] + remarks
     return sheet
 
 
-def _points(rings: list[list[list[float]]], path: str) -> tuple[Ring, ...]:
-    for ring in rings:
-        for x, y in ring:
-            if not (abs(x) < FARTHEST_UM and abs(y) < FARTHEST_UM):
-                raise InputError(
-                    f"{path}: a corner at ({x:g}, {y:g}) µm, expected less than {FARTHEST_UM:g} "
-                    "µm; is the unit right?"
-                )
+def _rings(rings: list[list[list[float]]]) -> tuple[Ring, ...]:
     return tuple(tuple((x, y) for x, y in ring) for ring in rings)
+
+
+def _check_places(parsed: dict[str, Any], path: str, unit_stated_by: str) -> None:
+    """Refuse what no wafer is large enough for; the likeliest cause is a wrong unit."""
+    drawn = {
+        name: [*own["rings"], *own["lines"], *chain(*(fill["rings"] for fill in own["fills"]))]
+        for name, own in parsed["layers"].items()
+    }
+    extents = {name: extent_of(rings) for name, rings in drawn.items()}
+    for name, rings in drawn.items():
+        points = (point for ring in rings for point in ring)
+        far = (point for point in points if not all(abs(each) < FARTHEST_UM for each in point))
+        if (place := next(far, None)) is None:
+            continue
+        largest = max(extents, key=lambda name: extents[name])
+        unit = sensible_unit(extents[largest], parsed["unit_um"])
+        if unit is not None and not is_lever(extents[largest]):
+            words = doubt(extents[largest], parsed["unit_um"], unit, unit_stated_by)
+            raise InputError(f"{path}: layer {largest}: {words}")
+        raise InputError(
+            f"{path}: layer {name}: a corner at ({place[0]:g}, {place[1]:g}) µm, expected less "
+            f"than {FARTHEST_UM:g} µm; is the unit right?"
+        )
 
 
 def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...], tuple[Ring, ...]]:
