@@ -30,7 +30,7 @@ from hotlever.probe.probe import Probe
 from hotlever.probe.shapes import DRAWING
 from hotlever.text import aligned, as_toml
 
-#: Layers that are listed.
+#: Layers that are listed, and notes on how the file is read.
 _MOST_LISTED = 60
 #: What is assumed of a film that is heater and legs in one, and of the body below it.
 _ASSUMED = {
@@ -189,7 +189,9 @@ def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:
     if len(sheet.layers) > _MOST_LISTED:
         lines.append(f"and {len(sheet.layers) - _MOST_LISTED} more layers")
     lines += [f"{label}: {reason}" for label, reason in inference.reasons.items()]
-    lines += [text for _, text in sheet.remarks]
+    lines += [text for _, text in sheet.remarks[:_MOST_LISTED]]
+    if len(sheet.remarks) > _MOST_LISTED:
+        lines.append(f"and {len(sheet.remarks) - _MOST_LISTED} more notes on how it is read")
     return lines + [f"to be checked: {doubt}" for doubt in inference.doubts]
 
 
