@@ -354,7 +354,8 @@ class _Drawing:
             return
         rule = None
         if kind in _AREAS:
-            rule = _RULES[entity.dxf.get("hatch_style", 0) if kind == "HATCH" else 0]
+            style = entity.dxf.get("hatch_style", 0) if kind == "HATCH" else 0
+            rule = _RULES.get(style, _RULES[0])
         elif kind in ("LWPOLYLINE", "POLYLINE") and entity.has_width:
             self.outlines.note(name, f"{{}} {kind} counts as wide as it is drawn")
             self.wide.append((name, entity))
