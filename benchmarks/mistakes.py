@@ -275,7 +275,7 @@ MISTAKES = [
     Mistake("current in 20 steps", rounded(20), "steps|resolution|quanti"),
     Mistake("an outlier", spoilt(17), "standard deviations"),
     Mistake("five outliers", spoilt(8, 15, 22, 30, 37), "standard deviations"),
-    Mistake("half of the rows from another lever", half_of_another, "two sweeps"),
+    Mistake("half of the rows from another lever", half_of_another, "current jump"),
     Mistake("up and down with drift", up_and_down, "drift|zero"),
     Mistake("contact of 800 ohm", contact, "series resis|contact"),
     Mistake("sweeps in vacuum and air in one file", two_media, "two sweeps"),

@@ -15,6 +15,7 @@ from hotlever.errors import InputError
 from hotlever.estimation import Measurement
 from hotlever.estimation.diagnosis import Diagnosis, _Curve
 from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
 from synthetic_curves import measured_curve, measurement_of
@@ -101,7 +102,7 @@ def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
             marks=pytest.mark.slow,
         ),
         (lambda i, n: np.minimum(i, 0.8 * i.max()), {}, "is the current clipped"),
-        (lambda i, n: np.where(n < 0.5, i, 0.9 * i), {}, "two sweeps, a new one from row"),
+        (lambda i, n: np.where(n < 0.5, i, 0.9 * i), {}, "does the current jump, .* from row 21"),
     ],
 )  # fmt: skip
 def test_the_likeliest_cause_is_found_by_the_model(curve, current, probe, question):
@@ -110,6 +111,17 @@ def test_the_likeliest_cause_is_found_by_the_model(curve, current, probe, questi
         altered_measurement(curve, current_mA=wrong), Probe.reference().with_(**probe)
     )
     assert re.search(question, causes.likeliest())
+
+
+@pytest.mark.slow
+def test_one_sweep_of_another_lever_is_no_two_sweeps():
+    """A U-shape of 120 µm, taken for the reference probe."""
+    lever = Lever(Probe.u_shape().with_(length_um=120.0), COARSE).branch()
+    other = altered_measurement(measured_curve(lever, np.random.default_rng(0)))
+    causes = Diagnosis(other, Probe.reference()).named()
+    assert causes.startswith("is the drawing that of another lever, u-shape?")
+    assert "sweeps" not in causes
+    assert "jump" not in causes
 
 
 def test_good_data_have_no_cause(curve):

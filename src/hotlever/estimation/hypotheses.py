@@ -22,6 +22,9 @@ from hotlever.types import Array, Mask
 _LEVEL_ROWS, _BELOW = 2, 5
 #: The range of a meter may be off by such a factor, and its zero by such a share.
 _FACTOR, _OF_THE_ZERO = 50.0, 0.5
+#: The current of one sweep may jump from row to row: by this share of it, and by so many times as
+#: much as usually; rows that tell, and how many jumps are tried.
+_JUMP, _OUTSTANDING, _JUMP_ROWS, _JUMPS_TRIED = 0.01, 5.0, 8, 3
 #: How much warmer than stated the base may be (K).
 _WARMER = (30.0, 60.0, 100.0)
 
@@ -164,16 +167,44 @@ def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
     def part(first: bool, rows: MeasuredRows, cut: float) -> MeasuredRows:
         return replace(rows, included=(number < cut) == first)
 
-    def asks(cut: float) -> str:
-        return (
-            f"are there two sweeps, a new one from row {cut + 1:.0f} ({bias[int(cut)]:.3g} V) on?"
-        )
+    # one sweep is no two; but something may have changed on the way
+    steps = np.diff(bias)
+    monotonic = bool((steps >= 0).all() or (steps <= 0).all())
 
-    # where the bias goes back, or else at some quarter
-    back = (np.flatnonzero(np.diff(bias) < 0)[:1] + 1).tolist()
-    cuts = [*back, *(quarter * number.size // 4 for quarter in (1, 2, 3))]
-    both = (Hypothesis(asks, partial(part, first), starts=cuts) for first in (True, False))
+    def asks(cut: float) -> str:
+        where = f"row {cut + 1:.0f} ({bias[int(cut)]:.3g} V) on"
+        if monotonic:
+            return f"does the current jump, by another lever or another range, from {where}?"
+        return f"are there two sweeps, a new one from {where}?"
+
+    if monotonic:
+        cuts = _jumps(bias, current)
+    else:
+        # where the bias goes back, or else at some quarter
+        back = (np.flatnonzero(steps < 0)[:1] + 1).tolist()
+        cuts = [*back, *(quarter * number.size // 4 for quarter in (1, 2, 3))]
+    both = [Hypothesis(asks, partial(part, first), starts=cuts) for first in (True, False) if cuts]
     return [*clipped, *both]
+
+
+def _jumps(bias: Array, current: Array) -> list[int]:
+    """Return rows of one sweep from which on the current may be another one.
+
+    Straight lines through two rows on either side say how far it jumps there; a knee has the
+    largest of some levers.
+    """
+    used = np.flatnonzero(np.append(True, np.diff(bias) != 0.0) & (bias > 0) & (current > 0))
+    if used.size < _JUMP_ROWS:
+        return []
+    x, y = np.log(bias[used]), np.log(current[used])
+    slope = np.diff(y) / np.diff(x)
+    middle = 0.5 * (x[1:-2] + x[2:-1])
+    before = y[1:-2] + slope[:-2] * (middle - x[1:-2])
+    after = y[2:-1] + slope[2:] * (middle - x[2:-1])
+    jump = np.abs(after - before)
+    least = max(_JUMP, _OUTSTANDING * float(np.median(jump)))
+    largest = np.argsort(-jump, kind="stable")[:_JUMPS_TRIED]
+    return [int(row) for row in used[largest[jump[largest] > least] + 2]]
 
 
 def _of_the_lever(probe: Probe) -> list[Hypothesis]:
