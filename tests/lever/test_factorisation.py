@@ -108,6 +108,16 @@ def test_memory_is_given_back():
     assert used[2] - used[0] < 8e6
 
 
+@KLU_INSTALLED
+def test_few_factors_wait_for_another_matrix():
+    matrix = random_matrix(1)
+    factorisation = KLU(matrix.indices, matrix.indptr, FactorisationOptions(spare=2))
+    several = [factorisation.factorised(matrix.data) for _ in range(5)]
+    assert len(factorisation._unused) == 0
+    several.clear()
+    assert len(factorisation._unused) == 2
+
+
 @pytest.mark.parametrize("constraint", [TIP, LEVER], ids=["tip", "lever voltage"])
 @pytest.mark.parametrize("place", ["at a node", "inside a triangle"])
 def test_no_unknown_is_missing_from_a_condensed_jacobian(options, constraint, place):

@@ -39,11 +39,15 @@ class FactorisationOptions:
         Factors by the pivots of an earlier matrix are taken if they solve a linear system so
         exactly, relative in each row (W. Oettli and W. Prager, Numer. Math. 6, 405 (1964)).
         Otherwise pivots are chosen anew.
+    spare : int
+        Factors that are no longer in use, and wait for another matrix, at most: those of the
+        reference probe have 4 MB each.
     """
 
     solver: Literal["superlu", "klu"] | None = None
     pivot_threshold: float = 0.01
     backward_error: float = 1e-12
+    spare: int = 8
 
 
 class Factorisation(ABC):
@@ -143,7 +147,7 @@ class KLU(Factorisation):
             solver = _KLUSolver(self._rows, self._starts, self._options.pivot_threshold)
         if not (solver.has_pivots and self._refactorised(solver, entries)):
             solver.factorise(entries)
-        return _KLUFactors(solver, self._unused)
+        return _KLUFactors(solver, self._unused, self._options.spare)
 
     def _refactorised(self, solver: _KLUSolver, entries: Array) -> bool:
         """Factorise with the pivots that there are; return whether they serve."""
@@ -212,11 +216,12 @@ def _free_all() -> None:
 
 
 class _KLUFactors:
-    def __init__(self, solver: _KLUSolver, unused: list[_KLUSolver]) -> None:
-        self._solver, self._unused = solver, unused
+    def __init__(self, solver: _KLUSolver, unused: list[_KLUSolver], spare: int) -> None:
+        self._solver, self._unused, self._spare = solver, unused, spare
 
     def __del__(self) -> None:
-        self._unused.append(self._solver)
+        if len(self._unused) < self._spare:
+            self._unused.append(self._solver)
 
     def solve(self, right_hand_side: Array, transposed: bool = False) -> Array:
         klu = self._solver.klu
