@@ -109,16 +109,15 @@ def main() -> None:
     count = Count()
     count.start()
     asked = [shlex.join(sys.argv[1:])] if sys.argv[1:] else COMMANDS
-    for line in asked:
+    for words in map(shlex.split, asked):
         count.counts.clear()
-        sys.argv[1:] = shlex.split(line)
         with empty_folder(), redirect_stdout(StringIO()):
             try:
-                command()
+                command(words)
             except SystemExit as end:
                 if end.code:
                     raise
-        print(f"\nhotlever {sys.argv[1]}\n")
+        print(f"\nhotlever {words[0]}\n")
         rows = sorted({(phase, size) for phase, size, _ in count.counts})
         table(
             ("phase", "unknowns", *KINDS),
