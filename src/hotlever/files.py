@@ -11,7 +11,7 @@ import os
 import secrets
 import select
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from pathlib import Path
@@ -261,34 +261,6 @@ class Outputs:
 _outputs: ContextVar[Outputs | None] = ContextVar("outputs", default=None)
 
 
-#: Called with each file right before it is made or replaced.
-_keep: ContextVar[Callable[[Path], None] | None] = ContextVar("keep", default=None)
-
-
-@contextmanager
-def kept_before_writing(keep: Callable[[Path], None]) -> Iterator[None]:
-    """Have `keep` called with each file that is written inside the block, right before it is.
-
-    Whoever wants back what is replaced keeps it then; where `keep` fails, nothing is written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder, kept_before_writing(
-    ...     lambda path: print(path.name, path.exists())
-    ... ):
-    ...     write_text(f"{folder}/a.csv", "bias_V")
-    ...     write_text(f"{folder}/a.csv", "bias_V,tip_K")
-    a.csv False
-    a.csv True
-    """
-    before = _keep.set(keep)
-    try:
-        yield
-    finally:
-        _keep.reset(before)
-
-
 @contextmanager
 def whole_file(path: Name) -> Iterator[Path]:
     """Give a temporary path that replaces `path` if the block succeeds.
@@ -368,10 +340,7 @@ def output_folder(path: Name) -> Path:
 
 def _put_in_place(temporary: Path, target: Path) -> None:
     """Rename a file; it gets the permissions of the one it replaces."""
-    keep = _keep.get()
     try:
-        if keep is not None:
-            keep(target)
         if target.exists():
             temporary.chmod(target.stat().st_mode & 0o7777)
         temporary.replace(target)

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from hotlever.app import server
 from hotlever.app.server import Access
 
 TOKEN, LARGEST = "t0ken", 1000
@@ -17,7 +16,6 @@ def ask(
     path: str = "/",
     query: str = "",
     *,
-    password: str | None = None,
     gate: Access | None = None,
     body: bytes = b"",
     method: str = "GET",
@@ -46,7 +44,7 @@ def ask(
     async def send(message: Any) -> None:
         sent.append(message)
 
-    gate = gate or Access(app, TOKEN, {"127.0.0.1"}, password, LARGEST)
+    gate = gate or Access(app, TOKEN, LARGEST)
     gate._app = app
     all_headers = {"host": "127.0.0.1:80", **headers}
     scope = {
@@ -63,8 +61,8 @@ def ask(
     return sent[0]["status"], head, sent[1]["body"]
 
 
-def gate(password: str | None = None) -> Access:
-    return Access(None, TOKEN, {"127.0.0.1"}, password, LARGEST)
+def gate() -> Access:
+    return Access(None, TOKEN, LARGEST)
 
 
 def test_without_the_token_nothing_is_answered() -> None:
@@ -107,24 +105,5 @@ def test_a_request_that_says_it_is_too_large_is_refused(length: str) -> None:
     assert ask(content_length=length)[0] == 413
 
 
-def test_a_request_that_grows_too_large_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "_FORM", 0)
-    same = gate()
-    cookie = ask("/", f"token={TOKEN}", gate=same)[1]["set-cookie"].split(";")[0]
-    assert ask(gate=same, cookie=cookie, body=bytes(LARGEST))[0] == 200
-    assert ask(gate=same, cookie=cookie, body=bytes(LARGEST + 1))[0] == 499
-
-
-def test_others_need_the_password(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "_WRONG_S", 0.0)
-    same = gate("long enough")
-    status, _, page = ask("/", f"token={TOKEN}", gate=same)
-    assert status == 401
-    assert b'type="password"' in page
-    wrong = ask("/enter", gate=same, method="POST", body=b"password=wrong")
-    assert wrong[0] == 401
-    assert "set-cookie" not in wrong[1]
-    right = ask("/enter", gate=same, method="POST", body=b"password=long+enough")
-    assert right[0] == 200
-    cookie = right[1]["set-cookie"].split(";")[0]
-    assert ask(gate=same, cookie=cookie)[0] == 200
+def test_a_request_that_does_not_say_how_long_it_is_is_refused() -> None:
+    assert ask(transfer_encoding="chunked", body=b"1")[0] == 411

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from elements import of, press
 from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import Here, Run, drop, text_of, until, visit
@@ -31,10 +32,10 @@ def _imported(name: str) -> Task:
     return Task("probe import", (name,), {"output": f"{stem}.toml", "plot": f"{stem}.svg"})
 
 
-@pytest.mark.parametrize("address", ["/fit", "/", "/lever", "/raman", "/levers"])
+@pytest.mark.parametrize("address", ["/measurements", "/", "/lever", "/raman"])
 def test_bad_files_are_a_line_each_and_the_page_goes_on(tmp_path: Path, address: str) -> None:
     # what a command will refuse, and is no mistake of the page
-    accepted_suffixes = {"/": (*POOR, *DRAWINGS), "/fit": POOR, "/levers": POOR, "/lever": DRAWINGS}
+    accepted_suffixes = {"/": (*POOR, *DRAWINGS), "/measurements": POOR, "/lever": DRAWINGS}
 
     async def story(user: User, session: Session) -> None:
         tasks: list[Task] = []
@@ -92,14 +93,23 @@ def test_a_line_is_corrected_by_hand_as_by_the_command(
         await until(lambda: "by-hand" in spectrum_text())
         user.find(kind=ui.plotly).trigger("plotly_selected", {"range": {"x": [545.0, 490.0]}})
         await until(lambda: spectrum_text().endswith("(by-hand)"))
-        _, out, _ = run(*shlex.split(tasks[-1].line.partition(" -o ")[0])[1:])
+        await user.should_see("--corrections tip.corrections.csv")
+        assert not (tmp_path / "tip.corrections.csv").exists()
+        press(user, "Measure")
+        _, out, _ = run(*shlex.split(tasks[-1].line.partition(" --save")[0])[1:])
         texts.extend((spectrum_text(), out))
-        user.find("Leave out").click()
+        of(user, ui.checkbox).set_value(True)
         await until(lambda: spectrum_text() == "left-out")
+        # another correction is another file
+        await user.should_see("--corrections tip-2.corrections.csv")
         user.find("As found").click()
         await until(lambda: "551.11 ± 2.52 K" in spectrum_text())
-        assert "--corrections" in tasks[0].line
+        press(user, "Measure")
         assert "--corrections" not in tasks[-1].line
+        # they are those of the file again when that is chosen
+        of(user, ui.select, "Corrected by hand in").set_value("tip.corrections.csv")
+        await until(lambda: spectrum_text().endswith("(by-hand)"))
+        await user.should_see("--corrections tip.corrections.csv")
 
     visit(tmp_path, story)
     row = next(one for one in csv.DictReader(texts[1].splitlines()) if one["file"] == "tip_04.txt")
@@ -111,18 +121,17 @@ def test_a_line_is_corrected_by_hand_as_by_the_command(
 def test_questions_of_the_gallery_open_pages_or_scripts(tmp_path: Path) -> None:
     page = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8")
     assert list(QUESTIONS) == re.findall(r"gallery/(\w+)\.png", page)
-    files = {"how_sure": "lever-a.csv", "metal_film": "palladium-on-nitride.toml"}
 
     async def story(user: User, session: Session) -> None:
-        for name, opened in QUESTIONS.items():
+        for opened in QUESTIONS.values():
             if opened is not None:
                 opened.set_up(session)
                 assert opened.page in session.chosen
-                assert not opened.key or (tmp_path / files.get(name, "lever-a.csv")).is_file()
-        await user.open("/fit")
-        await user.should_see("hotlever fit lever-a.csv -o lever-a.fit.json", retries=50)
+        assert session.probe == "palladium-on-nitride.toml"
+        await user.open("/measurements")
+        await user.should_see("hotlever fit lever-a.csv --probe palladium", retries=50)
         await user.open("/raman")
-        await user.should_see("hotlever raman tip --calibrate-from hot-plate")
+        await user.should_see("hotlever raman tip --calibrate-from hot-plate", retries=50)
         await user.open("/")
         for question in re.findall(r"^## (.+)", page, re.MULTILINE):
             await user.should_see(question)
@@ -141,8 +150,8 @@ def test_a_page_that_waits_for_a_busy_process_is_shown(tmp_path: Path) -> None:
     async def story(user: User, session: Session) -> None:
         session.workers["full"] = Busy()  # type: ignore[assignment]
         (tmp_path / "lever-a.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
-        await user.open("/fit")
-        await user.should_see("Measurement")
+        await user.open("/measurements")
+        await user.should_see("Measurements")
         await user.should_see("What was understood", retries=200)
 
     visit(tmp_path, story)
@@ -154,8 +163,7 @@ def titles(user: User) -> str:
     return "; ".join(str(one.props["label"]) for one in there)
 
 
-@pytest.mark.parametrize("address", ["/fit", "/calibrate"])
-def test_without_a_measurement_an_example_is_shown(tmp_path: Path, address: str) -> None:
+def test_without_a_measurement_an_example_is_shown(tmp_path: Path) -> None:
     """Logs, spectra and results are there, and none of them is taken for a measurement."""
     shutil.copy(EXAMPLES / "raman" / "tip" / "tip_00.txt", tmp_path)
     (tmp_path / "log.csv").write_text("time (s),temperature (K)\n0,293\n1,294\n")
@@ -165,22 +173,23 @@ def test_without_a_measurement_an_example_is_shown(tmp_path: Path, address: str)
     )
 
     async def story(user: User, session: Session) -> None:
-        await user.open(address)
+        await user.open("/measurements")
         await until(lambda: "An example, lever-a.csv" in titles(user))
         plots = [one for one in user.client.elements.values() if isinstance(one, ui.plotly)]
         assert len(plots[0].figure["data"][0]["x"]) == 25  # type: ignore[index,call-overload]
         assert not text_of(user, "role=alert").strip()
-        assert session.chosen[address[1:]]["data"] is None
+        assert session.chosen["measurements"]["data"] == []
         user.find("Try the example").click()
-        await user.should_see(f"hotlever {address[1:]} lever-a.csv", retries=50)
+        await user.should_see("hotlever calibrate lever-a.csv", retries=50)
         assert (tmp_path / "lever-a.csv").is_file()
         # a measurement that is there is taken the next time, whatever is newer
         (tmp_path / "newer.csv").write_text("time (s),temperature (K)\n0,293\n1,294\n")
-        session.choices(address[1:])["data"] = None
-        await user.open(address)
-        await user.should_see(f"hotlever {address[1:]} lever-a.csv", retries=50)
-        await user.open("/levers")
-        await until(lambda: session.chosen["levers"]["data"] == ["lever-a.csv"])
-        await user.should_not_see("-o fits")  # one is fitted on another page
+        session.chosen["measurements"]["data"] = None
+        await user.open("/measurements")
+        await user.should_see("hotlever calibrate lever-a.csv", retries=50)
+        # and all that are there
+        (tmp_path / "lever-b.csv").write_bytes((EXAMPLES / "lever-b.csv").read_bytes())
+        press(user, "All")
+        await user.should_see("hotlever calibrate lever-b.csv lever-a.csv", retries=50)
 
     visit(tmp_path, story)

@@ -58,7 +58,7 @@ def test_contact_shows_the_numbers_of_the_command(
 
 def test_a_slider_by_decades_keeps_what_is_typed(tmp_path: Path) -> None:
     async def story(user: User, session: Session) -> None:
-        await user.open("/materials")
+        await user.open("/")
         with user:
             field = slider("length", 0.0, 1.0, 1e4, by_decades=True, from_zero=True)
         bar = named(user, "length", ui.slider)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
-import os
 import zipfile
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +21,8 @@ from hotlever.app.pages.driven import Pulses
 from hotlever.app.pages.frame import ErrorBanner
 from hotlever.app.project import EXAMPLES
 from hotlever.app.session import Session
-from hotlever.app.state import Simulate
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.calibration.power_law import EQ12
-from hotlever.calibration.procedure import calibrate
 from hotlever.errors import HotleverError
-from hotlever.files import CALIBRATION
 
 
 class Hearing(Here):
@@ -60,8 +54,7 @@ def at_once(session: Session) -> None:
     """Have tasks of pages done in this process, before the page goes on."""
 
     def start(page: str, task: Task) -> Job:
-        session.jobs.by_page[page], _ = done(task, session.project.folder)
-        return session.jobs.by_page[page]
+        return session.jobs.add(page, done(task, session.project.folder)[0])
 
     session.jobs.start = start  # type: ignore[method-assign]
 
@@ -70,7 +63,7 @@ def understood(folder: Path) -> dict[str, Any]:
     """Return what a measurement is understood as, in this process."""
     here: Any = Here()
     with contextlib.chdir(folder):
-        return showing.understood(here, "mine.csv")
+        return showing.understood(here, "mine.csv", {})
 
 
 def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
@@ -93,8 +86,9 @@ def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
     assert off(curves[-1]) < 0.005
 
     async def story(user: User, session: Session) -> None:
-        session.jobs.by_page["fit"] = job
-        await user.open("/fit")
+        session.jobs.add("measurements", job)
+        session.chosen["measurements"] = {"kind": "fit", "data": ["mine.csv"]}
+        await user.open("/measurements")
         await user.should_see("Line: the lever as the fit has it", retries=50)
         plots = [one for one in user.client.elements.values() if isinstance(one, ui.plotly)]
         measured, model = plots[0].figure["data"]  # type: ignore[index,call-overload]
@@ -107,10 +101,10 @@ def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
 @pytest.mark.slow
 def test_pulses_in_the_page_are_those_of_the_command_and_of_python(tmp_path: Path) -> None:
     chosen = {"kind": "train", "height": 6.0, "length": 1.0, "period": 2.5, "count": 2}
-    lever = {"changes": {"c_kappa": 0.7}, "view": "time"}
+    lever = {"probe": "", "changes": {"c_kappa": 0.7}, "view": "time"}
 
     async def story(user: User, session: Session) -> None:
-        session.reduced[None, ()] = False
+        session.reduced["", ()] = False
         session.chosen |= {"simulate": lever, "pulse": {**chosen, "until": 4.0}}
         await user.open("/simulate")
         words = "pulse --set c_kappa=0.7 --pulse 6V,1us --period 2.5us --count 2 --until 4us"
@@ -119,9 +113,10 @@ def test_pulses_in_the_page_are_those_of_the_command_and_of_python(tmp_path: Pat
         with user:
             task = Pulses(session, ErrorBanner(""), session.chosen["simulate"]).task()
         assert task.line == f"hotlever {words}"
-        job = session.jobs.by_page["pulse"] = done(task, tmp_path)[0]
+        job = session.jobs.add("pulse", done(task, tmp_path)[0])
         await user.open("/simulate")
         labels = [one.text for one in user.client.elements.values() if isinstance(one, ui.label)]
+        assert f"hotlever {words}" in labels  # of the result
         lines = next(text for text in labels if "simulate(lever, " in text)
         found: dict[str, Any] = {}
         exec(lines, found)
@@ -145,14 +140,14 @@ def test_fields_leave_as_one_file(tmp_path: Path) -> None:
         await user.open("/simulate")
         job = Job(Task("pulse", (), {"fields": "a.fields"}))
         (tmp_path / "a.fields").mkdir()
-        for name in ("1.vtu", "2.vtu", "3.vtu"):
+        for name in ("1.vtu", "2.vtu"):
             (tmp_path / "a.fields" / name).write_text(name)
-        os.utime(tmp_path / "a.fields" / "1.vtu", (0, 0))  # of another command
         with user:
-            await Pulses(session, ErrorBanner(""), Simulate().model_dump()).give(job)
+            lever = {"probe": "", "changes": {}, "beside": ""}
+            await Pulses(session, ErrorBanner(""), lever).give(job)
             await until(lambda: bool(user.download.http_responses))
         packed = zipfile.ZipFile(io.BytesIO(user.download.http_responses[-1].content))
-        assert packed.namelist() == ["2.vtu", "3.vtu"]
+        assert packed.namelist() == ["1.vtu", "2.vtu"]
 
     visit(tmp_path, story)
 
@@ -163,50 +158,3 @@ def test_what_was_measured_in_time_is_drawn_against_time(tmp_path: Path) -> None
     found = understood(tmp_path)
     assert found["data"]["time_us"] == pytest.approx([0.1 * n for n in range(20)])
     assert len(found["data"]["current_mA"]) == 20
-
-
-def test_a_pulse_is_told_where_its_file_has_no_bias(tmp_path: Path) -> None:
-    rows = "".join(f"{0.1 * n},{1.28 - 0.01 * n:.3f}\n" for n in range(20))
-    (tmp_path / "mine.csv").write_text(f"t (us),I_h (mA)\n{rows}")
-
-    async def story(user: User, session: Session) -> None:
-        session.chosen["fit"] = {"data": "mine.csv", "free": "n_d, a0"}
-        await user.open("/fit")
-        await user.should_see("--pulse 10V,5us", retries=50)  # what is missing, and how to say it
-        user.find("Pulse of a file in time (10V,20us)").type("9V, 5us")
-        await user.should_see("What was understood", retries=50)
-        words = "fit mine.csv --pulse 9V,5us --free n_d,a0 -o mine.fit.json"
-        await user.should_see(f"hotlever {words}", retries=50)
-
-    visit(tmp_path, story)
-
-
-def test_a_refused_calibration_says_nothing_of_what_to_set(tmp_path: Path) -> None:
-    """It showed 600 K ± 5 K below the line that no such lever shows the data."""
-    (tmp_path / "mine.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
-    calibrated = calibrate(tmp_path / "mine.csv", law=EQ12)
-    answered: dict[str, str] = {}
-    for reason in ("", "current differs by 7%"):
-        replace(calibrated, reason=reason).write(tmp_path / f"mine{CALIBRATION}")
-
-        async def story(user: User, session: Session, reason: str = reason) -> None:
-            at_once(session)
-            await user.open("/calibrate")
-            mark = "data-answer=none" if reason else "data-answer=tip_K"
-            await until(lambda: len(text_of(user, mark)) > 10)
-            answered[reason] = " ".join(
-                text_of(user, f"data-answer={along}")
-                for along in ("none", "tip_K", "bias_V", "power_mW")
-            )
-            if not reason:
-                user.find("Propose").click()
-                # by the paper's rule there is no posterior to ask
-                await user.should_see("expected one of a probe with priors", retries=50)
-
-        visit(tmp_path, story)
-    assert answered[""].count("set a bias of") == 3
-    assert "This calibration does not tell. No lever like this one shows these data: current " in (
-        refusal := answered["current differs by 7%"]
-    )
-    assert "set a bias" not in refusal
-    assert "±" not in refusal

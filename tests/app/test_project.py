@@ -32,6 +32,17 @@ def test_a_dropped_file_replaces_none_of_the_same_name(tmp_path: Path) -> None:
     assert project.spectra("tip") == ["b.txt"]
 
 
+def test_what_is_written_has_a_new_name(tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    assert project.free("a", ".toml", ".svg") == "a"
+    project.write("a.toml", "1")
+    (tmp_path / "a-2.svg").write_text("2")
+    assert project.free("a", ".toml", ".svg") == "a-3"
+    with pytest.raises(InputError, match=r"a\.toml: is there already, .* such as a-2\.toml"):
+        project.write("a.toml", "3")
+    assert (tmp_path / "a.toml").read_text() == "1"
+
+
 def test_nothing_outside_of_the_folder_is_read_or_written(tmp_path: Path) -> None:
     project = Project(tmp_path / "inner")
     (tmp_path / "secret.csv").write_text("")
@@ -48,6 +59,8 @@ def test_a_file_that_is_too_large_is_refused(tmp_path: Path) -> None:
 
 def test_files_are_told_apart_by_what_they_hold(tmp_path: Path) -> None:
     (tmp_path / "one.fit.json").write_text('{"correlation": 1}')
+    (tmp_path / "fits-2").mkdir()
+    (tmp_path / "fits-2" / "b.json").write_text("{}")
     (tmp_path / "cal.json").write_text('{"route": 1, "power_law": {}}')
     (tmp_path / "bad.json").write_text("{")
     (tmp_path / "list.json").write_text("[1]")
@@ -57,7 +70,8 @@ def test_files_are_told_apart_by_what_they_hold(tmp_path: Path) -> None:
     (tmp_path / ".hidden.csv").write_text("")
     (tmp_path / "l.GDS").write_text("")
     project = Project(tmp_path)
-    assert project.fits == ["one.fit.json"]
+    assert project.fits == ["one.fit.json", "fits-2/b.json"]
+    assert project.calibrations == ["cal.json"]
     assert project.laws == ["cal.json"]
     assert project.probes == ["p.toml"]
     assert project.data == ["m.csv"]

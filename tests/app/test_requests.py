@@ -21,13 +21,12 @@ TASKS = [
     Task("contact", (), {"sample": "polymer, 100nm, silicon", "radius": "5nm", "bias": "8V"}),
     Task("reader", (), {"set": ["surface_tilt_deg=-3"], "amplifier": "0nV", "hooge": 1e-5}),
     Task("spectrum", (), {"bias": "0", "frequency": "1Hz:1e7Hz:71", "amplitude": ""}),
-    Task("design", (), {"vary": ["a=-1:2:3", "b=1:2:3"], "power": 0.0, "no_air": True}),
-    Task("design", (), {"vary": ["a=1:2:3"], "power": -2.5, "annealing_min": 0, "no_air": False}),
     Task("fit", ("my data.csv",), {"column": ["I_h (uA)=Current"], "fix": ["p"], "robust": True}),
     Task("fit", ("a.csv", "b.csv"), {"probe": "p.toml", "output": "fits", "report": "levers"}),
     Task("calibrate", ("a.csv",), {"power_law": "f.json", "prior": ["usual"], "table": "t.csv"}),
     Task("next", ("a.json",), {"at": "800K", "stay_below": "900.5K", "output": "n.csv"}),
     Task("raman", ("tip",), {"calibrate_from": ["plate"], "law": "", "plot": "r.svg"}),
+    Task("probe new", (), {"shape": "u-shape", "output": "u.toml"}),
     Task("probe show", ("a.toml",), {"plot": "a.svg", "mesh": True}),
 ]
 

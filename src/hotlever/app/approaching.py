@@ -1,7 +1,8 @@
 """A reader over a surface that sliders move. Runs in worker processes.
 
-A coarse lever is solved at some distances, once for all biases. What it shows at another distance
-is read off the curves through these, whose slopes are exact.
+While sliders move, a coarse lever answers that is solved at some distances, once for all biases:
+what it shows at another distance is read off the curves through these, whose slopes are exact. When
+they rest, the full lever, whose numbers are those of ``hotlever reader``.
 """
 
 from __future__ import annotations
@@ -21,28 +22,27 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.lever import Branch, Lever
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reader import Reader, Signal, at_distance
+from hotlever.lever.reader import Reader, Signal, at_distance, over_surface, reading_notes
 from hotlever.probe import Layout, Probe
 from hotlever.probe.shapes import Shape
 from hotlever.steps import each
+from hotlever.tasks.shared import make_lever, notes_of
 from hotlever.tasks.surfaces import jumping_at_tip, needs_jump, noise_of, probe_over_surface
 from hotlever.tasks.texts import parse_bias, parse_distances
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
-#: Distances at which levers are solved, levers kept, and pieces of the drawn lever.
-_DISTANCES, _CACHE_SIZE, _PIECES = 9, 3, 80
+#: Levers kept, and pieces of the drawn lever.
+_CACHE_SIZE, _PIECES = 3, 80
 #: The nearest and the farthest distance (µm), and the least below any part of the lever.
 _NEAREST_UM, _FARTHEST_UM, _CLEAR_UM = 0.2, 5.0, 0.1
-#: Temperatures (K) as at which the air jumps alike: the voltage is the same within 0.1 %.
-_SAME_JUMP_K = 2.0
 #: What is read off by the distance.
 _READ = tuple(name for name in Signal._fields if not name.startswith(("source", "crosstalk")))
 #: What is drawn by the distance.
 _CURVES = ("reader_V", "dlnR_dz_per_um", "noise_V_per_rtHz", "resolution_nm_per_rtHz", "tip_K")
 
 
-def described(report: Report, name: str | None, tilt_deg: float | None) -> dict[str, Any]:
+def described(report: Report, name: str, tilt_deg: float | None) -> dict[str, Any]:
     """Return the distances (µm) that a probe allows, and what its file says of its surroundings."""
     probe = probe_of(name)
     around = probe.surroundings
@@ -61,8 +61,10 @@ def described(report: Report, name: str | None, tilt_deg: float | None) -> dict[
 
 
 @one_blas_thread
-def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str, Any]:
-    """Return what a reader shows at a distance (µm), and by the distance.
+def answer(
+    report: Report, task: Task, distance: float, quick: bool, jump_K: float | None
+) -> dict[str, Any]:
+    """Return what a reader shows at a distance (µm), and if `quick` by the distance too.
 
     Parameters
     ----------
@@ -71,7 +73,10 @@ def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str
         That of ``hotlever reader``, at a bias, over the distances of the curves.
     distance : float
     quick : bool
-        By levers that are solved already, with the air's temperature jump of another bias.
+        Whether the coarse lever is to answer.
+    jump_K : float or None
+        The temperature as at which the air jumps for it, where the probe leaves that open; that of
+        its own tip if None. The full lever takes that of its own, as the command does.
 
     Raises
     ------
@@ -80,15 +85,40 @@ def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str
     """
     request = request_of(task)
     ends = parse_distances(request.distance)
-    distances = np.geomspace(ends[0], ends[-1], _DISTANCES)
+    distances = np.geomspace(ends[0], ends[-1], ends.size)
     probe = probe_over_surface(report, request, distances)
     bias = float(parse_bias(request.bias, probe.lowest_bias_V).item())
-    probe = _jumping(report, probe, bias, quick)
-    reader = Reader(probe, noise_of(request))
-    levers = _levers(report, probe, tuple(distances.tolist()))
-    signals: dict[float, Signal] = {}
+    if quick:
+        if needs_jump(probe) and jump_K is None:
+            probe = jumping_at_tip(report, _nearest(report, probe, True), bias).probe
+        elif needs_jump(probe):
+            probe = probe.with_(jump_temperature_K=jump_K)
+        return _moving(report, Reader(probe, noise_of(request)), distances, distance, bias)
+    with report.progress("full lever") as update:
+        update(0, 2)
+        lever = _nearest(report, probe, False)
+        if needs_jump(probe):
+            lever = jumping_at_tip(report, lever, bias)
+        update(1, 2)
+        data = over_surface(lever, [distance], [bias], noise_of(request))
+    if not data.tip_K.notnull().any():
+        raise ComputationError(notes_of(data)[0])
+    report.note(*notes_of(data))
+    values = {name: float(data[name].item()) for name in _READ}
+    return {
+        "now": {"bias_V": bias, "surface_gap_um": distance, **values},
+        "jump_K": lever.probe.surroundings.jump_temperature_K if needs_jump(probe) else None,
+        "read_at": data.attrs["read_at"],
+    }
+
+
+def _moving(
+    report: Report, reader: Reader, distances: Array, distance: float, bias: float
+) -> dict[str, Any]:
+    """Return what coarse levers at some distances show, and between them at another one."""
+    probe, signals, states = reader.probe, dict[float, Signal](), {}
     failures: list[ComputationError] = []
-    states = {}
+    levers = _levers(report, probe, tuple(distances.tolist()))
     for z, lever in zip(distances.tolist(), levers, strict=True):
         branch, reading, failure = lever.read(np.array([bias]))
         if failure is None:
@@ -102,10 +132,10 @@ def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str
     columns = {
         name: np.array([getattr(signal, name) for signal in signals.values()]) for name in _READ
     }
+    by_bias = {name: values[:, None] for name, values in columns.items()}
     nearest = min(states, key=lambda at: abs(math.log(at / distance)))
     hottest, line = _hottest(*states[nearest]), _Line(probe.layout())
-    base = probe.circuit.base_temperature_K
-    around = probe.surroundings
+    base, around = probe.circuit.base_temperature_K, probe.surroundings
     return {
         "now": {"bias_V": bias, "surface_gap_um": distance, **_at(distance, z, columns)},
         "curves": {"surface_gap_um": z, **{name: columns[name] for name in _CURVES}},
@@ -115,34 +145,14 @@ def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str
         "tip": None if probe.tip is None else (probe.tip.height_um, probe.tip.base_radius_um),
         "slope": math.tan(math.radians(around.surface_tilt_deg)),
         "read_at": reader.terminal,
+        "on_curves": reading_notes(reader, z, np.array([bias]), by_bias),
     }
 
 
-def _jumping(report: Report, probe: Probe, bias: float, quick: bool) -> Probe:
-    """Return a probe with the jump of the air as the command has it, or quickly as it was last."""
-    if not needs_jump(probe):
-        return probe
-    last = _jumps.get(probe)
-    if last is None or not quick:
-        jumping = jumping_at_tip(report, _nearest(probe), bias).probe
-        if last is None or not math.isclose(
-            last.surroundings.jump_temperature_K,
-            jumping.surroundings.jump_temperature_K,
-            abs_tol=_SAME_JUMP_K,
-        ):
-            _jumps.clear()
-            last = _jumps[probe] = jumping
-    return last
-
-
-#: The last probe with the jump of the air at its tip, by what it is without.
-_jumps: dict[Probe, Probe] = {}
-
-
 @lru_cache(maxsize=_CACHE_SIZE)
-def _nearest(probe: Probe) -> Lever:
-    """Return a coarse lever at the nearest distance."""
-    return Lever(probe, COARSE)
+def _nearest(report: Report, probe: Probe, coarse: bool) -> Lever:
+    """Return a lever at the nearest distance."""
+    return Lever(probe, COARSE) if coarse else make_lever(report, probe)
 
 
 @lru_cache(maxsize=_CACHE_SIZE)

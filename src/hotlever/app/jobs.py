@@ -16,7 +16,6 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter, ValidationError
 
-from hotlever.app.changes import Changes
 from hotlever.app.workers import Report, Worker
 from hotlever.errors import HotleverError, InputError
 from hotlever.probe import Probe
@@ -24,8 +23,8 @@ from hotlever.tasks.commands import COMMANDS
 
 Standing = Literal["running", "done", "failed", "cancelled"]
 
-#: Notes kept of a task.
-_MOST_NOTES = 200
+#: Notes kept of a task, and jobs of a page.
+_MOST_NOTES, _MOST_JOBS = 200, 50
 #: Share of the work from which on it tells how long the rest takes: it may begin slowly.
 _TELLING = 0.03
 
@@ -83,9 +82,22 @@ class Task:
         return replace(self, options={**options, **files})
 
     @property
+    def question(self) -> Task:
+        """What it asks, whatever it is written to."""
+        asked = self.writing({})
+        return replace(asked, options=asked.effective_options)
+
+    @property
     def written(self) -> str:
         """The file or folder that shows whether it has written what was asked for."""
         return str([value for value in self.options.values() if value][-1])
+
+    @property
+    def read(self) -> list[str]:
+        """What may be files that it reads."""
+        values = self.question.options.values()
+        lists = (value if isinstance(value, list) else [value] for value in values)
+        return [*self.files, *(str(value) for each in lists for value in each)]
 
 
 @dataclass
@@ -159,16 +171,27 @@ class Jobs:
         self._spare: Worker | None = None
         self._workers: dict[str, Worker] = {}
         self._running: set[asyncio.Task[None]] = set()
-        self.by_page: dict[str, Job] = {}
+        self._by_page: dict[str, list[Job]] = {}
 
     def prepare(self) -> None:
         """Have a process ready."""
         if self._spare is None or self._spare.lost:
             self._spare = Worker(self._folder)
 
+    def add(self, page: str, job: Job) -> Job:
+        """Count a job to a page."""
+        jobs = self._by_page.setdefault(page, [])
+        jobs.insert(0, job)
+        del jobs[_MOST_JOBS:]
+        return job
+
+    def of(self, page: str) -> list[Job]:
+        """Return the jobs of a page, the latest first."""
+        return self._by_page.get(page, [])
+
     def running(self, page: str) -> bool:
         """Return whether a page has work."""
-        return page in self.by_page and self.by_page[page].standing == "running"
+        return any(job.standing == "running" for job in self.of(page)[:1])
 
     def start(self, page: str, task: Task) -> Job:
         """Have a task done for a page.
@@ -180,7 +203,7 @@ class Jobs:
         """
         if self.running(page):
             raise HotleverError("this is being worked on already; cancel it first")
-        job = self.by_page[page] = Job(task)
+        job = self.add(page, Job(task))
         self.prepare()
         assert self._spare is not None
         self._workers[page], self._spare = self._spare, None
@@ -208,7 +231,7 @@ class Jobs:
     async def cancel(self, page: str) -> None:
         """End what a page works on."""
         if self.running(page):
-            self.by_page[page].end("cancelled")
+            self.of(page)[0].end("cancelled")
             await self._workers[page].end()
 
 
@@ -216,16 +239,14 @@ class Jobs:
 
 
 def run(report: Report, task: Task) -> None:
-    """Do a task; what it writes can be undone.
+    """Do a task.
 
     Raises
     ------
     HotleverError
         If it cannot be done, or only in part.
     """
-    request = request_of(task)
-    with Changes(Path()).recorded(task.line):
-        COMMANDS[task.command].do(report, request)
+    COMMANDS[task.command].do(report, request_of(task))
 
 
 def request_of(task: Task) -> Any:
@@ -237,8 +258,6 @@ def request_of(task: Task) -> Any:
         As the command line says, if a value is not of its option's type.
     """
     command, options = COMMANDS[task.command], task.effective_options
-    switched_off = [name for name in options if name.startswith("no_")]
-    options |= {name.removeprefix("no_"): not options.pop(name) for name in switched_off}
     if task.files:
         (argument,) = command.arguments
         several = "list" in str(argument.type)
@@ -251,6 +270,6 @@ def request_of(task: Task) -> Any:
         raise InputError(f"Invalid value for '--{name}': {first['msg']}") from None
 
 
-def probe_of(name: str | None) -> Probe:
+def probe_of(name: str) -> Probe:
     """Return the probe of a file, the reference probe where none is named."""
-    return Probe.reference() if name is None else Probe.from_file(name)
+    return Probe.from_file(name) if name else Probe.reference()

@@ -235,7 +235,7 @@ def prepare(report: Report, task: Task) -> bool:
     return True
 
 
-def described(report: Report, name: str | None) -> dict[str, Any]:
+def described(report: Report, name: str) -> dict[str, Any]:
     """Return what sliders need of a probe: by group names, values, bounds and units."""
     probe = probe_of(name)
     sliders: dict[str, list[Any]] = {"material": [], "dimensions": [], "circuit": []}

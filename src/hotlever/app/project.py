@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 import unicodedata
 from pathlib import Path
 
-from hotlever.app.changes import HIDDEN, Changes
 from hotlever.errors import InputError
-from hotlever.files import TABLE, output_folder, read_text, whole_file, write_text
+from hotlever.files import TABLE, output_folder, whole_file, write_text
 
 #: Bytes that a dropped file may have.
 LARGEST_FILE = 64 * 2**20
@@ -18,20 +16,17 @@ LARGEST_FILE = 64 * 2**20
 _LONGEST = 100
 #: Files that are listed of a kind, and bytes read of one to tell what it is.
 _MOST, _BEGINNING = 500, 2**22
-#: Bytes that a probe file may have.
-LARGEST_PROBE = 1_000_000
 
 DATA = (".csv", ".txt", ".tsv", ".dat", ".lvm", ".tdms", ".ibw", ".asc")
 DRAWINGS = (".gds", ".gds2", ".gdsii", ".oas", ".oasis", ".dxf")
-#: What the app writes beside a measurement begins with its name and ends so; see also `files`.
-FIT = ".fit.json"
-#: Folders of the fits and of the calibrations of many levers.
+#: What a fit is called that the app writes, and corrections of spectra; see also `files`.
+FIT, CORRECTIONS = ".fit.json", ".corrections.csv"
+#: Folders of the fits and of the calibrations of many levers; they may end with a number.
 FITS, CALIBRATIONS = "fits", "calibrations"
 #: Endings of tables that commands write: no measurements.
 _WRITTEN = (
-    *(TABLE, ".raman.csv", ".corrections.csv"),
-    *(".sweep.csv", ".pulse.csv", ".spectrum.csv", ".design.csv"),
-    *(".contact.csv", ".reader.csv", ".next.csv"),
+    *(TABLE, CORRECTIONS, ".raman.csv", ".sweep.csv", ".pulse.csv", ".spectrum.csv"),
+    *(".design.csv", ".contact.csv", ".reader.csv", ".next.csv"),
 )
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -83,11 +78,6 @@ class Project:
     folder : path
         Made if it does not exist.
 
-    Attributes
-    ----------
-    changes : Changes
-        What the app wrote here, and what was there before.
-
     Raises
     ------
     InputError
@@ -98,12 +88,6 @@ class Project:
         if Path(folder).is_file():
             raise InputError(f"{folder}: is a file, expected a folder")
         self.folder = output_folder(folder).resolve()
-        self.changes = Changes(self.folder)
-
-    @property
-    def hidden(self) -> Path:
-        """Folder for what is the app's own; it may not exist yet."""
-        return self.folder / HIDDEN
 
     def path(self, name: str) -> Path:
         """Return the path of a file of the project.
@@ -146,21 +130,29 @@ class Project:
 
     @property
     def fits(self) -> list[str]:
-        """Fit files."""
-        alone = [name for name in self.names(".json") if "correlation" in self._keys(name)]
-        among = (f"{FITS}/{path.name}" for path in sorted(self.path(FITS).glob("*.json")))
-        return [*alone, *list(among)[:_MOST]]
+        """Fit files, those of many levers too."""
+        return self._with_keys({"correlation"}, FITS)
+
+    @property
+    def calibrations(self) -> list[str]:
+        """Calibration files, those of many levers too."""
+        return self._with_keys({"route"}, CALIBRATIONS)
 
     @property
     def laws(self) -> list[str]:
         """Files that hold a power law."""
-        law_keys = {"power_law", "linear_K_per_mW"}
-        return [name for name in self.names(".json") if law_keys & self._keys(name)]
+        return self._with_keys({"power_law", "linear_K_per_mW"})
 
     @property
     def raman_calibrations(self) -> list[str]:
         """Calibrations of a Raman thermometer."""
-        return [name for name in self.names(".json") if "anharmonic" in self._keys(name)]
+        return self._with_keys({"anharmonic"})
+
+    def _with_keys(self, keys: set[str], folder: str = "") -> list[str]:
+        """Return the JSON files with one of some keys, and all in folders of a name."""
+        alone = [name for name in self.names(".json") if keys & self._keys(name)]
+        among = sorted(self.folder.glob(f"{folder}*/*.json")) if folder else []
+        return [*alone, *(path.relative_to(self.folder).as_posix() for path in among[:_MOST])]
 
     def _keys(self, name: str) -> set[str]:
         """Return the keys of a JSON file; none of one that is too large or damaged."""
@@ -181,48 +173,30 @@ class Project:
         """Return when a file was written; 0 if it does not exist."""
         return _time_of(self.path(name))
 
-    def probe_of_drawing(self, drawing: str) -> tuple[str, bool]:
-        """Return the name of the probe file of a drawing, and whether it is there already.
-
-        A file of that name that is a probe of something else is none of the drawing's: the name
-        then has a number. One that cannot be read is taken to be: somebody is editing it.
-        """
-        stem, number = Path(drawing).stem, 1
-        name = f"{stem}.toml"
-        while self.path(name).exists():
-            if self._is_of_drawing(name, drawing):
-                return name, True
-            number += 1
-            name = f"{stem}-{number}.toml"
-        return name, False
-
-    def _is_of_drawing(self, name: str, drawing: str) -> bool:
-        try:
-            content = tomllib.loads(read_text(self.path(name), largest=LARGEST_PROBE))
-        except (InputError, ValueError, RecursionError):
-            return True
-        section = content.get("probe")
-        file = section.get("file") if isinstance(section, dict) else None
-        if not isinstance(file, str):
-            return False
-        try:
-            return (self.folder / file).resolve() == self.path(drawing)
-        except (OSError, ValueError):
-            return False
-
     # --- what is written --------------------------------------------------------------------------
 
-    def write(self, name: str, text: str, what: str) -> None:
-        """Write a text file, which can be undone; `what` says what for.
+    def free(self, stem: str, *endings: str) -> str:
+        """Return a stem with which no file ends so yet: it, or it with a number behind."""
+        number, free = 1, stem
+        while any(self.path(f"{free}{ending}").exists() for ending in endings):
+            number += 1
+            free = f"{stem}-{number}"
+        return free
+
+    def write(self, name: str, text: str) -> None:
+        """Write a new text file.
 
         Raises
         ------
         InputError
-            If it is not in the folder, or cannot be written.
+            If there is one of this name, it is not in the folder, or cannot be written.
         """
         path = self.path(name)
-        with self.changes.recorded(what):
-            write_text(path, text)
+        if path.exists():
+            own = Path(name)
+            other = f"{self.free(own.stem, own.suffix)}{own.suffix}"
+            raise InputError(f"{name}: is there already, expected a new name such as {other}")
+        write_text(path, text)
 
     def take(self, name: str, content: bytes, folder: str = "") -> str:
         """Keep a dropped file, beside others of the same name; return its name in the project.
@@ -244,9 +218,8 @@ class Project:
             number += 1
             file_name = f"{stem}-{number}{suffix}"
         else:
-            with self.changes.recorded(f"took in {file_name}"), whole_file(path) as temporary:
+            with whole_file(path) as temporary:
                 temporary.write_bytes(content)
-        path.touch()
         return f"{folder}/{file_name}" if folder else file_name
 
     def take_example(self, name: str) -> str:
@@ -271,7 +244,6 @@ class Project:
                         f"{folder}/{own}: is no file of the example, which needs the folder "
                         f"{folder} for itself; try it in another project"
                     )
-        with self.changes.recorded(f"took in the example {name}"):
-            for folder in folders:
-                for path in sorted((source / folder).iterdir()):
-                    self.take(path.name, path.read_bytes(), folder)
+        for folder in folders:
+            for path in sorted((source / folder).iterdir()):
+                self.take(path.name, path.read_bytes(), folder)

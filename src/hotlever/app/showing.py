@@ -6,8 +6,9 @@ The figures are those of `hotlever.figures`, the pages those of `hotlever.report
 from __future__ import annotations
 
 import io
+import tempfile
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -17,10 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from hotlever import figures
 from hotlever.app.jobs import Task, probe_of, request_of
-from hotlever.app.probe_files import figure_file, svg
-from hotlever.app.project import CALIBRATIONS, file_stamp
+from hotlever.app.probe_fields import figure_file, svg
+from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.calibration import Calibration, read_calibration
 from hotlever.calibration.levers import calibration_rows, compare_calibrations
@@ -28,6 +28,7 @@ from hotlever.calibration.table import interpolated
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimation import Fit, read_fit
 from hotlever.estimation.summary import parameter_rows
+from hotlever.files import read_json
 from hotlever.lever.transient.waveform import waveform_from_text
 from hotlever.measurement import (
     FileColumn,
@@ -36,20 +37,24 @@ from hotlever.measurement import (
     parse_columns,
     read_measurement,
     read_measurement_of,
+    with_measured_circuit,
 )
 from hotlever.quantities import FITTED
-from hotlever.raman import measure, read_lines, read_spectra
+from hotlever.raman import Correction, measure, read_lines, read_spectra
 from hotlever.raman.lineshape import WINDOW, in_window
 from hotlever.raman.reading import read_file, spectrum_files
 from hotlever.raman.series import Line
 from hotlever.raman.spectrum import Spectrum
+from hotlever.raman.tables import corrections_text
 from hotlever.report.calibration_pages import budget_page, calibration_page
 from hotlever.report.fit_pages import fit_page
-from hotlever.report.page import Block, Page
+from hotlever.report.page import Page
 from hotlever.tasks.reporter import Silence
 from hotlever.tasks.spectra import set_up
 from hotlever.types import Array
 
+#: Kinds of results.
+FIT, CALIBRATION = "fit", "calibration"
 #: Results kept, whose figures may be asked for as files.
 _CACHE_SIZE = 4
 #: Points of a measurement that are shown, and of the curve that is fitted to a spectrum.
@@ -58,20 +63,20 @@ _POINTS, _FINE = 1000, 800
 _OF_RESULTS = {"bias_V", "current_mA", "lever_V", "tip_K", "power_mW"}
 
 
-def understood(
-    report: Report, name: str, metadata: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
-    """Return what a measurement file was understood as.
+def understood(report: Report, name: str, metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a measurement file was understood as, in its circuit, as it is fitted in.
 
-    Beside it may be told its columns, the file of the probe, and the pulse that was measured.
+    Beside it may be told its columns, the file of the probe, the medium, and the pulse that was
+    measured.
     """
-    metadata = metadata or {}
-    probe = probe_of(metadata.get("probe"))
+    probe = probe_of(metadata.get("probe", ""))
     assigned = parse_columns(metadata.get("columns") or [])
-    pulse = metadata.get("waveform")
+    pulse, medium = metadata.get("waveform"), metadata.get("medium")
     waveform = waveform_from_text("pulse", pulse) if pulse else None
     measurement = read_measurement_of(probe, Path(name), assigned, waveform)
-    data = measurement.dataset(probe.circuit)
+    asked = medium if medium in ("vacuum", "air") else None
+    measured_probe, differences = with_measured_circuit(probe, measurement, asked)
+    data = measurement.dataset(measured_probe.circuit)
     (along,) = data.sizes
     data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
     in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}
@@ -80,7 +85,7 @@ def understood(
     return {
         "rows": [(Path(name).name, *head[1:]), *rows],
         # those that were not used are among the columns, all of which the page shows
-        "notes": list(measurement.notes),
+        "notes": [*measurement.notes, *differences],
         "observables": list(measurement.observables),
         "data": in_time
         | {column: data[column].values.tolist() for column in columns_shown if column in data},
@@ -121,20 +126,21 @@ def groups(report: Report, name: str) -> list[str]:
     return file_groups(Path(name))
 
 
-def page(report: Report, kind: str, name: str) -> None:
-    """Send the blocks of the page of a result, a fit or a calibration, as they are drawn."""
+def result(report: Report, name: str) -> dict[str, Any]:
+    """Return what a fit or a calibration file says: its kind, data, doubt and page."""
+    kind, estimate, shown = _result(Path(name), file_stamp(Path(name)))
+    blocks = [
+        {**block, "figure": svg(block["figure"])} if block["kind"] == "figure" else block
+        for block in shown.blocks
+    ]
+    data = read_json(name).get("data", {}).get("path", "")
+    return {"kind": kind, "data": data, "doubt": estimate.doubt, "blocks": blocks}
 
-    def send(block: Block) -> None:
-        drawing = {"figure": svg(block["figure"])} if block["kind"] == "figure" else {}
-        report.send("block", {**block, **drawing})
 
-    _page(kind, Path(name), send)
-
-
-def drawn(report: Report, kind: str, name: str, figure_name: str, suffix: str) -> bytes:
+def drawn(report: Report, name: str, figure_name: str, suffix: str) -> bytes:
     """Return a figure of a result as the content of a file."""
-    blocks = _page(kind, Path(name)).blocks
-    figure = next(block["figure"] for block in blocks if block.get("name") == figure_name)
+    *_, shown = _result(Path(name), file_stamp(Path(name)))
+    figure = next(block["figure"] for block in shown.blocks if block.get("name") == figure_name)
     return figure_file(figure, suffix)
 
 
@@ -146,13 +152,8 @@ def budget(report: Report, name: str) -> bytes:
     InputError
         If it has none.
     """
-    stated = budget_page(_calibration(Path(name), file_stamp(Path(name))))
+    stated = budget_page(_calibration(name))
     return stated.html().encode()
-
-
-def doubted(report: Report, name: str) -> str:
-    """Return why a calibration does not say what to set; empty if it does."""
-    return _calibration(Path(name), file_stamp(Path(name))).doubt
 
 
 def settings(report: Report, name: str, along: str, value: float) -> dict[str, float] | None:
@@ -165,7 +166,7 @@ def settings(report: Report, name: str, along: str, value: float) -> dict[str, f
     InputError
         If the data of the calibration are not described.
     """
-    calibration = _calibration(Path(name), file_stamp(Path(name)))
+    calibration = _calibration(name)
     calibration.need_described("what to set")
     table = calibration.table
     if along == "tip_K":
@@ -211,7 +212,9 @@ def spectra(report: Report, folders: Sequence[str]) -> list[str]:
     return names
 
 
-def spectrum(report: Report, name: str, task: Task) -> dict[str, Any]:
+def spectrum(
+    report: Report, name: str, task: Task, corrections: Mapping[str, Correction]
+) -> dict[str, Any]:
     """Return the counts of a spectrum, its fit, and what is read from it, in words.
 
     Parameters
@@ -221,13 +224,20 @@ def spectrum(report: Report, name: str, task: Task) -> dict[str, Any]:
         As `spectra` has it.
     task : Task
         That of ``hotlever raman``, by whose thermometer it is read.
+    corrections : mapping of str to Correction
+        By hand, which may be in no file yet.
     """
     counted, request, doubt = _spectrum(name), request_of(task), ""
-    try:
-        setup = set_up(Silence(), request)
-    except HotleverError as error:
-        doubt = f"no temperature: {error}"
-        setup = set_up(Silence(), replace(request, calibration=None, calibrate_from=None))
+    with tempfile.TemporaryDirectory() as folder:
+        by_hand = Path(folder, "by-hand.csv") if corrections else None
+        if by_hand is not None:
+            by_hand.write_text(corrections_text(corrections), encoding="utf-8")
+        request = replace(request, corrections=by_hand)
+        try:
+            setup = set_up(Silence(), request)
+        except HotleverError as error:
+            doubt = f"no temperature: {error}"
+            setup = set_up(Silence(), replace(request, calibration=None, calibrate_from=None))
     (line,) = measure([counted], setup.options, corrections=setup.corrections)
     table = read_lines([line], setup.thermometer)
     inside = in_window(counted.x, "")
@@ -254,17 +264,13 @@ def spectrum(report: Report, name: str, task: Task) -> dict[str, Any]:
 
 def levers(report: Report, names: list[str]) -> dict[str, Any]:
     """Return the table of the fits, or of the calibrations, that are there."""
-    rows, head = [], ["lever"]
-    calibrations = dict[str, Calibration]()
+    fits, calibrations = dict[str, Fit](), dict[str, Calibration]()
     for name in names:
-        path, lever = Path(name), Path(name).name.split(".")[0]
-        try:
-            if path.parent.name == CALIBRATIONS:
-                calibrations[lever] = _calibration(path, file_stamp(path))
-                continue
-            fit = _fit(path, file_stamp(path))
-        except InputError:
-            continue  # being written, or another kind of file
+        with suppress(InputError):  # being written, or another kind of file
+            kind, estimate, _ = _estimate(Path(name), file_stamp(Path(name)))
+            (calibrations if kind == CALIBRATION else fits)[Path(name).stem] = estimate
+    rows, head = [], ["lever"]
+    for lever, fit in fits.items():
         cells = parameter_rows(fit)
         head = ["lever", *(f"{label} ({unit})" if unit else label for label, _, unit, _ in cells)]
         rows.append([lever, *(value for _, value, _, _ in cells), fit.doubt])
@@ -273,28 +279,6 @@ def levers(report: Report, names: list[str]) -> dict[str, Any]:
         # what follows from all of them is on their page
         rows = [[*row, calibrations[row[0]].doubt] for row in all_rows if row[0] in calibrations]
     return {"head": [*head, "remark"], "rows": rows}
-
-
-def design_numbers(report: Report, name: str | None) -> dict[str, float]:
-    """Return what can be varied of a probe, what is asked for first before the rest."""
-    from hotlever.studies.design import Design
-
-    design = Design(probe_of(name))
-    numbers = design.numbers
-    return {key: numbers[key] for key in dict.fromkeys((*design.usual, *numbers)) if numbers[key]}
-
-
-def materials(report: Report, name: str | None) -> dict[str, Any]:
-    """Return all materials, or those of a probe file, in words and as curves."""
-    from hotlever.materials import catalogue
-
-    if name is None:
-        made_of, curves = None, catalogue.curves()
-    else:
-        probe = probe_of(name)
-        made_of = probe.made_of
-        curves = catalogue.curves(made_of, probe.layout().thickness_um)
-    return {"kinds": catalogue.sections(made_of), "figure": svg(figures.material_curves(curves))}
 
 
 def packed(report: Report, paths: list[Path]) -> bytes:
@@ -306,34 +290,26 @@ def packed(report: Report, paths: list[Path]) -> bytes:
     return content.getvalue()
 
 
-#: Pages of results, whose figures may be asked for as files; the latest last.
-_pages: dict[tuple[str, Path, float], Page] = {}
-
-
-def _page(kind: str, path: Path, added: Callable[[Block], None] | None = None) -> Page:
-    """Return the page of a result, telling of its blocks as soon as they are there."""
-    key = kind, path, file_stamp(path)
-    if key in _pages:
-        if added is not None:
-            for block in _pages[key].blocks:
-                added(block)
-    elif kind == "fit":
-        _pages[key] = fit_page(_fit(path, key[2]), added=added)
-    else:
-        _pages[key] = calibration_page(_calibration(path, key[2]), added)
-    if len(_pages) > _CACHE_SIZE:
-        del _pages[next(iter(_pages))]
-    return _pages[key]
+@lru_cache(maxsize=2000)
+def _estimate(path: Path, stamp: float) -> tuple[str, Any, Any]:
+    """Return the kind of a result, it, and what makes its page."""
+    if "route" in read_json(path):
+        return CALIBRATION, read_calibration(path), calibration_page
+    return FIT, read_fit(path), fit_page
 
 
 @lru_cache(maxsize=_CACHE_SIZE)
-def _calibration(path: Path, stamp: float) -> Calibration:
-    return read_calibration(path)
+def _result(path: Path, stamp: float) -> tuple[str, Any, Page]:
+    kind, estimate, paged = _estimate(path, stamp)
+    return kind, estimate, paged(estimate)
 
 
-@lru_cache(maxsize=2000)
-def _fit(path: Path, stamp: float) -> Fit:
-    return read_fit(path)
+def _calibration(name: str) -> Calibration:
+    kind, estimate, _ = _estimate(Path(name), file_stamp(Path(name)))
+    if kind != CALIBRATION:
+        raise InputError(f"{name}: is a fit, expected a calibration")
+    calibration: Calibration = estimate
+    return calibration
 
 
 def _with_room(values: Array) -> list[float]:

@@ -38,7 +38,7 @@ _CURVES = ("bias_V", "tip_K", "apex_K", "sample_mW", "beside_mW", "current_chang
 _near: WeakKeyDictionary[Lever, State] = WeakKeyDictionary()
 
 
-def described(report: Report, name: str | None) -> dict[str, Any]:
+def described(report: Report, name: str) -> dict[str, Any]:
     """Return radius (nm), interface (K/W) and sample that a probe file states, or usual ones."""
     probe = probe_of(name)
     contact = probe.contact
@@ -71,7 +71,7 @@ def answer(report: Report, task: Task, bias: float, most: float, quick: bool) ->
     probe = probe_in_contact(report, request)
     curves: dict[str, Any] | None = None
     if quick:
-        end = 1e-3 * described(report, next(iter(task.files), None))["radius_nm"]
+        end = 1e-3 * described(report, next(iter(task.files), ""))["radius_nm"]
         free = _out_of_contact(report, probe.with_(**{"tip.apex_radius_um": end}), True, most)
         now, _near[free] = state_in_contact(free, probe, bias, _near.get(free))
     else:

@@ -8,6 +8,7 @@ that the lever follows.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -71,6 +72,7 @@ class Reader:
 
     Attributes
     ----------
+    probe : Probe
     noise : NoiseOptions
     terminal : str
         Where the voltage is read.
@@ -84,6 +86,7 @@ class Reader:
     """
 
     def __init__(self, probe: Probe, noise: NoiseOptions | None = None) -> None:
+        self.probe = probe
         if probe.surroundings.medium == "vacuum":
             raise InputError("in vacuum a reader sees no surface, expected air: --medium air")
         circuit = probe.circuit
@@ -192,9 +195,7 @@ def over_surface(
     by_source = ("distance", "bias", "source"), columns.pop("source_V_per_rtHz")
     columns["surface_gap_um"] = "distance", distances
     columns["bias_V"] = "bias", values
-    notes += _turns(distances, values, columns["dV_dz_V_per_um"])
-    notes += _too_fast(reader.noise, columns["delay_us"])
-    notes += _jump_of_others(lever.probe, distances, values, columns["tip_K"])
+    notes += reading_notes(reader, distances, values, columns)
     return labelled(
         {**columns, "source_V_per_rtHz": by_source},
         ("distance", "bias"),
@@ -203,6 +204,20 @@ def over_surface(
         read_at=reader.terminal,
         notes="\n".join(notes),
     )
+
+
+def reading_notes(
+    reader: Reader, distances: Array, biases: Array, columns: Mapping[str, Array]
+) -> list[str]:
+    """Return what should be known of what a reader shows at distances (µm) and biases (V).
+
+    The `columns` are those of `Signal`, of shape (k, n).
+    """
+    return [
+        *_turns(distances, biases, columns["dV_dz_V_per_um"]),
+        *_too_fast(reader.noise, columns["delay_us"]),
+        *_jump_of_others(reader.probe, distances, biases, columns["tip_K"]),
+    ]
 
 
 def _turns(distances: Array, biases: Array, slopes: Array) -> list[str]:

@@ -18,13 +18,8 @@ _BESIDE = {
 }
 
 
-def stem(lever: Mapping[str, Any]) -> str:
-    """Return what names of files begin with, of the lever that is chosen."""
-    return Path(lever["probe"] or "reference.toml").stem
-
-
-def probe_files(lever: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the files that a task of the lever is given."""
+def files_of(lever: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the files that a task of a lever is given."""
     return (lever["probe"],) if lever["probe"] else ()
 
 
@@ -40,7 +35,7 @@ def settings(lever: Mapping[str, Any]) -> dict[str, Any]:
 
 def sweep_of(lever: Mapping[str, Any]) -> Task:
     """Return the task of a sweep of the lever that is chosen, whatever the biases."""
-    return Task("sweep", probe_files(lever), settings(lever))
+    return Task("sweep", files_of(lever), settings(lever))
 
 
 def in_python(lever: Mapping[str, Any], last: str, *imports: str) -> str:
@@ -48,7 +43,7 @@ def in_python(lever: Mapping[str, Any], last: str, *imports: str) -> str:
 
     Examples
     --------
-    >>> print(in_python({"probe": None, "changes": {"n_d": 5e17}}, "sweep = lever.sweep([8.0])"))
+    >>> print(in_python({"probe": "", "changes": {"n_d": 5e17}}, "sweep = lever.sweep([8.0])"))
     from hotlever import Lever, Probe
     <BLANKLINE>
     lever = Lever(Probe.reference().with_(n_d=5e+17))
@@ -77,8 +72,8 @@ def lever_beside(chosen: Mapping[str, Any]) -> dict[str, Any] | None:
 
     Examples
     --------
-    >>> lever_beside({"beside": "air", "probe": None, "changes": {"n_d": 5e17}})
-    {'probe': None, 'changes': {'n_d': 5e+17, 'medium': 'air'}}
+    >>> lever_beside({"beside": "air", "probe": "", "changes": {"n_d": 5e17}})
+    {'probe': '', 'changes': {'n_d': 5e+17, 'medium': 'air'}}
     """
     beside = chosen["beside"]
     if not beside:
@@ -86,7 +81,7 @@ def lever_beside(chosen: Mapping[str, Any]) -> dict[str, Any] | None:
     if beside == NOW:
         return dict(chosen["kept"])
     if beside.startswith(_PROBE):
-        return {"probe": beside.removeprefix(_PROBE) or None, "changes": {}}
+        return {"probe": beside.removeprefix(_PROBE), "changes": {}}
     return {"probe": chosen["probe"], "changes": {**chosen["changes"], "medium": beside}}
 
 

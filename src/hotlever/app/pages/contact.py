@@ -12,7 +12,6 @@ from nicegui import ui
 
 from hotlever.app.jobs import Task
 from hotlever.app.pages import plots
-from hotlever.app.pages.chosen_lever import probe_files
 from hotlever.app.pages.frame import caption, flat_button
 from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage, slider
 from hotlever.app.pages.page import MEDIA
@@ -222,6 +221,15 @@ class ContactPage(LivePage):
     """One tab of the page."""
 
     name, live, plots_of = "contact", "touching", ContactPlots
+    #: What is None or empty is what the probe file says, or what is usual.
+    first: ClassVar = {
+        "medium": "",
+        "sample": "",
+        "radius_nm": None,
+        "interface": None,
+        "bias": 8.0,
+        "most": 12.0,
+    }
     numbers: ClassVar = {
         "tip_K": ("tip at the lever", "{:.1f} K", 1.0),
         "apex_K": ("apex", "{:.1f} K", 1.0),
@@ -259,7 +267,7 @@ class ContactPage(LivePage):
             "interface": "" if interface is None else f"{interface:.12g}K/W",
             "medium": self.chosen["medium"],
         }
-        return Task("contact", probe_files(self.chosen), options)
+        return Task("contact", self.probe_files, options)
 
     def of_table(self, kind: str) -> dict[str, Any]:
         """Return the biases of a table."""

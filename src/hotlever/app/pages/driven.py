@@ -13,17 +13,15 @@ from nicegui import ui
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.chosen_lever import (
     beside_in_words,
+    files_of,
     in_python,
     lever_beside,
-    probe_files,
     settings,
-    stem,
 )
 from hotlever.app.pages.frame import ErrorBanner, caption, figure
-from hotlever.app.pages.page import FILM, KINDS, DrawnPage, Work, outputs
+from hotlever.app.pages.page import FILM, KINDS, DrawnPage, Work
 from hotlever.app.pages.plots import compare_histories
 from hotlever.app.session import Session
-from hotlever.app.state import Result
 from hotlever.errors import InputError
 
 _KINDS = {"pulse": "one pulse", "train": "several pulses", "step": "a step that stays"}
@@ -48,6 +46,14 @@ class Pulses(DrawnPage):
     """What the lever shows in time, as `hotlever pulse` computes it."""
 
     name = "pulse"
+    first: ClassVar = {
+        "kind": "pulse",
+        "height": 10.0,
+        "length": 5.0,
+        "period": 20.0,
+        "count": 5,
+        "until": None,
+    }
     alt = "Voltages, current, tip temperature and heat in time"
     kinds: ClassVar = {**KINDS, **FILM}
 
@@ -86,7 +92,7 @@ class Pulses(DrawnPage):
 
     def task(self) -> Task:
         """Return the task that simulates the lever, and writes table and figure."""
-        return self._task(self._lever, outputs(f"{stem(self._lever)}.pulse", "SVG"))
+        return self._task(self._lever, self.outputs(self.stem, "pulse", "SVG"))
 
     def _task(self, lever: Mapping[str, Any], files: dict[str, str]) -> Task:
         """Return the task that simulates a lever under the wave form that is chosen."""
@@ -97,20 +103,23 @@ class Pulses(DrawnPage):
             wave = {"step": values["height"]}
         else:
             wave = {"pulse": f"{height},{texts.pop('length')}"}
-        return Task("pulse", probe_files(lever), {**settings(lever), **wave, **texts, **files})
+        return Task("pulse", files_of(lever), {**settings(lever), **wave, **texts, **files})
 
     def start(self) -> bool:
         """Simulate the lever, and that beside it at the same time."""
-        started, other = super().start(), lever_beside(self._lever)
-        if started:
-            self.session.results.pop(_BESIDE, None)
-        if started and other is not None:
-            task = self._task(other, outputs(f"{stem(self._lever)}.beside.pulse", "CSV"))
-            with self.banner.caught():
-                self.session.jobs.start(_BESIDE, task)
-                numbers = [("Dashed", beside_in_words(self._lever))]
-                self.session.results[_BESIDE] = Result(**vars(task), numbers=numbers, stamp=0.0)
-        return started
+        other = lever_beside(self._lever)
+        with self.banner.caught():
+            beside = None
+            if other is not None:
+                beside = self._task(other, self.outputs(self.stem, "beside.pulse", "CSV"))
+            if started := super().start():
+                job = self.session.jobs.of(self.name)[0]
+                # what is beside it stays so, whatever is chosen by the time it is shown
+                job.contents["beside"] = beside and (beside.written, beside_in_words(self._lever))
+                if beside is not None:
+                    self.session.jobs.start(_BESIDE, beside)
+            return started
+        return False
 
     def python(self) -> str:
         """Return the lines of Python that simulate the lever."""
@@ -120,35 +129,24 @@ class Pulses(DrawnPage):
         imported = f"from hotlever.lever.transient import {form}, simulate"
         return in_python(self._lever, last, imported)
 
-    def show_figure(self, path: Path) -> None:
-        """Show the figure that was drawn, and the film of it if there is one."""
-        super().show_figure(path)
-        self._show_beside(path)
-        film = path.with_suffix(".gif")
-        if self.session.project.stamp(film.name) >= self.session.project.stamp(path.name):
-            figure(film.read_bytes(), "The temperature map in time", wide=True)
+    def show_figure(self, job: Job, path: Path) -> None:
+        """Show the figure that was drawn, the lever beside, and the film if there is one."""
+        super().show_figure(job, path)
+        beside, words = job.contents.get("beside") or ("", "")
+        if beside and self.session.project.stamp(beside) >= job.began:
+            compare_histories(path.with_suffix(".csv"), self.session.project.path(beside))
+            caption(f"Line: the lever. Dashed: {words}.").classes("remark")
+        films = (film for film in self.session.jobs.of(self.name) if "film" in film.task.options)
+        same = (film for film in films if film.task.question == job.task.question)
+        if film := next(filter(self.written, same), None):
+            content = self.session.project.path(film.task.written).read_bytes()
+            figure(content, "The temperature map in time", wide=True)
 
     async def _beside_ended(self, job: Job) -> None:
-        result = self.session.results.get(_BESIDE)
-        if result is not None and self.written(job):
-            result.stamp = self.session.project.stamp(job.task.written)
         self._show()
 
-    def _show_beside(self, path: Path) -> None:
-        """Show the lever beside in the same plots, if it was followed under the same wave form."""
-        result, own = (self.session.results.get(name) for name in (_BESIDE, self.name))
-        if result is None or own is None or not result.stamp:
-            return
-        other = self.session.project.path(result.options["output"])
-        if self.session.project.stamp(other.name) != result.stamp or any(
-            result.options.get(key) != own.options.get(key) for key in _WAVE
-        ):
-            return
-        compare_histories(path.with_suffix(".csv"), other)
-        caption(f"Line: the lever. Dashed: {result.numbers[0][1]}.").classes("remark")
-
     async def _ended(self, job: Job) -> None:
-        if job.task.written.endswith(".gif"):
+        if "film" in job.task.options:
             self._show()
         else:
             await super()._ended(job)
@@ -158,6 +156,7 @@ class SmallSignals(DrawnPage):
     """What the lever shows under small signals, or its harmonics, as `hotlever spectrum` does."""
 
     name = "signals"
+    first: ClassVar = {"lowest_Hz": 1.0, "highest_Hz": 1e7, "count": 71, "amplitude_V": None}
     alt = "Impedance, and how the tip follows, against the frequency"
 
     def __init__(self, session: Session, banner: ErrorBanner, lever: dict[str, Any]) -> None:
@@ -189,9 +188,8 @@ class SmallSignals(DrawnPage):
             "frequency": f"{low}Hz:{high}Hz:{count}",
             "amplitude": "" if amplitude is None else f"{amplitude:.12g}",
         }
-        files = outputs(f"{stem(self._lever)}.spectrum", "SVG")
-        probe = probe_files(self._lever)
-        return Task("spectrum", probe, {**options, **settings(self._lever), **files})
+        options |= {**settings(self._lever), **self.outputs(self.stem, "spectrum", "SVG")}
+        return Task("spectrum", files_of(self._lever), options)
 
     def python(self) -> str:
         """Return the lines of Python that do the same."""

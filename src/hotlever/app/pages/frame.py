@@ -5,7 +5,6 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
-from datetime import datetime
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -13,8 +12,7 @@ from typing import Any
 
 from nicegui import events, ui
 
-from hotlever.app.changes import Change
-from hotlever.app.project import LARGEST_FILE, safe_name
+from hotlever.app.project import LARGEST_FILE
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
@@ -25,23 +23,13 @@ PAGES = {
     "simulate": ("Simulate", "tune"),
     "contact": ("Contact", "south"),
     "reader": ("Reader", "height"),
-    "design": ("Design", "insights"),
-    "materials": ("Materials", "layers"),
     "raman": ("Raman", "thermostat"),
-    "fit": ("Fit", "query_stats"),
-    "calibrate": ("Calibrate", "straighten"),
-    "levers": ("Levers", "table_rows"),
-}
-#: What else of the state of a project pages show, beside what has their name.
-_ALSO = {
-    "simulate": {"pulse", "signals"},
-    "fit": {"files"},
-    "calibrate": {"files", "asked", "next"},
+    "measurements": ("Measurements", "query_stats"),
 }
 #: Types of files that figures leave as.
 FIGURE_FILES = (".svg", ".png", ".pdf")
-#: Changes that are listed, and files of each that are named; refused files that are named.
-_LISTED, _NAMED, _REFUSED = 30, 4, 5
+#: Refused files that are named.
+_REFUSED = 5
 #: A cell that is a button.
 _CHOICE = """<q-td :props="props"><q-btn flat dense no-caps color="primary" :label="props.value"
     @click="$parent.$emit('chosen', props.value)" /></q-td>"""
@@ -86,17 +74,8 @@ def framed(session: Session, page: str) -> Iterator[ErrorBanner]:
                 link.classes("q-px-sm" + (" bg-black/25" if here else ""))
         ui.space()
         ui.label(str(session.project.folder)).classes("text-xs ellipsis gt-md")
-        for label, icon, click in (
-            ("Undo", "undo", partial(_step, session, page, -1)),
-            ("Redo", "redo", partial(_step, session, page, 1)),
-            ("What the app wrote", "history", partial(_list_changes, session)),
-            ("Light or dark", "contrast", switch),
-        ):
-            flat_button("", click, icon=icon, label=label).props("color=white").tooltip(label)
-    if session.remark:
-        remark = session.remark.replace(f"{session.project.folder}/", "")
-        ui.label(remark).classes("text-sm remark w-full").props("role=status")
-        session.remark = ""
+        contrast = flat_button("", switch, icon="contrast", label="Light or dark")
+        contrast.props("color=white").tooltip("Light or dark")
     yield ErrorBanner(str(session.project.folder))
 
 
@@ -153,12 +132,9 @@ def drop_zone(
 
     async def take(event: events.MultiUploadEventArguments) -> None:
         with banner.caught():
-            names = []
-            more = f" and {len(event.files) - 1} more" if len(event.files) > 1 else ""
-            first = f"{safe_name(event.files[0].name)}{more}" if event.files else ""
-            with session.project.changes.recorded(f"dropped {first}"):
-                for file in event.files:
-                    names.append(session.project.take(file.name, await file.read(), folder))
+            names = [
+                session.project.take(file.name, await file.read(), folder) for file in event.files
+            ]
             await then(names)
 
     # the web server remembers its last 4096 routes, of which a drop zone is one: what it holds of
@@ -294,72 +270,17 @@ def table(
 # --- dialogs --------------------------------------------------------------------------------------
 
 
-async def confirm(question: str, yes: str, no: str) -> bool:
-    """Ask something, and wait for the answer; whoever closes the question says no."""
-    with ui.dialog().props('aria-label="Question"') as dialog, ui.card():
-        ui.label(question).classes("remark")
-        with ui.row().classes("w-full justify-end"):
-            ui.button(no, on_click=lambda: dialog.submit(False)).props("autofocus")
-            ui.button(yes, on_click=lambda: dialog.submit(True)).props("outline")
-    answer = bool(await dialog)
-    dialog.delete()
-    return answer
-
-
 @contextmanager
-def opened_dialog(title: str, width: str) -> Iterator[ui.row]:
-    """Open a dialog with a title and a way out of it; give the row of its title."""
+def opened_dialog(title: str, width: str) -> Iterator[tuple[ui.dialog, ui.row]]:
+    """Open a dialog with a title and a way out of it; give it, and the row of its title.
+
+    It goes when it is closed; when its tab is closed first, it has gone with that.
+    """
     dialog = ui.dialog(value=True).props(f'aria-label="{_attribute(title)}"')
     with dialog, ui.card().classes("w-full").style(f"max-width: {width}"):
         with ui.row().classes("w-full items-center no-wrap"):
             ui.label(title).classes("text-lg text-bold col")
             buttons = ui.row()
             flat_button("", dialog.close, icon="close", label="Close")
-        yield buttons
-    dialog.on("hide", dialog.delete)
-
-
-def _step(session: Session, page: str, by: int) -> None:
-    """Undo or redo a step of what is chosen; the page that shows it is opened anew."""
-    changed = session.step(by)
-    if not changed:
-        ui.notify(session.remark)
-        session.remark = ""
-        return
-    shows = {name: {name, *_ALSO.get(name, ())} & changed for name in (page, *PAGES)}
-    ui.navigate.to("/" + next((name for name, parts in shows.items() if parts), page))
-
-
-def _list_changes(session: Session) -> None:
-    """Show what the app wrote into the project, each change with the way back."""
-    changes = session.project.changes.latest(_LISTED)
-    with opened_dialog("What the app wrote", "46rem"):
-        if changes:
-            words = "Undo makes these files what they were before, and can be undone too."
-            ui.label(words).classes("text-sm opacity-70")
-        else:
-            ui.label("Nothing yet in this folder.")
-        for change in changes:
-            with ui.row().classes("w-full items-center no-wrap"):
-                with ui.column().classes("col gap-0"):
-                    ui.label(change.what).classes("text-sm remark")
-                    caption(_time_and_files(change)).classes("remark")
-                small_button("Undo", partial(_undo, session, change), label=f"Undo: {change.what}")
-
-
-def _time_and_files(change: Change) -> str:
-    """Say when a change was made, and of which files."""
-    when = datetime.fromtimestamp(change.time_s).strftime("%Y-%m-%d %H:%M")
-    names = [name if version else f"{name} (new)" for name, version in change.before.items()]
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return f"{when}: {', '.join(names[:_NAMED])}{more}"
-
-
-def _undo(session: Session, change: Change) -> None:
-    try:
-        session.project.changes.undo(change)
-    except HotleverError as error:
-        ui.notify(str(error), type="negative")
-        return
-    # all pages show what is in the files
-    ui.navigate.reload()
+        yield dialog, buttons
+    dialog.on("hide", lambda: None if dialog.is_deleted else dialog.delete())

@@ -1,11 +1,12 @@
-"""Lever: a parametric shape or a drawing becomes a probe, with its picture while it does."""
+"""Lever: a probe file or a drawing as fields, with its picture while they are set."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
+import re
+from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from nicegui import ui
 
@@ -18,275 +19,403 @@ from hotlever.app.pages.frame import (
     figure,
     flat_button,
     hand_over,
+    opened_dialog,
     small_button,
     table,
     two_columns,
 )
 from hotlever.app.pages.page import Page, Work
-from hotlever.app.pages.probe_file import ProbeFields, ProbeFile, ProbeText, new_probe
-from hotlever.app.project import DATA, DRAWINGS
+from hotlever.app.probe_fields import (
+    FILM,
+    TERMINALS,
+    LayerRow,
+    Place,
+    Sections,
+    has_section,
+    typed,
+    with_layer,
+    with_material_renamed,
+    with_value,
+)
+from hotlever.app.project import DATA, DRAWINGS, safe_name
 from hotlever.app.session import Session
-from hotlever.app.state import Lever, Simulate
 from hotlever.errors import HotleverError, InputError
 
-_SHAPES = {"three-leg": "New: three legs", "u-shape": "New: two legs (U)"}
 _FILE = "a probe file or a drawing"
-_NEW = Lever().name
 #: Pages that go on with the probe.
-_ON = {"simulate": "tune", "calibrate": "straighten"}
+_ON = {"simulate": "tune", "measurements": "query_stats"}
 _DROP = "Drop a drawing here (GDSII, OASIS, DXF) or a probe file, and tables of materials"
-
-
-class Picture:
-    """The lever from above, and what there is to know of it."""
-
-    def __init__(self, page: LeverPage) -> None:
-        self._page, self._latest = page, 0
-        mesh = ui.switch("mesh", value=page.chosen["mesh"], on_change=self._switch)
-        mesh.tooltip("The triangles that the lever is solved on")
-        self._column = ui.column().classes("w-full gap-1")
-
-    async def _switch(self, event: Any) -> None:
-        self._page.chosen["mesh"] = event.value
-        await self._page.draw()
-
-    def clear(self) -> None:
-        """Show none, nor one that is being drawn."""
-        self._latest += 1
-        self._column.clear()
-
-    async def show(self, text: str, title: str) -> str | None:
-        """Show the picture of a probe by its file; return what is wrong with the probe.
-
-        None if another picture was asked for meanwhile. There is no picture of what cannot be
-        drawn: the last one is of another probe.
-        """
-        self._latest += 1
-        turn, mesh, drawn = self._latest, self._page.chosen["mesh"], None
-        try:
-            what = text, title, mesh
-            drawn = await self._page.session.ask("quick", "probe_files:drawn_text", *what)
-            fault: str = drawn["fault"]
-        except HotleverError as error:
-            fault = str(error)
-        if turn != self._latest:
-            return None
-        self._column.clear()
-        if drawn is not None:
-            alt = "The lever from above: regions, terminals and tip"
-            with self._column:
-                figure(drawn["figure"], alt, wide=True)
-                if not fault:
-                    table(("region", "part", "area"), drawn["rows"])
-                    if mesh:
-                        caption(f"mesh: {drawn['triangles']} triangles")
-        return fault
-
-    def add(self, listing: str, outlines: str) -> None:
-        """Show below what a drawing holds, and the picture of all of it."""
-        with self._column, ui.expansion("What the drawing holds"):
-            ui.label(listing).classes("lines")
-            figure(outlines, "All outlines of the drawing, by layer")
+_SAVED = (
+    "What is set is saved as a new file; comments of the file that was opened are not in it. Other "
+    "pages take the lever as its file says."
+)
+_ROLES = {"": "not used", "body": "outline of the lever", FILM: "film or part"}
+_ROLES |= {name: f"terminal: {name}" for name in TERMINALS}
+_SILICON = "silicon of [material]"
+_LAWS = (
+    "A property is a number, a formula of T in K such as 0.032*(T/300)**-1.2, or the name of a "
+    "table (CSV) in the folder; drop tables above. Grey: what counts where nothing is said."
+)
 
 
 class LeverPage(Page):
     """One tab of the page."""
 
     name = "lever"
+    #: Of each probe file that was edited and not saved its sections, and the probe file that a
+    #: drawing is to become.
+    first: ClassVar = {"edited": {}, "awaited": "", "mesh": False}
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
-        self._file = ProbeFile(self)
-        self._awaited: str | None = None
+        self._sections: Sections = {}
+        self._turn = 0
+        self._opened_for: str | None = None
+        self._held_for = ""
         with two_columns() as (left, right):
             with left:
                 drop_zone(session, banner, _DROP, self._dropped)
-                self._pick = ui.select(self._files, label="Open").classes("w-full")
-                self._pick.props("clearable").on_value_change(lambda event: self._open(event.value))
-                with ui.row():
-                    for shape, words in _SHAPES.items():
-                        small_button(words, partial(self._take_shape, shape))
-                self._fields = ProbeFields(self, self._set)
+                self.lever_choice()
+                self._drawings = ui.select([], label="Propose a probe for the drawing")
+                self._drawings.classes("w-full").on_value_change(self._drawing_chosen)
+                small_button("New: two legs (U)", self._take_u_shape)
+                self._fields = ProbeFields(self, self._edit)
             with right:
-                self._work = Work(session, self.name, self._ended)
-                self._existing_notice = ui.row().classes("items-center w-full")
-                self._picture = Picture(self)
+                Work(session, self.name, self._proposed)
+                mesh = ui.switch("mesh", value=self.chosen["mesh"], on_change=self._set_mesh)
+                mesh.tooltip("The triangles that the lever is solved on")
+                self._picture = ui.column().classes("w-full gap-1")
+                self._holds = ui.expansion("What the drawing holds")
+                self._holds.set_visibility(False)
                 with ui.row().classes("items-center w-full"):
-                    name = self.chosen["save_as"] or self.chosen["name"]
-                    keep = self._keep("save_as", "")
-                    self._name = ui.input("Save as", value=name, on_change=keep)
-                    ui.button("Save", icon="save", on_click=self._write)
+                    self._name = ui.input("Save as", on_change=self.show_command)
+                    ui.button("Save", icon="save", on_click=self._save)
                     for page, icon in _ON.items():
                         go = ui.button(page.capitalize(), icon=icon)
                         go.props("outline").on_click(partial(self._go_on, page))
                     for suffix in FIGURE_FILES:
                         flat_button(suffix[1:].upper(), partial(self._give, suffix))
-                self._text = ProbeText(self._edited)
+                caption(_SAVED)
+                self._edited = ui.label().classes("remark").props("role=status")
                 self.command()
-
-    @property
-    def _files(self) -> list[str]:
-        project = self.session.project
-        return [*project.probes, *project.drawings]
+        self._offer_drawings()
 
     async def open(self) -> None:
-        """Show what was open last; a drawing that was just dropped is opened."""
-        with self.banner.caught():
-            self._file.take_up()
-        if self.chosen["text"] is None:
-            self.chosen["text"] = new_probe(next(iter(_SHAPES)))
-        self._text.put(self.chosen["text"])
-        await self.draw()
-        await self._open(self.chosen["drawing"])
+        """Show the lever; the one of a drawing, if that was awaited and is there."""
+        awaited = self.chosen["awaited"]
+        if awaited and not self.session.jobs.running(self.name):
+            self._take(awaited)
+        await self._show_lever()
 
-    async def _take_shape(self, shape: str) -> None:
-        """Begin with the probe file of a shape."""
-        if not await self._file.may_go():
-            return
-        self._work.hide()
-        self._begin(_NEW)
-        self._pick.set_value(None)
-        await self._set(new_probe(shape))
+    async def changed(self) -> None:
+        """Show another lever."""
+        await self._show_lever()
 
-    async def draw(self) -> None:
-        """Draw what is open, and show its fields."""
-        text = self.chosen["text"]
-        if not text:
+    async def _set_mesh(self, event: Any) -> None:
+        self.chosen["mesh"] = event.value
+        await self._draw()
+
+    # --- the lever --------------------------------------------------------------------------------
+
+    async def _show_lever(self) -> None:
+        """Open the lever that is chosen, with what was set in it and not saved."""
+        probe, self._sections = self.probe, {}
+        if probe != self._opened_for:
+            self._opened_for = probe
+            self._name.set_value(f"{self.session.project.free(self.stem, '.toml')}.toml")
             self._picture.clear()
-            await self._fields.show("", "")
+            self._fields.clear()
+            self._holds.set_visibility(probe == self._held_for)
+        with self.banner.caught():
+            edited = self.chosen["edited"].get(probe)
+            sections = edited or await self.session.ask("quick", "probe_fields:opened", probe)
+            if probe == self.probe:
+                self._sections = sections
+                await self._draw()
             return
-        fault = await self._picture.show(text, self._name.value)
-        if fault is not None:
-            self.banner.say(fault)
-            await self._fields.show(text, fault)
-            self.show_command()
 
-    # --- a file -----------------------------------------------------------------------------------
+    async def _edit(self, sections: Sections) -> None:
+        """Take sections in which something was set."""
+        self._sections = self.chosen["edited"][self.probe] = sections
+        await self._draw()
+
+    async def _draw(self) -> None:
+        """Draw what is open, and show its fields; only what was asked for last counts."""
+        self._turn += 1
+        turn, drawn, sections = self._turn, None, self._sections
+        title, mesh = self._name.value or "lever", self.chosen["mesh"]
+        try:
+            request = "probe_fields:drawn", sections, title, mesh
+            drawn = await self.session.ask("quick", *request)
+            fault = drawn["fault"]
+        except HotleverError as error:
+            fault = str(error)
+        if turn != self._turn or self._picture.is_deleted:
+            return
+        self.banner.say(fault)
+        self._picture.clear()
+        if drawn is not None:  # there is no picture of what cannot be drawn
+            with self._picture:
+                figure(
+                    drawn["figure"], "The lever from above: regions, terminals and tip", wide=True
+                )
+                if not fault:
+                    table(("region", "part", "area"), drawn["rows"])
+                    if mesh:
+                        caption(f"mesh: {drawn['triangles']} triangles")
+        words = "Something is set that is not saved." if self._is_edited else ""
+        self._edited.set_text(words)
+        self.show_command()
+        await self._fields.show(sections, fault)
+
+    @property
+    def _is_edited(self) -> bool:
+        return self.probe in self.chosen["edited"]
+
+    def task(self) -> Task:
+        """Return the command that draws the probe, as it is or as it will be saved."""
+        name = self._name.value if self._is_edited else self.probe
+        options = {"mesh": self.chosen["mesh"]}
+        stem = self.session.project.free(Path(name or "reference").stem, ".svg")
+        return Task("probe show", (name,) if name else (), {**options, "plot": f"{stem}.svg"})
+
+    # --- files ------------------------------------------------------------------------------------
+
+    def _offer_drawings(self) -> None:
+        drawings = self.session.project.drawings
+        self._drawings.set_options(drawings, value=None)
+        self._drawings.set_visibility(bool(drawings))
 
     async def _dropped(self, names: list[str]) -> None:
-        self._pick.set_options(self._files)
-        opened = [name for name in names if name in self._files]
-        if opened and self._pick.value == opened[-1]:  # dropped again
-            await self._open(opened[-1])
-        elif opened:
-            self._pick.set_value(opened[-1])
+        self._offer_drawings()
+        known = [name for name in names if name.lower().endswith((".toml", *DRAWINGS))]
+        if known and known[-1].lower().endswith(".toml"):
+            self._take(known[-1])
+        elif known:
+            self._propose(known[-1])
         elif names[-1].lower().endswith(DATA):
-            await self.draw()
+            await self._draw()
             self.banner.say(f"{names[-1]}: kept in the folder; a material's property may name it")
         else:
             raise InputError(f"{names[-1]}: unknown type of file, expected {_FILE}")
 
-    async def _open(self, name: str | None) -> None:
-        """Show a probe file, or the probe of a drawing; if there is none, have one proposed."""
-        if name is None:
-            return
-        if not await self._file.may_go():
-            self._awaited = self.chosen["drawing"] = None
-            self._existing_notice.clear()
-            self._pick.set_value(None)
-            return
-        self.banner.clear()
-        self._work.hide()
-        if not name.lower().endswith(DRAWINGS):
-            await self._show(name)
-            return
-        job = self.session.jobs.by_page.get(self.name)
-        if job is not None and job.standing == "running" and job.task.files == (name,):
-            self._begin(drawing=name)  # it is being proposed since before the page was opened
-            return
-        probe, is_there = self.session.project.probe_of_drawing(name)
-        if not is_there:
-            self._propose(name, probe)
-            return
-        await self._show(probe)
-        with self._existing_notice:
-            ui.label(f"{probe} is there already, and was kept as it is.").classes("remark")
-            again = small_button("Propose anew", partial(self._propose, name, probe))
-            again.tooltip(f"Writes what the drawing proposes over {probe}")
+    def _take(self, name: str) -> None:
+        """Have another lever, on all pages."""
+        self.chosen["awaited"] = ""
+        self.session.choose_lever(name)
 
-    def _propose(self, drawing: str, name: str) -> None:
-        """Have a probe file proposed for a drawing."""
-        files = {"output": name, "plot": f"{Path(name).stem}.svg"}
-        if self.run(Task("probe import", (drawing,), files)):
-            self._begin(drawing=drawing)
+    def _drawing_chosen(self, event: Any) -> None:
+        if event.value:
+            self._propose(event.value)
+            self._drawings.set_value(None)
 
-    def _begin(self, name: str = "", drawing: str | None = None) -> None:
-        """Show no lever until another one is there: none may stand under the other's name."""
-        self.chosen |= {"name": name, "text": "", "saved": ""}
-        # whoever leaves before the probe file of a drawing is there, and comes back, is shown it
-        self._awaited = self.chosen["drawing"] = drawing
-        self._name.set_value(name)
-        self._picture.clear()
-        self._existing_notice.clear()
-        self._text.put("")
-        self.show_command()
+    def _propose(self, drawing: str) -> None:
+        """Have a probe file proposed for a drawing, which is then the lever."""
+        if self.run(proposal(self.session, drawing)):
+            self.chosen["awaited"] = self.session.jobs.of(self.name)[0].task.options["output"]
 
-    async def _show(self, name: str, listing: str = "", plot: str = "") -> None:
-        """Show a probe file, and what the drawing holds that it was proposed for."""
-        self._begin(name)
-        with self.banner.caught():
-            self._text.put(self._file.open(name))
-            await self.draw()
-            if plot:
+    async def _proposed(self, job: Job) -> None:
+        """Show what was proposed, if nothing else was chosen meanwhile, and what is drawn."""
+        name, plot = job.task.options["output"], job.task.options.get("plot")
+        if job.standing != "done":
+            return
+        if self.chosen["awaited"] != name:
+            ui.notify(f"{name} is written")
+            return
+        if plot:
+            self._held_for = name
+            self._holds.clear()
+            with self._holds:
+                ui.label(job.contents["result"]).classes("lines")
                 outlines = self.session.project.path(plot).read_text(encoding="utf-8")
-                self._picture.add(listing, outlines)
+                figure(outlines, "All outlines of the drawing, by layer")
+        self._take(name)
 
-    async def _ended(self, job: Job) -> None:
-        """Show what was proposed for the drawing that is waited for, if nothing else is open."""
-        self._pick.set_options(self._files)
-        if job.task.files != (self._awaited,):
-            return
-        if job.standing == "done":
-            files = job.task.options
-            await self._show(files["output"], job.contents["result"], files["plot"])
-        else:
-            self._begin()
+    def _take_u_shape(self) -> None:
+        """Write the probe file of a lever of two legs, and have it be the lever."""
+        name = f"{self.session.project.free('u-shape', '.toml')}.toml"
+        self.chosen["awaited"] = name
+        self.run(Task("probe new", (), {"shape": "u-shape", "output": name}))
 
-    def _edited(self, text: str) -> Awaitable[None]:
-        """Take what was typed, at once: later the text may be another one, which nobody typed."""
-        self.chosen["text"] = text
-        return self.draw()
-
-    async def _set(self, text: str) -> None:
-        """Take a text in which a field was set."""
-        self.chosen["text"] = text
-        self._work.hide()
-        self._text.put(text)
-        await self.draw()
-
-    # --- what is shown and written ----------------------------------------------------------------
-
-    def task(self) -> Task:
-        """Return the command that draws the probe."""
-        name = self._name.value or "lever"
-        options = {"plot": f"{Path(name).stem}.svg", "mesh": self.chosen["mesh"]}
-        return Task("probe show", (name,), options)
-
-    async def _write(self) -> bool:
-        """Write the probe file; return whether it is there now."""
+    async def _save(self) -> bool:
+        """Write what is set as a new probe file, which is then the lever; return whether it is."""
+        if not self._is_edited:
+            return True
         with self.banner.caught():
-            name = await self._file.save(self._name.value or "", self._text.text)
-            if name is None:
-                return False
-            self._name.set_value(name)
-            self._pick.set_options(self._files)
+            name = safe_name(self._name.value or "")
+            name = name if name.endswith(".toml") else f"{name}.toml"
+            text = await self.session.ask("quick", "probe_fields:written", self._sections, name)
+            self.session.project.write(name, text)
+            del self.chosen["edited"][self.probe]
+            self._take(name)
             ui.notify(f"{name} is written", type="positive")
             return True
         return False
 
     async def _go_on(self, page: str) -> None:
         """Go on with the probe on another page."""
-        if await self._write():
-            name = self._name.value
-            set_up = {"rests": f"probe:{name}"}
-            if page == "simulate":
-                set_up = Simulate(probe=name).model_dump()
-            self.session.choices(page).update(set_up)
+        if await self._save():
             ui.navigate.to(f"/{page}")
 
     async def _give(self, suffix: str) -> None:
-        if await self._write():
-            with self.banner.caught():
-                name, mesh = self._name.value, self.chosen["mesh"]
-                drawn = self.session.ask("quick", "probe_files:drawn_file", name, suffix, mesh)
-                await hand_over(drawn, f"{Path(name).stem}{suffix}")
+        with self.banner.caught():
+            name, mesh = self._name.value or "lever", self.chosen["mesh"]
+            request = "probe_fields:drawn_file", self._sections, name, mesh, suffix
+            await hand_over(self.session.ask("quick", *request), f"{Path(name).stem}{suffix}")
+
+
+def proposal(session: Session, drawing: str) -> Task:
+    """Return the task that proposes a probe file for a drawing."""
+    stem = session.project.free(Path(drawing).stem, ".toml", ".svg")
+    return Task("probe import", (drawing,), {"output": f"{stem}.toml", "plot": f"{stem}.svg"})
+
+
+class ProbeFields:
+    """What can be set in the probe that is open; `edited` is told its sections with it set."""
+
+    def __init__(self, page: Page, edited: Callable[[Sections], Awaitable[None]]) -> None:
+        self._session, self._banner, self._edited = page.session, page.banner, edited
+        self._sections: Sections = {}
+        self._turn = 0
+        self._built: Any = None
+        self._inputs: dict[tuple[Place, str], ui.input] = {}
+        self._cards: dict[Place, ui.element] = {}
+        self._column = ui.column().classes("w-full gap-1")
+
+    def clear(self) -> None:
+        """Show nothing, nor what is still asked for."""
+        self._turn += 1
+        self._built, self._inputs = None, {}
+        self._column.clear()
+
+    async def show(self, sections: Sections, fault: str) -> None:
+        """Show what can be set in some sections, and what is wrong; nothing if nothing is open."""
+        self._turn += 1
+        turn, is_own = self._turn, sections is self._sections
+        self._sections = sections
+        settable = await self._session.ask("quick", "probe_fields:settable", sections)
+        if turn != self._turn or self._column.is_deleted:
+            return
+        cards, rows = settable.get("cards", []), settable.get("layers", [])
+        built = rows, [(card["place"], card["title"]) for card in cards]
+        # fields in which somebody types stay
+        if not is_own or built != self._built:
+            self._built = built
+            self._build(settable, rows)
+        for card in cards:
+            for field in card["fields"]:
+                key = field["place"], field["key"]
+                if key not in self._inputs:
+                    with self._cards[card["place"]]:
+                        self._field(field)
+                self._inputs[key].set_visibility(field["used"])
+        self._mark(fault)
+
+    def _build(self, settable: dict[str, Any], rows: list[LayerRow]) -> None:
+        self._column.clear()
+        self._inputs, self._cards = {}, {}
+        with self._column:
+            if rows:
+                ui.label("Layers of the drawing").classes("text-bold")
+            materials = {"": _SILICON, **{name: name for name in settable.get("materials", [])}}
+            for row in rows:
+                self._row(row, materials | settable["new"])
+            for card in settable.get("cards", []):
+                with ui.row().classes("w-full items-center gap-2"):
+                    ui.label(card["title"]).classes("text-bold")
+                    if card["place"][0] == "materials":
+                        name = card["place"][1]
+                        rename = partial(self._ask_name, name)
+                        flat_button("", rename, icon="edit", label=f"Rename {name}")
+                self._cards[card["place"]] = ui.element("div").classes("w-full fields")
+            if settable.get("materials"):
+                caption(_LAWS)
+
+    def _row(self, row: LayerRow, materials: dict[str, str]) -> None:
+        """Show what a layer is, what it is made of, and how thick it is if it lies on the body."""
+        with ui.row().classes("w-full items-center gap-1"):
+            roles = _ROLES if row.role in _ROLES else {**_ROLES, row.role: row.role}
+            role = ui.select(roles, label=f"layer {row.label}", value=row.role)
+            role.classes("col min-w-36")
+            role.on_value_change(lambda event: self._set_layer(row, event.value, row.material))
+            if row.part == "terminals":
+                return
+            options = materials if row.role else {**materials, "": "–"}
+            made_of = ui.select(options, label="made of", value=row.material, with_input=True)
+            made_of.classes("col min-w-36").props(f'aria-label="layer {row.label} is made of"')
+            role_then = row.role or FILM
+            made_of.on_value_change(lambda event: self._set_layer(row, role_then, event.value))
+            if row.role == FILM and row.material:
+                thickness = self._sections["layers"][row.name].get("thickness_um")
+                key, words = "thickness_um", f"{row.label}: thickness (µm)"
+                shown = "" if thickness is None else f"{thickness:.12g}"
+                field = self._input(("layers", row.name), key, "thickness (µm)", words, shown)
+                field.props('placeholder="a part of the body" stack-label').classes("w-full")
+
+    def _set_layer(
+        self, row: LayerRow, role: str | None, material: str | None
+    ) -> Awaitable[None] | None:
+        if role is None or material is None:
+            return None
+        return self._edit(with_layer(self._sections, row, role, material))
+
+    def _ask_name(self, old: str) -> None:
+        """Ask for another name of a material."""
+        with opened_dialog("Another name", "24rem") as (dialog, _):
+            name = ui.input("Name of the material", value=old).props("autofocus")
+
+            async def rename() -> None:
+                dialog.close()
+                if name.value.strip() != old:
+                    with self._banner.caught():
+                        await self._edit(with_material_renamed(self._sections, old, name.value))
+
+            name.on("keydown.enter", rename)
+            ui.button("Rename", on_click=rename)
+
+    def _field(self, field: dict[str, Any]) -> None:
+        """Show a value in its field."""
+        value = field["value"]
+        own = self._input(
+            field["place"], field["key"], field["label"], field["meaning"], value or ""
+        )
+        if value is None:
+            own.props('readonly placeholder="as the probe file says" stack-label')
+        elif field["default"]:
+            own.props(f'placeholder="{field["default"]}" stack-label')
+
+    def _input(self, place: Place, key: str, label: str, meaning: str, value: str) -> ui.input:
+        files = self._session.project.data if place[0] == "materials" else None
+        field = ui.input(label, value=value, autocomplete=files)
+        field.props(f'debounce=300 hide-bottom-space aria-label="{meaning}"')
+        field.tooltip(f"{'.'.join((*place, key))}: {meaning}")
+        field.on_value_change(partial(self._typed, place, key))
+        self._inputs[place, key] = field
+        return field
+
+    def _typed(self, place: Place, key: str, event: Any) -> Awaitable[None] | None:
+        if len(place) > 1 and not has_section(self._sections, place):
+            return None  # it went meanwhile with the layer or the material that it was of
+        value = typed(key, event.value or "")
+        sections = with_value(self._sections, place, key, value)
+        if sections == with_value(self._sections, place, "", None):
+            return None  # nobody typed it
+        return self._edit(sections)
+
+    def _edit(self, sections: Sections) -> Awaitable[None]:
+        # at once: the next field may be set before what this one does is shown
+        self._sections = sections
+        return self._edited(sections)
+
+    def _mark(self, fault: str) -> None:
+        """Say at its field what is wrong: at the first that a line about its section names."""
+        about, _, reason = fault.partition("]: ")
+        words = re.findall(r"\w+", reason)
+        at_fault = [
+            (words.index(key), field)
+            for (place, key), field in self._inputs.items()
+            if about.endswith(f"[{'.'.join(place)}") and key in words
+        ]
+        wrong = min(at_fault, key=lambda pair: pair[0], default=(0, None))[1]
+        for field in self._inputs.values():
+            field.error = reason if field is wrong else None

@@ -5,15 +5,15 @@ from __future__ import annotations
 import asyncio
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, ClassVar
 
 from nicegui import background_tasks, ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.chosen_lever import stem
 from hotlever.app.pages.frame import ErrorBanner, caption, number_shown, two_columns
-from hotlever.app.pages.page import Page, Work, outputs
+from hotlever.app.pages.page import Page, Work
 from hotlever.app.pages.plots import redraw
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
@@ -88,6 +88,8 @@ class LivePage(Page):
     ----------
     of_file : dict
         What the probe's file says, or what is usual, of what can be chosen.
+    opened_for : str or None
+        The probe file that it is of.
     """
 
     #: The module that answers, what draws the answers, and what is shown of ``now`` in them.
@@ -96,15 +98,17 @@ class LivePage(Page):
     numbers: ClassVar[Numbers]
     #: What is chosen of a state, beside the task, in the order in which it is asked for.
     state: ClassVar[tuple[str, ...]]
-    #: The processes that answer in full, and quickly.
-    workers = ("full", "quick")
+    #: Whether a lever that was solved in full answers at once at any state.
+    solved_once = True
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
         self.of_file: dict[str, Any] = {}
+        self.opened_for: str | None = None
+        self._notes: dict[str, None] = {}
         with two_columns("live") as (left, right):
             with left:
-                self.probe_choice()
+                self.lever_choice()
                 self.controls()
                 self._sliders = ui.column().classes("w-full gap-1")
             with right, ui.column().classes("w-full gap-3 parts"):
@@ -118,7 +122,7 @@ class LivePage(Page):
     async def described(self) -> dict[str, Any]:
         """Return what the probe's file says."""
         described = f"{self.live}:described"
-        answer: dict[str, Any] = await self.session.ask("quick", described, self.chosen["probe"])
+        answer: dict[str, Any] = await self.session.ask("quick", described, self.probe)
         return answer
 
     @abstractmethod
@@ -144,6 +148,10 @@ class LivePage(Page):
     def model_and_remark(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return what the numbers are of, and what else is said of an answer."""
 
+    def completed(self, answer: dict[str, Any], quick: bool) -> dict[str, Any]:
+        """Return an answer with all that the plots draw."""
+        return answer
+
     async def follow_answer(self, at: list[Any], quick: bool) -> None:
         """Follow an answer that is shown."""
 
@@ -154,8 +162,14 @@ class LivePage(Page):
 
     async def open(self) -> None:
         """Show the sliders of the probe, and so the first state."""
+        if self.opened_for != self.probe:
+            self.blank()
         with self.banner.caught():
-            self.of_file = await self.described()
+            self.opened_for = probe = self.probe
+            of_file = await self.described()
+            if self.is_gone or probe != self.probe:
+                return  # another lever was chosen meanwhile
+            self.of_file = of_file
             self._sliders.clear()
             with self._sliders:
                 self.show_sliders()
@@ -198,6 +212,8 @@ class LivePage(Page):
     def refresh(self) -> None:
         """Have what is shown follow; only what is wanted last counts."""
         self.show_command()
+        # numbers that are not of this are pale after a moment
+        self._shown.classes("of-before")
         self._follower.follow(self.of_lever(), [self.chosen[key] for key in self.state])
 
     def task(self) -> Task | None:
@@ -206,7 +222,7 @@ class LivePage(Page):
 
     def _writing(self, kind: str) -> Task:
         task = self.of_lever()
-        files = outputs(f"{stem(self.chosen)}.{task.command}", kind)
+        files = self.outputs(self.stem, task.command, kind)
         options = {**self.of_table(kind), **task.options, **files}
         return Task(task.command, task.files, options)
 
@@ -214,7 +230,7 @@ class LivePage(Page):
 
     def results(self) -> None:
         """Show numbers and plots here, and what can be taken of them."""
-        with ui.row().classes("w-full items-end gap-6 numbers"):
+        with ui.row().classes("w-full items-end gap-6 numbers") as self._shown:
             titles = {key: title for key, (title, *_) in self.numbers.items()}
             self._numbers = {key: number_shown(key, title) for key, title in titles.items()}
         self._model = caption("starting").props("aria-live=polite")
@@ -236,42 +252,50 @@ class LivePage(Page):
         """Whether the tab was closed."""
         return self._model.is_deleted
 
-    async def show(self, lever: Task, at: list[Any], quick: bool) -> bool:
-        """Show a lever in a state, quickly or in full; return whether it did."""
+    async def show(
+        self, lever: Task, at: list[Any], quick: bool, is_wanted: Callable[[], bool]
+    ) -> bool:
+        """Show a lever in a state if it is still wanted by then; return whether there is one."""
         notes = dict[str, None]()
 
         def heard(kind: str, content: Any) -> None:
             if kind == "note" and content:
                 notes[content] = None
             elif kind == "progress" and not self.is_gone:
-                if quick:
-                    self.blank()
                 label, done, total = content
                 self._model.set_text(f"{label}: {done} of {total}")
 
         arguments = lever, *at, quick, *self.also_asked()
         try:
-            worker, function = self.workers[quick], f"{self.live}:answer"
+            worker, function = "quick" if quick else "full", f"{self.live}:answer"
             answer = await self.session.ask(worker, function, *arguments, heard=heard)
         except HotleverError as error:
-            if not self.is_gone:
+            if not self.is_gone and is_wanted():
                 self.blank()
                 self.banner.say(str(error))
             return False
-        if self.is_gone or (not quick and not self._follower.is_wanted(lever)):
-            return False  # the tab was closed meanwhile, or sliders have moved on
+        if self.is_gone or not is_wanted():
+            return True
         self.banner.clear()
+        answer = self.completed(answer, quick)
         for key, text in texts_of(answer["now"], self.numbers).items():
             self._numbers[key].set_text(text)
-        model, remark = self.model_and_remark(answer, quick)
-        self._model.set_text(model)
-        self._remarks.set_text("; ".join(filter(None, [remark, *notes])))
-        self.plots.show(answer)
+        self._notes = notes
+        self.draw(answer, quick)
         if not self._drawn.visible:
             self._drawn.set_visibility(True)
             redraw(self._drawn)
+        if self._follower.last == (lever, at):
+            self._shown.classes(remove="of-before")
         await self.follow_answer(at, quick)
         return True
+
+    def draw(self, answer: dict[str, Any], quick: bool) -> None:
+        """Draw an answer, and say what it is of."""
+        model, remark = self.model_and_remark(answer, quick)
+        self._model.set_text(model)
+        self._remarks.set_text("; ".join(filter(None, [remark, *self._notes])))
+        self.plots.show(answer)
 
     def blank(self) -> None:
         """Show no numbers where there are none: the last ones were of another state."""
@@ -297,46 +321,55 @@ def texts_of(now: Mapping[str, Any], numbers: Numbers) -> dict[str, str]:
 
 
 class _Follower:
-    """Has a page follow its sliders: quickly while they move, in full when they rest."""
+    """Has a page follow its sliders: quickly while they move, in full when they rest.
+
+    Attributes
+    ----------
+    last : tuple of Task and list, or None
+        What is wanted: a lever and its state.
+    """
 
     def __init__(self, page: LivePage) -> None:
         self._page = page
-        self._request: tuple[Task, list[Any]] | None = None
-        self._last: tuple[Task, list[Any]] | None = None
-        self._settled: Task | None = None
-        self._rests = 0
+        self.last: tuple[Task, list[Any]] | None = None
+        self._asked: tuple[Task, list[Any]] | None = None
+        self._solved: Task | None = None
         self._busy = False
 
     def follow(self, lever: Task, at: list[Any]) -> None:
         """Have a state of a lever shown; only what is wanted last counts."""
-        self._request = self._last = lever, at
+        self.last, self._asked = (lever, at), None
         if not self._busy:
             self._busy = True
             background_tasks.create(self._follow(), name="live lever")
 
-    def is_wanted(self, lever: Task) -> bool:
-        """Return whether this is still the lever that is wanted."""
-        return self._last is not None and self._last[0] == lever
-
     async def _follow(self) -> None:
         try:
-            while self._request is not None and not self._page.is_gone:
-                (lever, at), self._request = self._request, None
-                settled = lever == self._settled
-                await self._page.show(lever, at, not settled)
-                if not settled and self._request is None:
-                    self._rests += 1
-                    background_tasks.create(self._settle(lever, at, self._rests), name="full lever")
+            while self.last is not None and self._asked != self.last and not self._page.is_gone:
+                self._asked = lever, at = self.last
+                solved = self._page.solved_once and lever == self._solved
+                # of a lever that moves each state is shown, of another one none
+                is_wanted = partial(self._is_of, lever.files)
+                shown = await self._page.show(lever, at, not solved, is_wanted)
+                if shown and not solved and self.last == (lever, at):
+                    background_tasks.create(self._rest(lever, at), name="full lever")
         finally:
             self._busy = False
 
-    async def _settle(self, lever: Task, at: list[Any], turn: int) -> None:
+    def _is_of(self, files: tuple[str, ...]) -> bool:
+        return self.last is not None and self.last[0].files == files
+
+    async def _rest(self, lever: Task, at: list[Any]) -> None:
         """Ask for all once sliders have rested; they may move on meanwhile."""
+
+        def is_wanted() -> bool:
+            return self.last == (lever, at)
+
         await asyncio.sleep(_REST_S)
-        if turn != self._rests or self._request is not None or self._page.is_gone:
+        if self._page.is_gone or not is_wanted():
             return
-        if await self._page.show(lever, at, False):
-            self._settled = lever
+        if await self._page.show(lever, at, False, is_wanted):
+            self._solved = lever
             background_tasks.create(self._page.rested(), name="reduced lever")
-            if self._last is not None and self._last != (lever, at):
-                self.follow(*self._last)
+            if self.last is not None and not is_wanted():
+                self.follow(*self.last)

@@ -13,7 +13,6 @@ from nicegui import ui
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
     ErrorBanner,
-    caption,
     figure,
     framed,
     hand_over,
@@ -23,7 +22,6 @@ from hotlever.app.pages.frame import (
     text_shown,
 )
 from hotlever.app.session import Session
-from hotlever.app.state import Result
 from hotlever.errors import InputError
 
 REFERENCE = "reference probe"
@@ -44,6 +42,7 @@ KINDS = {
 }
 FILM = {"film": "the temperature map in time (GIF)"}
 _TABLES = {"CSV": "csv", "NetCDF": "nc"}
+_OTHER = "Something else is chosen now; this is still the result of:"
 #: Seconds between two looks at the work that runs.
 _LOOK_S = 0.1
 
@@ -56,10 +55,12 @@ class Page:
     name : str
         Its address, under which also its work runs, and what was chosen is kept.
     chosen : dict
-        What was chosen last, in whatever tab; see `hotlever.app.state.Choices`.
+        What was chosen last, in whatever tab.
     """
 
     name = ""
+    #: What is chosen at first.
+    first: ClassVar[dict[str, Any]] = {}
     #: What its task may be asked for as.
     kinds: ClassVar = {kind: meaning for kind, meaning in KINDS.items() if kind != "VTU"}
 
@@ -72,9 +73,10 @@ class Page:
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         self.session, self.banner = session, banner
-        self.chosen: dict[str, Any] = session.choices(self.name) if self.name else {}
+        self.chosen = session.choices(self.name, self.first)
         self._command: ui.column | None = None
         self._command_line = ""
+        self._origin: tuple[Job, ui.label] | None = None
 
     async def open(self) -> None:
         """Show what takes a moment, once the page is there."""
@@ -93,29 +95,55 @@ class Page:
 
         return keep
 
-    def choice(self, key: str, label: str, options: Any, without: Any = "") -> ui.select:
-        """Ask for one of some options; where its name is empty `without` is chosen.
-
-        The first is shown if none was chosen. A file that is not there any more stays chosen and is
-        said to be missing: in its place another would give other numbers without a word.
-        """
+    def choice(self, key: str, label: str, options: dict[str, str]) -> ui.select:
+        """Ask for one of some options; one that is not there any more stays chosen, as missing."""
         value = self.chosen[key]
-        if value is None:
-            value = next(iter(options), None)
-        elif value not in options:
-            options = {**options, value: f"{value} (not in the folder)"}
-        changed = self._keep(key, without)
-        return ui.select(options, label=label, value=value, on_change=changed).classes("w-full")
+        keep = self._keep(key, "")
+        options = _with_missing(options, value)
+        return ui.select(options, label=label, value=value, on_change=keep).classes("w-full")
 
-    def probe_choice(self) -> ui.select:
-        """Ask for a probe, the reference probe or one of the project."""
-        probes = {"": REFERENCE} | {name: name for name in self.session.project.probes}
-        return self.choice("probe", "Probe", probes, None)
+    def lever_choice(self) -> ui.select:
+        """Ask for the lever of all pages: the reference probe or a probe file of the project.
+
+        What is chosen in another tab is followed.
+        """
+        session, project = self.session, self.session.project
+
+        def options() -> dict[str, str]:
+            probes = {"": REFERENCE} | {name: name for name in project.probes}
+            return _with_missing(probes, session.probe)
+
+        def chosen(event: Any) -> Awaitable[None] | None:
+            session.choose_lever(event.value)
+            return self.changed()
+
+        def follow() -> None:
+            select.set_options(options(), value=session.probe)
+
+        select = ui.select(options(), label="Lever", value=session.probe, on_change=chosen)
+        session.followers.append(follow)
+        ui.context.client.on_delete(lambda: session.followers.remove(follow))
+        return select.classes("w-full").tooltip("The lever of all pages")
+
+    @property
+    def probe(self) -> str:
+        """The probe file of the lever; empty for the reference probe."""
+        return self.session.probe
+
+    @property
+    def probe_files(self) -> tuple[str, ...]:
+        """The files that a task of the lever is given."""
+        return (self.probe,) if self.probe else ()
+
+    @property
+    def stem(self) -> str:
+        """What names of files begin with, of the lever."""
+        return Path(self.probe or "reference.toml").stem
 
     def text(self, key: str, label: str) -> ui.input:
         """Ask for a line of text."""
         field = ui.input(label, value=self.chosen[key], on_change=self._keep(key, ""))
-        return field.classes("w-full")
+        return field.classes("w-full").props("debounce=200")
 
     def number(self, key: str, label: str, unit: str = "", empty: str = "") -> ui.number:
         """Ask for a number; `empty` is what counts where there is none."""
@@ -133,7 +161,7 @@ class Page:
     # --- what is done -----------------------------------------------------------------------------
 
     def task(self) -> Task | None:
-        """Return the task that does what is chosen.
+        """Return the task that does what is chosen, and writes new files.
 
         Raises
         ------
@@ -141,6 +169,11 @@ class Page:
             If something is missing.
         """
         return None
+
+    def outputs(self, stem: str, what: str, kind: str) -> dict[str, str]:
+        """Return the options that have a task write one of `KINDS` or a film, under a new name."""
+        endings = [f".{what}{Path(name).suffix}" for name in outputs("file", kind).values()]
+        return outputs(f"{self.session.project.free(stem, *endings)}.{what}", kind)
 
     def python(self) -> str:
         """Return the lines of Python that do the same, if there are short ones."""
@@ -150,11 +183,15 @@ class Page:
         """Show the command line here, whenever `show_command` is called."""
         self._command, self._command_line = ui.column().classes("w-full gap-0"), ""
 
-    def show_command(self) -> None:
-        """Show the command line of what is chosen now; none while something is missing."""
-        task = None
+    def _task_now(self) -> Task | None:
         with suppress(InputError):
-            task = self.task()
+            return self.task()
+        return None
+
+    def show_command(self) -> None:
+        """Show the command line of what is chosen now, and mark a result of something else."""
+        task = self._task_now()
+        self._mark(task)
         line = "" if task is None else task.line
         if self._command is not None and line != self._command_line:
             self._command.clear()
@@ -180,7 +217,28 @@ class Page:
             return True
         return False
 
-    # --- what was written is given ----------------------------------------------------------------
+    # --- what came out ----------------------------------------------------------------------------
+
+    def result_of(self, job: Job) -> None:
+        """Show here that what is below is of a job: its command line, and a mark once it is old."""
+        mark = ui.label(_OTHER).classes("banner w-full").props("role=status data-other=1")
+        self._origin = job, mark
+        with ui.element("pre").classes("command w-full"):
+            ui.label(job.task.line).props("data-origin=1")
+        self._mark(self._task_now())
+
+    def _mark(self, now: Task | None) -> None:
+        """Mark the result if something else is chosen, or one of its files has changed."""
+        if self._origin is not None:
+            job, mark = self._origin
+            asked = now is not None and now.question == job.task.question
+            mark.set_visibility(not asked or self._latest(job.task) > job.began)
+
+    def _latest(self, task: Task) -> float:
+        """Return when the latest of the files was written that a task reads."""
+        with suppress(InputError, OSError, ValueError):
+            return max(map(self.session.project.stamp, task.read), default=0.0)
+        return 0.0
 
     def kind_buttons(self, on_click: Callable[[str], Any]) -> None:
         """Show a button for each kind of file."""
@@ -198,13 +256,18 @@ class Page:
             return
         path = self.session.project.path(job.task.written)
         if path.is_dir():
-            new = [file for file in path.iterdir() if file.stat().st_mtime >= job.began]
+            new = sorted(path.iterdir())
             if len(new) > 1:
-                packed = self.session.ask("full", "showing:packed", sorted(new))
+                packed = self.session.ask("full", "showing:packed", new)
                 await hand_over(packed, f"{path.name}.zip")
                 return
             path = new[0]
         ui.download.file(path)
+
+
+def _with_missing(options: dict[str, str], value: str) -> dict[str, str]:
+    """Return options with one that is chosen, be its file gone: another would be a wrong one."""
+    return options if value in options else {**options, value: f"{value} (not in the folder)"}
 
 
 def several(text: str) -> list[str]:
@@ -255,7 +318,6 @@ class Work:
     ) -> None:
         self._session, self._page, self._then, self._during = session, page, then, during
         self._seen: tuple[int, int] = (0, -1)
-        self._hidden: Job | None = None
         with ui.column().classes("w-full gap-1") as self._all:
             with ui.row().classes("w-full items-center no-wrap") as self._running:
                 self._bar = ui.linear_progress(show_value=False, size="10px").props("rounded")
@@ -270,17 +332,11 @@ class Work:
 
     @property
     def _job(self) -> Job | None:
-        return self._session.jobs.by_page.get(self._page)
+        return next(iter(self._session.jobs.of(self._page)), None)
 
     @property
     def _has_ended(self) -> bool:
         return self._job is not None and self._job.standing != "running"
-
-    def hide(self) -> None:
-        """Show nothing more of a job that has ended: something else is shown now."""
-        if self._has_ended:
-            self._hidden = self._job
-            self._look()
 
     async def _cancel(self) -> None:
         await self._session.jobs.cancel(self._page)
@@ -295,7 +351,7 @@ class Work:
 
     def _look(self) -> None:
         job = self._job
-        self._all.set_visibility(job is not None and job is not self._hidden)
+        self._all.set_visibility(job is not None)
         if job is None:
             return
         running = job.standing == "running"
@@ -332,52 +388,41 @@ class DrawnPage(Page):
         Work(self.session, self.name, self._ended)
         self._result = ui.column().classes("w-full gap-3")
         self.command()
-        self._keep_result(self.session.jobs.by_page.get(self.name))
         self._show()
 
     async def _ended(self, job: Job) -> None:
-        if self._keep_result(job):
+        if job.task.written.endswith(".svg"):
             self._show()
         else:
             await self.give(job)
+        self.show_command()
 
-    def _keep_result(self, job: Job | None) -> bool:
-        """Keep what is to be shown of a job, if it drew that; return whether it did."""
-        if job is None or not job.task.written.endswith(".svg"):
-            return False
-        if self.written(job):
-            stamp = self.session.project.stamp(job.task.written)
-            summary = {
-                "numbers": job.contents.get("table", []),
-                "text": job.contents.get("result", ""),
-            }
-            self.session.results[self.name] = Result(**vars(job.task), **summary, stamp=stamp)
-        return True
+    def drawn_job(self) -> Job | None:
+        """Return the last job that drew a figure, which is still there."""
+        drawn = (job for job in self.session.jobs.of(self.name) if job.standing != "running")
+        drawn = (job for job in drawn if job.task.written.endswith(".svg"))
+        return next((job for job in drawn if self.written(job)), None)
 
     def _show(self) -> None:
         """Show what was computed last, with the figure that was drawn, and give it."""
         self._result.clear()
-        result = self.session.results.get(self.name)
-        if result is None:
+        self._origin = None
+        job = self.drawn_job()
+        if job is None:
             return
-        task = Task(result.command, tuple(result.files), result.options)
-        path, stamp = self.session.project.path(task.written), self.session.project.stamp
-        latest = max(map(stamp, task.files), default=0.0)
-        if stamp(task.written) != result.stamp or latest > result.stamp:
-            return  # it is gone, or another one by now, or of files that have changed since
+        path = self.session.project.path(job.task.written)
         with self._result:
-            if result.numbers:
+            self.result_of(job)
+            if numbers := job.contents.get("table"):
                 with ui.row().classes("w-full items-end gap-6"):
-                    for title, value in result.numbers:
+                    for title, value in numbers:
                         number_shown(title, title, value)
-            text_shown(result.text)
-            self.show_figure(path)
-            with ui.row().classes("w-full items-center"):
-                caption(task.writing({}).line).classes("remark col min-w-60")
-                self.kind_buttons(partial(self._ask, task, path))
+            text_shown(job.contents.get("result", ""))
+            self.show_figure(job, path)
+            self.kind_buttons(partial(self._ask, job.task, path))
 
-    def show_figure(self, path: Path) -> None:
-        """Show the figure that was drawn."""
+    def show_figure(self, job: Job, path: Path) -> None:
+        """Show the figure that a job drew."""
         figure(path.read_text(encoding="utf-8"), self.alt, wide=True)
 
     def _ask(self, task: Task, path: Path, kind: str) -> None:
@@ -385,4 +430,5 @@ class DrawnPage(Page):
         if kind in ("CSV", "SVG"):
             ui.download.file(path.with_suffix(f".{kind.lower()}"))
         else:
-            self.run(task.writing(outputs(path.stem, kind)))
+            stem, _, what = path.stem.rpartition(".")
+            self.run(task.writing(self.outputs(stem, what, kind)))

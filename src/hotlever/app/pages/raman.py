@@ -7,26 +7,26 @@ import io
 from collections.abc import Awaitable
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, ClassVar
 
 from nicegui import ui
 
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import (
-    FIGURE_FILES,
     ErrorBanner,
     caption,
     download_button,
     drop_zone,
-    figure,
     flat_button,
     say_refused,
     small_button,
     table,
     two_columns,
 )
-from hotlever.app.pages.page import Page, Work
+from hotlever.app.pages.page import DrawnPage
+from hotlever.app.project import CORRECTIONS
 from hotlever.app.session import Session
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
@@ -34,11 +34,7 @@ from hotlever.raman import Correction, read_corrections
 from hotlever.raman.tables import corrections_text
 
 _TIP, _PLATE = "tip", "hot-plate"
-_TABLE, _SAVED, _FIGURE = "tip.raman.csv", "raman.json", "raman"
 _LAWS = {"anharmonic": "anharmonic", "linear": "linear, as in the paper"}
-_FIGURE_ALT = "Spectra by temperature, the calibration and its residuals"
-#: The table of corrections, in the folder of the project.
-_CORRECTIONS = "raman.corrections.csv"
 _SPECTRUM_ALT = "Counts of the spectrum, and the fitted line"
 _HELP = "Click where the line is, or type it. Drag across the part that is to be fitted."
 _FIELDS = {"start": "Line near", "low": "Fit from", "high": "Fit to"}
@@ -56,32 +52,44 @@ _SHADE = {"type": "rect", **_HIGH, "line": {"width": 0}, "fillcolor": plots.SHAD
 _PLACE = {"type": "line", **_HIGH, "line": {"color": VERMILION, "width": 1, "dash": "dash"}}
 
 
-class RamanPage(Page):
+class RamanPage(DrawnPage):
     """One tab of the page."""
 
     name = "raman"
+    alt = "Spectra by temperature, the calibration and its residuals"
+    kinds: ClassVar = {kind: text for kind, text in DrawnPage.kinds.items() if kind != "NetCDF"}
+    #: Corrections by the name of a spectrum, the file that they are in, and what that holds.
+    first: ClassVar = {
+        "calibration": "",
+        "law": "anharmonic",
+        "spectrum": "",
+        "corrections": {},
+        "corrected_by": None,
+        "written": {},
+    }
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
-        self._again = False
+        project = session.project
+        self._taken = self.chosen["corrected_by"]
+        if self._taken is None:
+            self._take_corrections(next(iter(project.names(CORRECTIONS)), ""))
         with two_columns() as (left, right):
             with left:
                 self._folder(_PLATE, "Drop the spectra of the hot plate here (temperatures known)")
                 self._folder(_TIP, "Drop the spectra to be measured here")
                 names = {"": f"the spectra in {_PLATE}"}
-                names |= {name: name for name in session.project.raman_calibrations}
+                names |= {name: name for name in project.raman_calibrations}
                 self.choice("calibration", "Calibrated by", names)
                 self.choice("law", "Law", _LAWS)
+                self._corrected_by = self.choice("corrected_by", "Corrected by hand in", {})
+                self._offer_corrections()
                 measure = ui.button("Measure", icon="thermostat", on_click=self.start)
                 measure.classes("w-full")
             with right:
-                Work(session, self.name, self._measured)
                 self._spectrum = OneSpectrum(self)
-                self._result = ui.column().classes("w-full gap-2")
-                self.command()
+                self.show_result()
         self.show_command()
-        if not session.jobs.running(self.name):
-            self._show()
 
     async def open(self) -> None:
         """Show one of the spectra that are there."""
@@ -111,12 +119,43 @@ class RamanPage(Page):
             self.session.project.take_example_folders("raman", _PLATE, _TIP)
             ui.navigate.reload()
 
-    def changed(self) -> Awaitable[None]:
-        """Show the spectrum by what is asked of the thermometer now."""
-        self.show_command()
-        return self._spectrum.show_chosen()
+    # --- corrections ------------------------------------------------------------------------------
 
-    def task(self, suffix: str = ".svg") -> Task:
+    def _take_corrections(self, file: str) -> None:
+        """Take the corrections of a file of the project, or none."""
+        with self.banner.caught():
+            path = self.session.project.path(file)
+            corrections = read_corrections(path) if file else {}
+            self.chosen |= {"corrections": corrections, "written": corrections}
+            self._taken = self.chosen["corrected_by"] = file
+
+    def _offer_corrections(self) -> None:
+        names = {"": "nothing"} | {name: name for name in self.session.project.names(CORRECTIONS)}
+        self._corrected_by.set_options(names, value=self.chosen["corrected_by"])
+
+    @property
+    def _corrections_file(self) -> str:
+        """The file of the corrections, a new one if they have changed; empty without any."""
+        if self.chosen["corrections"] == self.chosen["written"]:
+            return str(self.chosen["corrected_by"] or "")
+        name = f"{self.session.project.free(_TIP, CORRECTIONS)}{CORRECTIONS}"
+        return name if self.chosen["corrections"] else ""
+
+    # --- what is asked ----------------------------------------------------------------------------
+
+    async def changed(self) -> None:
+        """Show the spectrum by what is asked of the thermometer now."""
+        if self._corrected_by.value != self._taken:
+            self._taken = self._corrected_by.value
+            self._take_corrections(self._taken)
+        await self.follow_corrections()
+
+    async def follow_corrections(self) -> None:
+        """Show the spectrum and the command with the corrections as they are."""
+        self.show_command()
+        await self._spectrum.show_chosen()
+
+    def task(self) -> Task:
         """Return the task that measures the spectra, and draws them."""
         project, calibration, law = (
             self.session.project,
@@ -124,63 +163,45 @@ class RamanPage(Page):
             self.chosen["law"],
         )
         with_plate = not calibration and bool(project.spectra(_PLATE))
+        stem = project.free(_TIP, ".raman.csv", ".raman.svg", ".raman.json")
         options = {
             "calibration": calibration,
             "calibrate_from": [_PLATE] if with_plate else [],
-            "save_calibration": _SAVED if with_plate else "",
             "law": "" if law == "anharmonic" else law,
-            "corrections": _CORRECTIONS if project.stamp(_CORRECTIONS) else "",
-            "output": _TABLE,
-            "plot": f"{_FIGURE}{suffix}",
+            "corrections": self._corrections_file,
+            "save_calibration": f"{stem}.raman.json" if with_plate else "",
+            "output": f"{stem}.raman.csv",
+            "plot": f"{stem}.raman.svg",
         }
         return Task("raman", (_TIP,), options)
 
-    def corrected(self) -> None:
-        """Measure anew, once what runs has ended."""
-        self.show_command()
-        if self.session.jobs.running(self.name):
-            self._again = True
-        else:
-            self.start()
+    def start(self) -> bool:
+        """Write the corrections, if they are new, and measure."""
+        with self.banner.caught():
+            file, corrections = self._corrections_file, self.chosen["corrections"]
+            if corrections != self.chosen["written"] and file:
+                self.session.project.write(file, corrections_text(corrections))
+            self._taken = file
+            self.chosen |= {"corrected_by": file, "written": corrections}
+            self._offer_corrections()
+            return super().start()
+        return False
 
-    async def _measured(self, job: Job) -> None:
-        if self._again:
-            self._again = False
-            self.start()
-        elif not job.task.written.endswith(FIGURE_FILES[0]):
-            await self.give(job)
-        elif job.standing == "done":
-            self._show()
-
-    def _give(self, suffix: str) -> None:
-        """Give the figure that there is, or have it written as another file."""
-        if suffix == FIGURE_FILES[0]:
-            ui.download.file(self.session.project.path(f"{_FIGURE}{suffix}"))
-        else:
-            self.run(self.task(suffix))
-
-    def _show(self) -> None:
-        self._result.clear()
-        project = self.session.project
-        if not project.stamp(_TABLE):
-            return
-        with self._result, self.banner.caught():
-            text = project.path(_TABLE).read_text(encoding="utf-8")
+    def show_figure(self, job: Job, path: Path) -> None:
+        """Show the figure, and the table whose rows lead to the spectra."""
+        with self.banner.caught():
+            super().show_figure(job, path)
+            text = path.with_suffix(".csv").read_text(encoding="utf-8")
             head, *rows = [*csv.reader(io.StringIO(text))] or [[]]
-            with ui.row().classes("items-center"):
-                download_button(self.session, _TABLE, "Temperatures (CSV)")
-                download_button(self.session, _SAVED, "Calibration (JSON)")
-                for suffix in FIGURE_FILES:
-                    flat_button(suffix[1:].upper(), partial(self._give, suffix))
-            if project.stamp(f"{_FIGURE}.svg"):
-                drawn = project.path(f"{_FIGURE}.svg").read_text(encoding="utf-8")
-                figure(drawn, _FIGURE_ALT, wide=True)
+            saved = job.task.options.get("save_calibration")
+            if saved:
+                download_button(self.session, saved, "Calibration (JSON)")
             table(head, rows, lambda name: self._spectrum.show(f"{_TIP}/{name}"), pagination=20)
             caption("A click on a name shows its spectrum above.")
 
 
 class OneSpectrum:
-    """A spectrum chosen by name, and its correction by hand, which a table of the project keeps.
+    """A spectrum chosen by name, and its correction by hand.
 
     The name is chosen under the page's ``spectrum``.
     """
@@ -216,10 +237,6 @@ class OneSpectrum:
     def _name(self) -> str:
         return str(self._select.value or "")
 
-    def _corrections(self) -> dict[str, Correction]:
-        path = self._page.session.project.path(_CORRECTIONS)
-        return read_corrections(path) if path.is_file() else {}
-
     async def look(self, folders: list[str]) -> None:
         """Offer the spectra of some folders, and show the one that was chosen last."""
         names = await self._page.session.ask("full", "showing:spectra", folders)
@@ -250,43 +267,40 @@ class OneSpectrum:
 
     # --- by hand ----------------------------------------------------------------------------------
 
-    async def _click(self, event: Any) -> None:
+    # at once: what was asked for before may be shown in the fields until it is done
+
+    def _click(self, event: Any) -> Awaitable[None] | None:
         points = event.args.get("points") or []
-        if points:
-            await self._correct(start=round(float(points[0]["x"]), 2))
+        return self._correct(start=round(float(points[0]["x"]), 2)) if points else None
 
-    async def _drag(self, event: Any) -> None:
+    def _drag(self, event: Any) -> Awaitable[None] | None:
         x = (event.args.get("range") or {}).get("x")
-        if x:
-            low, high = sorted(round(float(end), 1) for end in x)
-            await self._correct(low=low, high=high)
+        if not x:
+            return None
+        low, high = sorted(round(float(end), 1) for end in x)
+        return self._correct(low=low, high=high)
 
-    async def _type(self) -> None:
-        if not self._quiet:
-            numbers = {key: number.value for key, number in self._numbers.items()}
-            await self._correct(**numbers, use=not self._out.value)
+    def _type(self) -> Awaitable[None] | None:
+        if self._quiet:
+            return None
+        numbers = {key: number.value for key, number in self._numbers.items()}
+        return self._correct(**numbers, use=not self._out.value)
 
-    async def _reset(self) -> None:
-        await self._correct(start=None, low=None, high=None, use=True)
+    def _reset(self) -> Awaitable[None] | None:
+        return self._correct(start=None, low=None, high=None, use=True)
 
-    async def _correct(self, **what: Any) -> None:
-        """Keep a correction in the table, and have everything follow."""
-        with self._page.banner.caught():
-            corrections = self._corrections()
-            before = corrections.pop(self._name, Correction())
-            after = replace(before, **what)
-            if after == before:
-                return
-            if after != Correction():
-                corrections[self._name] = after
-            project = self._page.session.project
-            if corrections:
-                text = corrections_text(corrections)
-                project.write(_CORRECTIONS, text, f"corrected {self._name}")
-            else:
-                project.changes.remove(project.path(_CORRECTIONS))
-            await self.show_chosen()
-            self._page.corrected()
+    def _correct(self, **what: Any) -> Awaitable[None] | None:
+        """Take a correction, which is written when all are measured, and show what follows."""
+        corrections = dict(self._page.chosen["corrections"])
+        before = corrections.pop(self._name, Correction())
+        after = replace(before, **what)
+        if after == before:
+            return None
+        if after != Correction():
+            corrections[self._name] = after
+        self._page.chosen["corrections"] = corrections
+        self._turn += 1
+        return self._page.follow_corrections()
 
     # --- what is shown ----------------------------------------------------------------------------
 
@@ -297,8 +311,8 @@ class OneSpectrum:
         if not name:
             return
         try:
-            correction = self._corrections().get(name, Correction())
-            arguments = name, self._page.task()
+            corrections = self._page.chosen["corrections"]
+            arguments = name, self._page.task(), corrections
             spectrum = await self._page.session.ask("full", "showing:spectrum", *arguments)
         except HotleverError as error:
             if not self._all.is_deleted:
@@ -306,6 +320,7 @@ class OneSpectrum:
             return
         if turn != self._turn or self._all.is_deleted:  # another one has been chosen meanwhile
             return
+        correction = corrections.get(name, Correction())
         self._quiet = True
         for key, number in self._numbers.items():
             number.set_value(getattr(correction, key))

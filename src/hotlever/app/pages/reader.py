@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,7 +11,6 @@ from nicegui import ui
 
 from hotlever.app.jobs import Task
 from hotlever.app.pages import plots
-from hotlever.app.pages.chosen_lever import probe_files
 from hotlever.app.pages.frame import caption
 from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage
 from hotlever.colours import BLUE, VERMILION
@@ -22,14 +23,13 @@ _OF_THE_SURFACE = (
     ("accommodation", "Accommodation", "", "for the temperature jump at surfaces, 0.01 to 1"),
 )
 _MOVING = (
-    "moving: coarse lever, the air's temperature jumps as at the bias before: within some 5 %, and "
-    "10 % for slope and resolution"
+    "coarse lever, while the full one is solved; the air's temperature jumps as at the bias before"
 )
-_AT_REST = (
-    "coarse lever: voltage and resistance within some 0.1 %, the rest within 1 %, and 10 % where "
-    "the voltage turns with the distance; the files below are of the full lever"
-)
-
+_AT_REST = "full lever: the numbers of hotlever reader"
+#: Temperatures (K) as at which the air jumps alike: the voltage is the same within 0.1 %.
+_SAME_JUMP_K = 2.0
+#: What is said of the curves, which are of a coarse lever: how far they are off here.
+_OFF = {"reader_V": "voltage", "reader_ohm": "resistance", "dlnR_dz_per_um": "d ln R/dz"}
 _ABOUT = (
     "From the side, heights to a scale of their own; each piece of the lever in the colour of its "
     "hottest place. The dashed line is the distance."
@@ -115,8 +115,17 @@ class ReaderPage(LivePage):
     """One tab of the page."""
 
     name, live, plots_of = "reader", "approaching", ReaderPlots
-    # levers at some distances are kept in one process, which answers from them
-    workers = "quick", "quick"
+    # each distance is another lever
+    solved_once = False
+    first: ClassVar = {
+        "distance_um": 0.5,
+        "tilt_deg": None,
+        "accommodation": None,
+        "amplifier_nV": 5.0,
+        "hooge": 0.0,
+        "bias": 9.0,
+        "most": 12.0,
+    }
     numbers: ClassVar = {
         "resolution_nm_per_rtHz": ("resolution", "{:.3g} pm/√Hz", 1e3),
         "dlnR_dz_per_um": ("d ln R/dz", "{:.3g}·10⁻⁴/nm", 10.0),
@@ -127,6 +136,10 @@ class ReaderPage(LivePage):
         "tip_K": ("tip", "{:.1f} K", 1.0),
     }
     state = ("distance_um",)
+    #: The last answers of the coarse and the full lever, and as at what the air jumps for curves.
+    _coarse: Mapping[str, Any] = MappingProxyType({})
+    _full: Mapping[str, Any] = MappingProxyType({})
+    _jump_K: float | None = None
 
     def controls(self) -> None:
         """Ask for tilt and accommodation, of which each value needs other levers."""
@@ -137,7 +150,8 @@ class ReaderPage(LivePage):
 
     async def described(self) -> dict[str, Any]:
         """Return which distances there are, and what the file says of the surroundings."""
-        request = "approaching:described", self.chosen["probe"], self.chosen["tilt_deg"]
+        self._coarse, self._jump_K = {}, None
+        request = "approaching:described", self.probe, self.chosen["tilt_deg"]
         answer: dict[str, Any] = await self.session.ask("quick", *request)
         nearest, farthest = answer["nearest_um"], answer["farthest_um"]
         self.chosen["distance_um"] = min(max(self.chosen["distance_um"], nearest), farthest)
@@ -169,8 +183,36 @@ class ReaderPage(LivePage):
             "hooge": self.chosen["hooge"] or None,
             "bias": f"{self.chosen['bias']:.12g}V",
         }
-        return Task("reader", probe_files(self.chosen), options)
+        return Task("reader", self.probe_files, options)
+
+    def also_asked(self) -> tuple[float | None]:
+        """Return as at which temperature the air jumps, at the tip of the full lever."""
+        return (self._jump_K,)
+
+    def completed(self, answer: dict[str, Any], quick: bool) -> dict[str, Any]:
+        """Return an answer with the curves, which are of the coarse lever."""
+        if quick:
+            self._coarse = answer
+        return {**self._coarse, **answer}
+
+    async def follow_answer(self, at: list[float], quick: bool) -> None:
+        """Have the curves follow, too, if the air jumps as at another temperature by now."""
+        jump_K = self._full.get("jump_K")
+        if quick or jump_K is None or abs(jump_K - (self._jump_K or 0.0)) <= _SAME_JUMP_K:
+            return
+        self._jump_K, wanted = jump_K, (self.of_lever(), at)
+        with self.banner.caught():
+            request = "approaching:answer", *wanted[:1], *at, True, jump_K
+            coarse = await self.session.ask("quick", *request)
+            if not self.is_gone and self._follower.last == wanted:
+                self.draw({**self.completed(coarse, True), **self._full}, False)
 
     def model_and_remark(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
-        """Return whose numbers these are, and where they are read."""
-        return _MOVING if quick else _AT_REST, f"Read at the terminal {answer['read_at']}"
+        """Return whose numbers these are, where they are read, and how far curves are off."""
+        remark = "; ".join([f"Read at the terminal {answer['read_at']}", *answer["on_curves"]])
+        if quick:
+            return _MOVING, remark
+        self._full = {key: answer[key] for key in ("now", "jump_K", "read_at")}
+        coarse, now = self._coarse["now"], answer["now"]
+        off = (f"{100 * (coarse[key] / now[key] - 1):+.2g} % in {_OFF[key]}" for key in _OFF)
+        return _AT_REST, f"{remark}; curves: coarse lever, here {', '.join(off)}"

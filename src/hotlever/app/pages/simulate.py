@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any
+from typing import Any, ClassVar
 
 from nicegui import ui
 
@@ -56,6 +56,17 @@ class SimulatePage(LivePage):
     """One tab of the page."""
 
     name, live, plots_of = "simulate", "live", LivePlots
+    first: ClassVar = {
+        "probe": "",
+        "changes": {},
+        "beside": "",
+        "kept": {"probe": "", "changes": {}},
+        "bias": 8.0,
+        "most": 12.0,
+        "view": "rest",
+        "held": "",
+        "set_points": "",
+    }
     numbers = _NUMBERS | {"knee": ("knee of the I-V curve", "{:.0f} K, {knee_V:.3f} V", 1.0)}
     state = ("bias", "most")
     kinds = KINDS
@@ -64,7 +75,7 @@ class SimulatePage(LivePage):
 
     def controls(self) -> None:
         """Ask for a lever to be compared."""
-        self._shown_of = self.chosen["probe"], self.chosen["beside"]
+        self._beside = self.chosen["beside"]
         self.choice("beside", "Compare with", options_beside(self.session.project.probes))
 
     def results(self) -> None:
@@ -86,14 +97,13 @@ class SimulatePage(LivePage):
 
     async def changed(self) -> None:
         """Show another probe, as it stands in its file, another one beside, or another table."""
-        probe, beside = self._shown_of
-        self._shown_of = self.chosen["probe"], self.chosen["beside"]
-        if self.chosen["beside"] == NOW != beside:
+        before, self._beside = self._beside, self.chosen["beside"]
+        if self._beside == NOW != before:
             self.chosen["kept"] = {key: self.chosen[key] for key in ("probe", "changes")}
-        if self.chosen["probe"] == probe:
+        if self.opened_for == self.probe:
             self.refresh()
         else:
-            await self._reset()
+            await self.open()
 
     async def _reset(self) -> None:
         self.chosen["changes"] = {}
@@ -109,7 +119,9 @@ class SimulatePage(LivePage):
 
     async def described(self) -> dict[str, Any]:
         """Return what the probe's file says of all that can be moved."""
-        probe = await self.session.ask("quick", "live:described", self.chosen["probe"])
+        if self.chosen["probe"] != self.probe:  # what was changed is of another one
+            self.chosen |= {"probe": self.probe, "changes": {}}
+        probe = await self.session.ask("quick", "live:described", self.probe)
         self._of_probe = probe
         values = {name: value for group in _GROUPS for name, value, *_ in probe["sliders"][group]}
         of_material = {name for name, *_ in probe["sliders"]["material"]}

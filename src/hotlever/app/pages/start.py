@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -20,31 +19,28 @@ from hotlever.app.pages.frame import (
     opened_dialog,
     small_button,
 )
+from hotlever.app.pages.lever import LeverPage, proposal
+from hotlever.app.pages.measurements import MeasurementsPage
 from hotlever.app.pages.page import Page
+from hotlever.app.pages.simulate import SimulatePage
 from hotlever.app.project import DRAWINGS, EXAMPLES
 from hotlever.app.session import Session
-from hotlever.app.state import Simulate
 from hotlever.errors import HotleverError
 
 _SENTENCES = (
     "hotlever tells how hot the tip of a Joule-heated cantilever is, and how sure that is.",
-    "Drop a measurement (bias and current, and what else you have) and press Fit or Calibrate; or "
+    "Drop a measurement (bias and current, and what else you have) and press Calibrate or Fit; or "
     "go to Simulate and move the sliders of the reference probe.",
     "Everything lies as files in {folder}, and each page shows the command line that does the "
     "same.",
 )
 _DROP = "Drop anything here: a measurement, a drawing (GDSII, OASIS, DXF), a probe file"
-#: Kinds of files of a project, and the page and the name there under which one is chosen.
-_KINDS = {
-    "probes": ("Probes", "simulate", "probe"),
-    "data": ("Measurements", "fit", "data"),
-    "drawings": ("Drawings", "lever", "drawing"),
-}
+#: Kinds of files of a project, and their titles.
+_KINDS = {"probes": "Levers", "data": "Measurements", "drawings": "Drawings"}
 _MOST_FILES = 12
 _SCRIPTS, _ADDRESS = EXAMPLES / "gallery", "/gallery"
-#: The page Simulate as at first, whatever was chosen there.
-_SIMULATE = Simulate().model_dump()
-_IN_TIME = _SIMULATE | {"view": "time"}
+#: Pages on which all is as at first but what is set up, and how that is.
+_FIRST = {page.name: page.first for page in (SimulatePage, MeasurementsPage)}
 
 
 @dataclass(frozen=True)
@@ -55,28 +51,29 @@ class Opened:
     ----------
     page : str
     chosen : dict
-        What is chosen there.
+        What is chosen there; the rest is as at first.
     example : str
-        A file of the examples, or a folder of folders, that is copied into the project.
-    key : str
-        Under which the name of that file is chosen.
+        A file of the examples that is copied into the project, or a folder of folders.
     """
 
     page: str
     chosen: Mapping[str, Any] = field(default_factory=dict)
     example: str = ""
-    key: str = ""
 
     def set_up(self, session: Session) -> None:
         """Take the example, and choose."""
-        chosen = deepcopy(dict(self.chosen))
-        if self.key:
-            chosen[self.key] = session.project.take_example(self.example)
+        if self.example.endswith((".csv", ".toml", *DRAWINGS)):
+            choose_file(session, session.project.take_example(self.example))
         elif self.example:
             inside = (EXAMPLES / self.example).iterdir()
             folders = sorted(path.name for path in inside if path.is_dir())
             session.project.take_example_folders(self.example, *folders)
-        session.chosen.setdefault(self.page, {}).update(chosen)
+        elif self.page == SimulatePage.name:
+            session.choose_lever("")
+        first = _FIRST.get(self.page, {})
+        of_file = {"data"} if self.example else set()
+        chosen = {key: value for key, value in first.items() if key not in of_file}
+        session.choices(self.page, first).update({**chosen, **self.chosen})
 
     def open(self, session: Session, banner: ErrorBanner) -> None:
         """Set the page up, and go there."""
@@ -85,36 +82,45 @@ class Opened:
             ui.navigate.to(f"/{self.page}")
 
 
+def choose_file(session: Session, name: str) -> str:
+    """Choose a file of the project for the page that it belongs to; return the page's name."""
+    if name.lower().endswith(DRAWINGS):
+        task = proposal(session, name)
+        session.jobs.start(LeverPage.name, task)
+        session.choices(LeverPage.name, LeverPage.first)["awaited"] = task.options["output"]
+        return LeverPage.name
+    if name.lower().endswith(".toml"):
+        session.choose_lever(name)
+        return SimulatePage.name
+    session.choices(MeasurementsPage.name, MeasurementsPage.first)["data"] = [name]
+    return MeasurementsPage.name
+
+
 _TRY = {
     "A measured lever": (
         "Bias, current, reader voltage, tip temperature",
-        Opened("fit", example="lever-a.csv", key="data"),
+        Opened("measurements", example="lever-a.csv"),
     ),
     "A lever with a tip": (
         "The same, of a lever that the model lacks",
-        Opened("fit", example="lever-b.csv", key="data"),
+        Opened("measurements", example="lever-b.csv"),
     ),
-    "A drawing": (
-        "The reference lever as GDSII",
-        Opened("lever", example="reference-probe.gds", key="drawing"),
-    ),
+    "A drawing": ("The reference lever as GDSII", Opened("lever", example="reference-probe.gds")),
     "Raman spectra": ("A hot plate and a tip", Opened("raman", example="raman")),
 }
 #: Questions by the names of their scripts, in the order of the documentation; None has no page.
 QUESTIONS: dict[str, Opened | None] = {
-    "knee": Opened("simulate", {**_SIMULATE, "bias": 8.3}),
-    "how_sure": Opened("calibrate", {"rests": "probe:", "run": True}, "lever-a.csv", "data"),
-    "fit_my_data": Opened("fit", {"probe": None}, "lever-a.csv", "data"),
+    "knee": Opened("simulate", {"bias": 8.3}),
+    "how_sure": Opened("measurements", {"kind": "calibrate", "run": True}, "lever-a.csv"),
+    "fit_my_data": Opened("measurements", {"kind": "fit"}, "lever-a.csv"),
     "raman_to_temperature": Opened("raman", {"calibration": ""}, "raman"),
-    "what_air_takes": Opened("simulate", {**_SIMULATE, "changes": {"medium": "air"}}),
+    "what_air_takes": Opened("simulate", {"changes": {"medium": "air"}}),
     "where_the_heat_goes": None,
-    "pulse_in_air": Opened("simulate", {**_IN_TIME, "changes": {"medium": "air"}}),
-    "five_us_pulse": Opened("simulate", _IN_TIME),
+    "pulse_in_air": Opened("simulate", {"view": "time", "changes": {"medium": "air"}}),
+    "five_us_pulse": Opened("simulate", {"view": "time"}),
     "heat_the_reader": None,
     "heater_width": None,
-    "metal_film": Opened(
-        "simulate", {**_SIMULATE, "bias": 0.5, "most": 1.0}, "palladium-on-nitride.toml", "probe"
-    ),
+    "metal_film": Opened("simulate", {"bias": 0.5, "most": 1.0}, "palladium-on-nitride.toml"),
     "turned_on_the_wafer": None,
 }
 
@@ -153,46 +159,41 @@ class StartPage(Page):
     def _list_files(self) -> None:
         """Show what lies in the folder, each with the way to its page."""
         with ui.row().classes("w-full gap-8 items-start"):
-            for kind, (title, page, key) in _KINDS.items():
+            for kind, title in _KINDS.items():
                 names = getattr(self.session.project, kind)
                 if not names:
                     continue
                 with ui.column().classes("gap-0"):
                     ui.label(title).classes("text-bold")
                     for name in names[:_MOST_FILES]:
-                        go = flat_button(name, partial(self._open, page, key, name))
+                        go = flat_button(name, partial(self._open, name))
                         go.props("align=left")
                     if len(names) > _MOST_FILES:
                         caption(f"and {len(names) - _MOST_FILES} more")
 
-    def _open(self, page: str, key: str, name: str) -> None:
-        # sliders that were moved are of another probe
-        chosen = {**_SIMULATE, key: name} if page == "simulate" else {key: name}
-        Opened(page, chosen).open(self.session, self.banner)
+    def _open(self, name: str) -> None:
+        with self.banner.caught():
+            ui.navigate.to(f"/{choose_file(self.session, name)}")
 
     async def _sort(self, names: list[str]) -> None:
         """Bring dropped files to the page that they belong to."""
         name, session = names[-1], self.session
-        if name.lower().endswith(DRAWINGS):
-            self._open("lever", "drawing", name)
-        elif name.lower().endswith(".toml"):
+        if name.lower().endswith(".toml"):
             await session.ask("quick", "live:described", name)
-            self._open("simulate", "probe", name)
         elif name.lower().endswith(".json"):
-            self.banner.say(
-                f"{name}: kept in the folder; the pages Fit and Calibrate find it there"
-            )
-        else:
+            self.banner.say(f"{name}: kept in the folder; the page Measurements finds it there")
+            return
+        elif not name.lower().endswith(DRAWINGS):
             try:
-                await session.ask("full", "showing:understood", name)
+                await session.ask("full", "showing:understood", name, {})
             except HotleverError:
                 if await session.ask("full", "showing:refused", [name], True):
                     raise
                 self.banner.say(
                     f"{name} is a spectrum: please drop it on the page Raman, as tip or plate"
                 )
-            else:
-                self._open("fit", "data", name)
+                return
+        self._open(name)
 
     def _card(self, name: str, opened: Opened | None) -> None:
         """Show a question with its picture, the page that answers it, and its script."""
@@ -219,7 +220,7 @@ def _picture(name: str, question: str) -> ui.element:
 
 def _show_script(name: str, question: str, code: str) -> None:
     """Show a script and its figure."""
-    with opened_dialog(question, "52rem") as buttons:
+    with opened_dialog(question, "52rem") as (_, buttons):
         with buttons:
             small_button("Copy", partial(ui.clipboard.write, code), icon="content_copy")
         with ui.element("pre").classes("command w-full"):

@@ -1,106 +1,87 @@
-"""Calibrate: an I-V curve in; what to set for a temperature, and how sure that is, out."""
+"""What was made of measurements: the page of a result, what to set by it, what to measure next."""
 
 from __future__ import annotations
 
 from functools import partial
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
 from nicegui import ui
 
 from hotlever.app.jobs import Task
-from hotlever.app.pages.frame import ErrorBanner, download_button, hand_over, small_button
-from hotlever.app.pages.measured import MeasuredPage
-from hotlever.app.pages.page import MEDIA, REFERENCE, DrawnPage, outputs, several
-from hotlever.app.project import CALIBRATIONS
+from hotlever.app.pages.frame import (
+    FIGURE_FILES,
+    ErrorBanner,
+    caption,
+    download_button,
+    figure,
+    flat_button,
+    hand_over,
+    small_button,
+    table,
+    text_shown,
+)
+from hotlever.app.pages.page import DrawnPage
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
-from hotlever.files import CALIBRATION, TABLE
 from hotlever.materials.parameters import sentence
 from hotlever.text import value_with_error
 
-#: What a calibration rests on, and the option that says so.
-_RESTS = {"probe": "probe", "fit": "fit", "law": "power_law"}
+#: What can be asked of a calibration: title, unit, and what is asked at first.
 _QUANTITIES = {
-    "tip_K": ("tip temperature", "K"),
-    "bias_V": ("bias", "V"),
-    "power_mW": ("power", "mW"),
+    "tip_K": ("tip temperature", "K", 600.0),
+    "bias_V": ("bias", "V", 8.0),
+    "power_mW": ("power", "mW", 2.0),
 }
 #: What can be told: where the error counts, what the tip is to stay below, and what counts without.
 _TEMPERATURES = {"at": ("Sure at", "hottest measured"), "stay_below": ("Stay below", "what melts")}
 
 
-class CalibratePage(MeasuredPage):
-    """One tab of the page."""
+async def show_result(session: Session, banner: ErrorBanner, name: str, result: Any) -> None:
+    """Show what a fit or a calibration file says, as `hotlever.app.showing.result` has it."""
+    stem = Path(name).name.split(".")[0]
 
-    name, kind, ending, folder = "calibrate", "calibration", CALIBRATION, CALIBRATIONS
+    async def give(function: str, file: str, *arguments: str) -> None:
+        with banner.caught():
+            await hand_over(session.ask("full", f"showing:{function}", name, *arguments), file)
 
-    def options(self) -> None:
-        """Show what the calibration rests on, and what is known beforehand."""
-        project = self.session.project
-        rests = {"probe:": REFERENCE}
-        rests |= {f"probe:{name}": name for name in project.probes}
-        rests |= {f"fit:{name}": f"fit {name}" for name in project.fits}
-        rests |= {f"law:{name}": f"power law of {name}" for name in project.laws}
-        self.choice("rests", "Rests on", rests)
-        self.choice("medium", "Medium", MEDIA)
-        self.text("priors", "Known beforehand (n_d=3.3e17±15%)")
-        self.text("pulse", "For pulses too (5us or 5us,100us)")
-
-    def understood(self) -> None:
-        """Begin at once if who comes from a fit has asked for it."""
-        if self.chosen.pop("run", False) and self.observables:
-            self.start()
-
-    @property
-    def _table_file(self) -> str:
-        return f"{self.stem}{TABLE}"
-
-    def task(self) -> Task | None:
-        """Return the task that makes the calibration."""
-        chosen = self.chosen
-        if not chosen["data"]:
-            return None
-        kind, _, name = chosen["rests"].partition(":")
-        options = {
-            _RESTS[kind]: name,
-            "column": self.metadata["columns"],
-            "medium": chosen["medium"],
-            "prior": several(chosen["priors"]),
-            "pulse": chosen["pulse"].replace(" ", ""),
-            "output": self.output,
-            "table": self._table_file,
-        }
-        return Task("calibrate", (chosen["data"],), options)
-
-    async def show(self, name: str) -> None:
-        """Show what to set for a temperature, and what a bias or a power gives, or why not."""
-        with ui.row().classes("items-center"):
-            ui.label(name).classes("text-lg text-bold")
-            download_button(self.session, self._table_file, "Table (CSV)")
-            download_button(self.session, name, "Calibration (JSON)")
-            give = partial(self._give_budget, name)
-            small_button("Uncertainty budget (one sheet)", give, icon="print")
-        doubt: str | None = None
-        with self.banner.caught():
-            doubt = await self.session.ask("full", "showing:doubted", name)
-        if doubt is None:
-            return
+    with ui.row().classes("items-center"):
+        ui.label(name).classes("text-lg text-bold")
+        download_button(session, name, f"{result['kind'].capitalize()} (JSON)")
+        if result["kind"] == "calibration":
+            budget = partial(give, "budget", f"{stem}-budget.html")
+            small_button("Uncertainty budget (one sheet)", budget, icon="print")
+    questions = []
+    if result["kind"] == "calibration":
         with ui.card().classes("w-full").props("flat bordered"):
             ui.label("What do I set?").classes("text-bold")
-            if doubt:
+            if doubt := result["doubt"]:
                 refusal = f"This calibration does not tell. {sentence(doubt)}"
                 ui.label(refusal).classes("remark").props("data-answer=none")
-                return
-            questions = [_Question(self.session, name, along) for along in _QUANTITIES]
-        Proposals(self.session, self.banner, name, self.stem)
-        for question in questions:
-            await question.answer()
-
-    async def _give_budget(self, name: str) -> None:
-        """Hand over the uncertainty budget, to print it."""
-        with self.banner.caught():
-            page = self.session.ask("full", "showing:budget", name)
-            await hand_over(page, f"{self.stem}-budget.html")
+            else:
+                questions = [_Question(session, name, along) for along in _QUANTITIES]
+        if questions:
+            Proposals(session, banner, name, stem)
+    for question in questions:
+        await question.answer()
+    with ui.row().classes("w-full gap-3 items-start"):
+        for block in result["blocks"]:
+            if block["kind"] == "heading":
+                ui.label(block["text"]).classes("w-full text-lg text-bold")
+            elif block["kind"] == "text":
+                text_shown(block["text"])
+            elif block["kind"] == "table":
+                table(block["columns"], block["rows"])
+                caption(block["caption"]).classes("w-full")
+            else:
+                with ui.column().classes("gap-0"):
+                    figure(block["figure"], block["caption"])
+                    with ui.row().classes("items-center w-full no-wrap"):
+                        caption(block["caption"]).classes("remark caption col")
+                        for suffix in FIGURE_FILES:
+                            own, kind = block["name"], suffix[1:].upper()
+                            click = partial(give, "drawn", f"{stem}-{own}{suffix}", own, suffix)
+                            flat_button(kind, click, label=f"{own} as {kind}").props("size=sm")
 
 
 class _Question:
@@ -108,8 +89,8 @@ class _Question:
 
     def __init__(self, session: Session, name: str, along: str) -> None:
         self._session, self._name, self._along = session, name, along
-        self._targets = session.choices("asked")
-        title, unit = _QUANTITIES[along]
+        self._targets = session.choices("asked", {key: at for key, (*_, at) in _QUANTITIES.items()})
+        title, unit, _ = _QUANTITIES[along]
         with ui.row().classes("w-full items-center"):
             value = self._targets[along]
             self._number = ui.number(f"For a {title} of", value=value, on_change=self.answer)
@@ -130,7 +111,8 @@ class _Question:
                 )
             except HotleverError as error:
                 text = str(error)
-        self._answer.set_text(text)
+        if value == self._number.value:  # nothing else was typed meanwhile
+            self._answer.set_text(text)
 
 
 def _answer(row: dict[str, float]) -> str:
@@ -152,13 +134,13 @@ class Proposals(DrawnPage):
     Each calibration has proposals of its own.
     """
 
-    name = "next"
     alt = "Error by temperature now and after more measurements; tip temperature by bias"
     kinds: ClassVar = {kind: text for kind, text in DrawnPage.kinds.items() if kind != "NetCDF"}
+    first: ClassVar = dict.fromkeys(_TEMPERATURES)
 
     def __init__(self, session: Session, banner: ErrorBanner, calibration: str, stem: str) -> None:
-        super().__init__(session, banner)
         self.name, self._calibration, self._stem = f"next {calibration}", calibration, stem
+        super().__init__(session, banner)
         with ui.card().classes("w-full").props("flat bordered data-proposals"):
             ui.label("What do I measure next?").classes("text-bold")
             with ui.row().classes("w-full items-center"):
@@ -173,5 +155,5 @@ class Proposals(DrawnPage):
         """Return the task that writes the proposals as a table and a figure."""
         temperatures = {key: self.chosen[key] for key in _TEMPERATURES}
         kelvins = {key: "" if T is None else f"{T:.12g}K" for key, T in temperatures.items()}
-        files = outputs(f"{self._stem}.next", "SVG")
+        files = self.outputs(self._stem, "next", "SVG")
         return Task("next", (self._calibration,), {**kelvins, **files})

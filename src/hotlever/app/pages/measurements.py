@@ -1,0 +1,442 @@
+"""Measurements: of one lever or many; what it is made of, or what to set, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
+
+from nicegui import ui
+
+from hotlever.app.jobs import Job, Task
+from hotlever.app.pages.columns import ColumnPicker
+from hotlever.app.pages.frame import (
+    ErrorBanner,
+    caption,
+    download_button,
+    drop_zone,
+    flat_button,
+    say_refused,
+    small_button,
+    table,
+    two_columns,
+)
+from hotlever.app.pages.page import MEDIA, Page, Work, several
+from hotlever.app.pages.plots import MeasuredPlots
+from hotlever.app.pages.results import show_result
+from hotlever.app.project import CALIBRATIONS, DATA, EXAMPLES, FIT, FITS
+from hotlever.app.session import Session
+from hotlever.errors import HotleverError, InputError
+from hotlever.files import CALIBRATION, TABLE
+from hotlever.measurement import FileColumn
+from hotlever.quantities import FITTED
+
+#: What is shown where there is no measurement.
+_EXAMPLE = "lever-a.csv"
+_UNDERSTOOD, _OF_EXAMPLE = "What was understood", f"An example, {_EXAMPLE}, and what it holds"
+_DROP = "Drop measurements here (bias, current and what else there is), or press +"
+#: What is made, in words; by command.
+_MADE = {"calibrate": "Calibrate", "fit": "Fit"}
+_MEANING = (
+    "Calibrate: what to set for a temperature, and how sure that is. Fit: what it is made of."
+)
+#: What a calibration rests on, and the option that says so; without one it is the lever.
+_RESTS = {"fit": "fit", "law": "power_law"}
+_FLAGS = {
+    "robust": ("robust", "Lessen the weight of points far off the others"),
+    "profiles": ("profiles", "Profile the likelihood of each parameter (some 10 s, on a page)"),
+    "posterior": ("posterior", "Sample the posterior (half a minute, on a page of its own)"),
+}
+_PULSE = "Pulse of a file in time (10V,20us)"
+_OF_FOLDER = (
+    "A result of the folder, made of {data}: it holds its own lever and options, whatever is "
+    "chosen here."
+)
+
+
+class MeasurementsPage(Page):
+    """One tab of the page."""
+
+    name = "measurements"
+    first: ClassVar = {
+        "kind": "calibrate",
+        "data": None,
+        "rests": "",
+        "medium": "",
+        "priors": "",
+        "pulses": "",
+        "without": [],
+        "robust": False,
+        "profiles": False,
+        "posterior": False,
+        "fixed": "",
+        "free": "",
+        "opened": "",
+        "run": False,
+    }
+
+    def __init__(self, session: Session, banner: ErrorBanner) -> None:
+        super().__init__(session, banner)
+        #: Observables that the measurement has.
+        self.observables: list[str] = []
+        self._reads = self._shows = 0
+        self._read_of: Any = None
+        with two_columns() as (left, right):
+            with left:
+                drop_zone(session, banner, _DROP, self._dropped)
+                self._try = small_button("Try the example", self._example, icon="science")
+                data, offered = self.chosen["data"] or [], session.project.data
+                self._select = ui.select(
+                    list(dict.fromkeys([*offered, *data])),
+                    label="Measurements",
+                    multiple=True,
+                    value=data,
+                    on_change=self._choose,
+                )
+                self._select.classes("w-full").props("use-chips")
+                with ui.row():
+                    flat_button("All", self._take_all)
+                    flat_button("None", partial(self._select.set_value, []))
+                self.lever_choice()
+                self._show_options()
+                self._button = ui.button("Start", icon="play_arrow", on_click=self.start)
+                # until there is something understood
+                self._button.classes("w-full").disable()
+                results = [*session.project.calibrations, *session.project.fits]
+                if results:
+                    names = {"": "–"} | {name: name for name in results}
+                    self.choice("opened", "Or open a result of the folder", names)
+            with right:
+                Work(session, self.name, self._ended, during=self._follow, notes=False)
+                self._result = ui.column().classes("w-full gap-2")
+                self._columns = ColumnPicker(partial(self._tell, "columns"))
+                opened = ui.expansion(_UNDERSTOOD, value=True)
+                self._understood = opened.props("header-class=text-bold")
+                with self._understood, ui.column().classes("w-full gap-2"):
+                    self._plots = MeasuredPlots()
+                    self._rows = ui.column().classes("w-full gap-2")
+                self._understood.set_visibility(False)
+                self.command()
+
+    def _show_options(self) -> None:
+        """Ask what is made, and what is known beforehand."""
+        project = self.session.project
+        kind = ui.toggle(_MADE, value=self.chosen["kind"], on_change=self._keep("kind"))
+        kind.props('aria-label="What is made"').tooltip(_MEANING)
+        self.choice("medium", "Medium", MEDIA)
+        self.text("priors", "Known beforehand (n_d=3.3e17±15%)")
+        with ui.column().classes("w-full gap-3") as of_calibration:
+            rests = {"": "the lever, known as usual"}
+            rests |= {f"fit:{name}": f"fit {name}" for name in project.fits}
+            rests |= {f"law:{name}": f"power law of {name}" for name in project.laws}
+            self._rests = self.choice("rests", "Rests on", rests)
+            self.text("pulses", "For pulses too (5us or 5us,100us)")
+        with ui.column().classes("w-full gap-1") as of_fit:
+            ui.label("Fitted").classes("text-sm text-bold")
+            self._boxes = {}
+            for name, measurand in FITTED.items():
+                label, fitted = f"{name} {measurand.symbol}", name not in self.chosen["without"]
+                self._boxes[name] = ui.checkbox(label, value=fitted, on_change=self._pick)
+            with ui.expansion("More"):
+                for name, (label, meaning) in _FLAGS.items():
+                    self.checkbox(name, label, meaning)
+                self.text("fixed", "Hold (n_d=3.3e17, p)")
+                self.text("free", "Vary too (film.tcr)")
+                self._waveform = ui.input(_PULSE, on_change=self._tell_pulse)
+                self._waveform.classes("w-full").props("debounce=600")
+        of_calibration.bind_visibility_from(kind, "value", value="calibrate")
+        of_fit.bind_visibility_from(kind, "value", value="fit")
+
+    async def open(self) -> None:
+        """Read the measurement that was chosen last, or the latest of the folder."""
+        if self.chosen["data"] is None:
+            self.chosen["data"] = []
+            names = self.session.project.data
+            latest = await self.session.ask("full", "showing:measurements", names, 1)
+            if latest and not self.chosen["data"]:
+                self._select.set_value(latest)  # which reads it
+                return
+        await self.read()
+
+    # --- what is asked ----------------------------------------------------------------------------
+
+    @property
+    def data(self) -> list[str]:
+        """The measurements that are chosen."""
+        return list(self.chosen["data"] or [])
+
+    @property
+    def single(self) -> str:
+        """The measurement, if it is a single one."""
+        return self.data[0] if len(self.data) == 1 else ""
+
+    def _metadata(self, name: str) -> dict[str, Any]:
+        """Return what was told of a file that it does not say itself."""
+        files = self.session.choices("files", {})
+        return files.setdefault(name, {"columns": [], "waveform": ""})
+
+    def _tell(self, key: str, value: Any) -> Awaitable[None] | None:
+        """Keep what was told of a measurement, unless it is what is shown for another one."""
+        if not self.single or value == self._metadata(self.single)[key]:
+            return None
+        self._metadata(self.single)[key] = value
+        return self.read()
+
+    def _tell_pulse(self, event: Any) -> Awaitable[None] | None:
+        return self._tell("waveform", (event.value or "").replace(" ", ""))
+
+    def _pick(self) -> None:
+        self.chosen["without"] = [name for name, box in self._boxes.items() if not box.value]
+        self.show_command()
+
+    def _choose(self, event: Any) -> Awaitable[None] | None:
+        self.chosen |= {"data": list(event.value or []), "opened": ""}
+        return self.changed()
+
+    def changed(self) -> Awaitable[None] | None:
+        """Read the measurement anew if it, or what it is read with, is another one."""
+        self._button.set_text(_MADE[self.chosen["kind"]] + (" all" if len(self.data) > 1 else ""))
+        if self._asked == self._read_of:
+            self.show_command()
+            return None
+        return self.read()
+
+    @property
+    def _asked(self) -> Any:
+        """What the measurement is read with, and the result that is opened."""
+        return self.data, self.probe, self.chosen["medium"], self.chosen["opened"]
+
+    def task(self) -> Task | None:
+        """Return the task that makes a result of each measurement.
+
+        Raises
+        ------
+        InputError
+            If a name is none of the project.
+        """
+        data, chosen = self.data, self.chosen
+        if not data:
+            return None
+        kind, project = chosen["kind"], self.session.project
+        told = [text for name in data for text in self._metadata(name)["columns"]]
+        options: dict[str, Any] = {
+            "probe": self.probe,
+            "column": list(dict.fromkeys(told)),
+            "medium": chosen["medium"],
+            "prior": several(chosen["priors"]),
+        }
+        if kind == "calibrate":
+            rests, _, name = chosen["rests"].partition(":")
+            options |= {_RESTS[rests]: name, "probe": ""} if rests else {}
+            options["pulse"] = chosen["pulses"].replace(" ", "")
+        else:
+            fitted = [name for name in self.observables if name not in chosen["without"]]
+            options |= {
+                "observables": "" if fitted == self.observables else ",".join(fitted),
+                "fix": several(chosen["fixed"]),
+                "free": chosen["free"].replace(" ", ""),
+                "robust": chosen["robust"],
+            }
+        if not self.single:
+            folder = FITS if kind == "fit" else CALIBRATIONS
+            return self._goes_on(Task(kind, tuple(data), options)) or Task(
+                kind,
+                tuple(data),
+                {
+                    **options,
+                    "report": f"{project.free(folder, '')}-report",
+                    "output": project.free(folder, ""),
+                },
+            )
+        stem = Path(self.single).stem
+        if kind == "fit":
+            stem = project.free(stem, FIT)
+            analyses = {name: chosen[name] for name in ("profiles", "posterior")}
+            report = f"{stem}-report" if any(analyses.values()) else ""
+            waveform = self._metadata(self.single)["waveform"]
+            options |= {"pulse": waveform, **analyses, "report": report, "output": f"{stem}{FIT}"}
+        else:
+            stem = project.free(stem, CALIBRATION, TABLE)
+            options |= {"table": f"{stem}{TABLE}", "output": f"{stem}{CALIBRATION}"}
+        return Task(kind, tuple(data), options)
+
+    def _goes_on(self, task: Task) -> Task | None:
+        """Return the same task of before, if it was stopped: it goes on in its folder."""
+        (last, *_) = [*self.session.jobs.of(self.name), None]
+        if last is None or last.standing in ("done", "running"):
+            return None
+        return last.task if last.task.question == task.question else None
+
+    # --- the measurement --------------------------------------------------------------------------
+
+    def _take(self, names: list[str]) -> None:
+        data = self.session.project.data
+        self._select.set_options(data)
+        if self.data == names:
+            self._read_of = None
+        self._select.set_value([name for name in names if name in data])
+
+    async def _take_all(self) -> None:
+        """Choose all measurements of levers that lie in the folder."""
+        names = self.session.project.data
+        self._take(await self.session.ask("full", "showing:measurements", names, len(names)))
+
+    async def _dropped(self, names: list[str]) -> None:
+        unknown = [name for name in names if name not in self.session.project.data]
+        if unknown:
+            raise InputError(
+                f"{unknown[0]}: no measurement by its name, expected {', '.join(DATA)}"
+            )
+        if self.data == names:
+            await self.read()
+        self._take(names)
+        if len(names) > 1:
+            await say_refused(self.session, self.banner, names, spectra=False)
+
+    async def _example(self) -> None:
+        with self.banner.caught():
+            await self._dropped([self.session.project.take_example(_EXAMPLE)])
+
+    async def read(self) -> None:
+        """Read the measurement, and show what was understood, and what was made of it before."""
+        self._reads += 1
+        turn, name, understood = self._reads, self.single, None
+        self._read_of = self._asked
+        self.banner.clear()
+        columns, groups = list[FileColumn](), list[str]()
+        metadata = dict[str, Any](probe=self.probe)
+        if name:
+            self._waveform.set_value(self._metadata(name)["waveform"])
+            metadata |= {**self._metadata(name), "medium": self.chosen["medium"]}
+            with suppress(HotleverError):
+                groups = await self.session.ask("full", "showing:groups", name)
+                columns = await self.session.ask("full", "showing:columns", name, metadata)
+        if name or not self.data:
+            try:
+                file = name or str(EXAMPLES / _EXAMPLE)
+                understood = await self.session.ask("full", "showing:understood", file, metadata)
+            except HotleverError as error:
+                if turn == self._reads:
+                    self.banner.say(str(error))
+        if turn != self._reads or self._rows.is_deleted:
+            return  # something else has been chosen meanwhile
+        told = self._metadata(name)["columns"] if name else []
+        self._columns.show(columns, told, understood is not None, groups)
+        self._show_understood(understood)
+        for job in self.session.jobs.of(self.name)[:1]:
+            self._follow(job)
+        self._try.set_visibility(not self.data)
+        self._understood.props(f'label="{_UNDERSTOOD if name else _OF_EXAMPLE}"')
+        self._button.set_text(_MADE[self.chosen["kind"]] + (" all" if len(self.data) > 1 else ""))
+        self._button.set_enabled(len(self.data) > 1 or bool(name and understood))
+        for own, box in self._boxes.items():
+            box.set_visibility(own in self.observables or not name)
+        self.show_command()
+        if self.chosen.pop("run", False) and name and understood:
+            self.start()
+        await self._show_result()
+
+    def _show_understood(self, understood: dict[str, Any] | None) -> None:
+        self.observables = understood["observables"] if understood and self.single else []
+        self._understood.set_visibility(understood is not None)
+        self._rows.clear()
+        if understood is None:
+            return
+        self._plots.measured(understood["data"], understood["observables"])
+        with self._rows:
+            head, *rows = understood["rows"]
+            table(head, rows)
+            for note in understood["notes"]:
+                ui.label(f"• {note}").classes("text-sm remark")
+
+    # --- what is made of it -----------------------------------------------------------------------
+
+    def _follow(self, job: Job) -> None:
+        """Draw how near to the data the lever is that is being fitted, or was."""
+        curve = job.contents.get("curve")
+        if curve and self.observables and job.task.files == tuple(self.data):
+            self._plots.approach(curve)
+
+    async def _ended(self, job: Job) -> None:
+        if job.task.files != tuple(self.data) and self.written(job):
+            ui.notify(f"{job.task.written} is written, of {', '.join(job.task.files)}")
+        if self.chosen["opened"] == "":
+            await self._show_result()
+        self.show_command()
+
+    def _job(self) -> Job | None:
+        """Return the last job on the measurements that are chosen that has written a result."""
+        jobs = self.session.jobs.of(self.name)
+        if jobs and jobs[0].standing == "running" and jobs[0].task.files == tuple(self.data):
+            return None
+        own = (job for job in jobs if job.task.files == tuple(self.data))
+        return next(filter(self.written, own), None)
+
+    async def _show_result(self) -> None:
+        """Show the result that was opened, or the last one of these measurements."""
+        self._shows += 1
+        turn, opened, job = self._shows, self.chosen["opened"], self._job()
+        self._result.clear()
+        self._origin = None
+        if not opened and job is None:
+            return
+        with self._result:
+            if not opened and job is not None:
+                self.result_of(job)
+                for note in job.notes:
+                    ui.label(f"• {note}").classes("text-sm remark")
+                if len(job.task.files) > 1:
+                    await self._show_levers(job, turn)
+                    return
+                if table_file := job.task.options.get("table"):
+                    download_button(self.session, table_file, "Table (CSV)")
+                if report := job.task.options.get("report"):
+                    download_button(self.session, f"{report}/index.html", "Page (HTML)")
+            await self._show_file(opened or job.task.written, turn)  # type: ignore[union-attr]
+
+    async def _show_file(self, name: str, turn: int) -> None:
+        """Show the page of a result in the element that is open."""
+        waiting = ui.spinner(size="lg").props('aria-label="Being drawn"')
+        container = ui.column().classes("w-full gap-2")
+        with self.banner.caught():
+            result = await self.session.ask("full", "showing:result", name)
+            if turn == self._shows and not container.is_deleted:
+                with container:
+                    if self.chosen["opened"]:
+                        ui.label(_OF_FOLDER.format(data=result["data"])).classes("remark")
+                    await show_result(self.session, self.banner, name, result)
+                    if result["kind"] == "fit":
+                        on = ui.button("Calibrate with this fit", icon="straighten")
+                        on.props("dense").classes("q-px-sm")
+                        on.on_click(partial(self._calibrate_with, name))
+        if not waiting.is_deleted:
+            waiting.delete()
+
+    def _calibrate_with(self, name: str) -> None:
+        self.chosen |= {"kind": "calibrate", "rests": f"fit:{name}", "opened": "", "run": True}
+        ui.navigate.to(f"/{self.name}")
+
+    async def _show_levers(self, job: Job, turn: int) -> None:
+        """Show the table of many levers; each opens its page below."""
+        folder, report = job.task.options["output"], job.task.options["report"]
+        path = self.session.project.path(folder)
+        names = [f"{folder}/{file.name}" for file in sorted(path.glob("*.json"))]
+        levers = await self.session.ask("full", "showing:levers", names)
+        if turn != self._shows:
+            return
+        page = ui.column().classes("w-full gap-2")
+
+        async def show_lever(stem: str) -> None:
+            page.clear()
+            with page:
+                await self._show_file(f"{folder}/{stem}.json", self._shows)
+
+        with ui.row().classes("items-center"):
+            for file in path.glob("*s.csv"):
+                download_button(self.session, f"{folder}/{file.name}", "Table (CSV)")
+            download_button(self.session, f"{report}/index.html", "Page (HTML)")
+        table(levers["head"], levers["rows"], show_lever)
+        caption("A click on a lever shows it below.")
+        page.move(target_index=-1)
