@@ -24,8 +24,8 @@ from hotlever.app.pages.frame import PAGES
 from hotlever.app.project import Project
 from problems import table
 
-WIDTHS = (390, 1024, 1920)
-_HEIGHTS = {390: 844, 1024: 768, 1920: 1080}
+WIDTHS = (390, 1024, 1600)
+_HEIGHTS = {390: 844, 1024: 768, 1600: 900}
 #: Contrast that a focus must have with what is around it (WCAG 2.2, 1.4.11).
 _OF_THE_FOCUS = 3.0
 _SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
@@ -80,15 +80,17 @@ def _compared(page: Page) -> None:
 
 
 def _read(page: Page) -> None:
-    page.locator("[aria-live=polite]").filter(has_text="coarse lever").wait_for(timeout=_WORK_MS)
+    page.locator("[aria-live=polite]").filter(has_text="full lever: the").wait_for(timeout=_WORK_MS)
 
 
-def _designed(page: Page) -> None:
-    page.get_by_role("checkbox", name="in air too").uncheck()
-    _drawn(page, "Knee, tip temperature", "Vary")
+def _opened(page: Page, name: str) -> None:
+    _choose(page, "Or open a result of the folder", name)
+    page.get_by_text("A result of the folder").wait_for(timeout=_WORK_MS)
+    stand_still(page, _ALL_MS)
 
 
 def _proposed(page: Page) -> None:
+    _opened(page, "lever-a.calibration.json")
     _drawn(page, "Error by temperature", "Propose")
 
 
@@ -97,9 +99,8 @@ def _menu(page: Page) -> None:
     page.get_by_label("Pages: ").click()
 
 
-def _question(page: Page) -> None:
-    page.get_by_role("textbox", name="Probe file").fill("[probe]")
-    _choose(page, "Open", "reference-probe.gds")
+def _script(page: Page) -> None:
+    page.get_by_role("button", name="Script: ").first.click()
     page.get_by_role("dialog").wait_for()
 
 
@@ -109,11 +110,10 @@ VIEWS: dict[str, tuple[str, Callable[[Page], None], tuple[int, ...]]] = {
     "small signals": ("simulate", _small_signals, WIDTHS),
     "compared": ("simulate", _compared, WIDTHS),
     "read": ("reader", _read, WIDTHS),
-    "designed": ("design", _designed, WIDTHS),
-    "proposed": ("calibrate", _proposed, WIDTHS),
-    "menu": ("materials", _menu, WIDTHS[:1]),
-    "changes": ("materials", lambda page: page.get_by_label("What the app wrote").click(), WIDTHS),
-    "question": ("lever", _question, WIDTHS),
+    "calibrated": ("measurements", _proposed, WIDTHS),
+    "fitted": ("measurements", lambda page: _opened(page, "lever-a.fit.json"), WIDTHS),
+    "menu": ("raman", _menu, WIDTHS[:1]),
+    "script": ("", _script, WIDTHS),
 }
 
 
@@ -143,8 +143,6 @@ def furnish(folder: Path) -> None:
     for line in (
         "calibrate lever-a.csv --fit lever-a.fit.json -o lever-a.calibration.json "
         "--table lever-a.table.csv",
-        "raman tip --calibrate-from hot-plate --save-calibration raman.json -o tip.raman.csv "
-        "--plot raman.svg",
     ):
         command(folder, line)
 
@@ -160,7 +158,7 @@ def look(page: Page, app: App, view: str, folder: Path) -> Look:
     address, opened, widths = VIEWS.get(view, (view, None, WIDTHS))
     made = Look(view or "start")
     for theme in ("light", "dark"):
-        page.set_viewport_size({"width": 1920, "height": 1080})
+        page.set_viewport_size({"width": WIDTHS[-1], "height": _HEIGHTS[WIDTHS[-1]]})
         go(page, app, address)
         if (theme == "dark") != page.evaluate("document.body.matches('.body--dark')"):
             page.get_by_label("Light or dark").click()
