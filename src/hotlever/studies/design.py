@@ -141,7 +141,9 @@ def _number(entry: Any) -> bool:
     return type(entry) in (int, float)
 
 
-def quantities(probe: Probe, power_mW: float, air: bool) -> dict[str, float]:
+def quantities(
+    probe: Probe, power_mW: float, air: bool, mesh: MeshOptions | None = DESIGN_MESH
+) -> dict[str, float]:
     """Return the `QUANTITIES` of a probe; k is NaN without air, the knee's where there is none.
 
     Parameters
@@ -151,8 +153,10 @@ def quantities(probe: Probe, power_mW: float, air: bool) -> dict[str, float]:
         Power (mW) in vacuum at which the tip temperature is given.
     air : bool
         Solve the lever in air too, for k.
+    mesh : MeshOptions, optional
+        That of designs, which are compared; None is that of a sweep.
     """
-    lever = Lever(probe.in_medium("vacuum"), DESIGN_MESH)
+    lever = Lever(probe.in_medium("vacuum"), mesh)
     vacuum = lever.branch_past_knee()
     if vacuum.by_power.highest_mW < power_mW:
         vacuum = lever.branch()
@@ -292,6 +296,19 @@ def design_notes(data: xr.Dataset) -> list[str]:
         designs.setdefault(point.item(), []).append(named)
     notes = [f"with {'; '.join(_few(named))}: {reason}" for reason, named in designs.items()]
     return _few(notes)
+
+
+def mesh_note(probe: Probe, power_mW: float) -> str:
+    """Say how far what a study says of a probe is from a sweep, whose mesh is finer."""
+    own, finer = (quantities(probe, power_mW, False, mesh) for mesh in (DESIGN_MESH, None))
+    texts = [f"{own['tip_K'] - finer['tip_K']:+.2g} K at {power_mW:g} mW"]
+    if np.isfinite(own["knee_mW"]) and np.isfinite(finer["knee_mW"]):
+        texts = [
+            f"{own['knee_K'] - finer['knee_K']:+.2g} K and "
+            f"{100 * (own['knee_mW'] / finer['knee_mW'] - 1):+.2g} % of the power at the knee",
+            *texts,
+        ]
+    return f"on a coarser mesh than hotlever sweep, off by {', '.join(texts)} for this probe"
 
 
 def _few(texts: list[str]) -> list[str]:

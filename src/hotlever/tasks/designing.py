@@ -42,6 +42,7 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
     if not varied:
         with reporter.progress("design") as update:
             sensitivities = study.sensitivities(start, progress=update, **options)
+        reporter.note(study.mesh_note(start.probe, request.power))
         reporter.give(study.sensitivity_text(sensitivities) + "\n")
         if start.probe.shape.shape == DRAWING:
             names = ", ".join(start.numbers)
@@ -51,7 +52,7 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
         return
     with reporter.progress("design") as update:
         data = study.vary(start, varied, progress=update, **options)
-    reporter.note(*study.design_notes(data))
+    reporter.note(study.mesh_note(start.probe, request.power), *study.design_notes(data))
     with outputs.together():
         if output is not None and output.suffix.lower() == ".nc":
             write_dataset(data, output, ())
