@@ -131,14 +131,14 @@ def test_the_group_of_a_tdms_file_is_asked_for_and_kept(tmp_path: Path) -> None:
         await user.open("/measurements")
         of(user, ui.select, "Measurements").set_value(["two.tdms"])
         await user.should_see("2 groups, each a measurement of its own", retries=50)
-        group = named(user, "Group of the file")
+        group = of(user, ui.select, "Group of the file")
         assert group.visible
         assert group.options == ["lever 1", "lever 2"]
         group.set_value("lever 2")
         words = "hotlever fit two.tdms --column 'group=lever 2' -o two.fit.json"
         await user.should_see(words, retries=50)
         await user.open("/measurements")
-        await until(lambda: named(user, "Group of the file").value == "lever 2")
+        await until(lambda: of(user, ui.select, "Group of the file").value == "lever 2")
         # what is told of a column is told beside it
         await until(lambda: named(user, "Column I_h (mA) is") is not None)
         named(user, "Column I_h (mA) is").set_value("")
