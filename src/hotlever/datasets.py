@@ -24,11 +24,8 @@ if TYPE_CHECKING:
 
 #: Attribute of a written dataset, see `checksum`.
 CHECKSUM = "checksum"
-#: What sweeps and histories of a lever have that a controller holds.
-_OF_SET_POINTS = {
-    *("set_ohm", "set_mW", "state", "slope_ohm_per_K", "slope_mW_per_K"),
-    "resistance_ohm",
-}
+#: What sweeps of a lever have that a controller holds.
+_OF_SET_POINTS = {"set_ohm", "set_mW", "state", "slope_ohm_per_K", "slope_mW_per_K"}
 
 
 def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:

@@ -1,10 +1,9 @@
-"""``hotlever raman``, ``hotlever join`` and ``hotlever raman-check`` as a user meets them."""
+"""``hotlever raman`` and ``hotlever join`` as a user meets them."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
 import os
 from pathlib import Path
 from threading import Thread
@@ -27,7 +26,6 @@ from hotlever.raman.series import (
 )
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.thermometer import Thermometer
-from hotlever.studies.raman_check import conclusion, paper_check
 
 HEADER = (
     "file,center_cm-1,center_stderr_cm-1,fwhm_cm-1,shift_cm-1,temperature_K,"
@@ -239,10 +237,6 @@ BAD = {
         ["join", "log.csv", "tip", "--calibrate-from", "plate"],
         "30 rows and 4 spectra",
     ),
-    "check with a broken calibration": (
-        ["raman-check", "--calibration", "log.csv"],
-        "not valid JSON",
-    ),
 }
 
 
@@ -279,25 +273,7 @@ def test_command_line_of_several_files():
         assert spread_option(words.split(), "--from", takes) == expected.split()
 
 
-# --- figures and the check -----------------------------------------------------------------
-
-
-def test_check_prints_its_conclusion_and_writes_figure_and_numbers(run, tmp_path):
-    status, out, _ = run(
-        "raman-check", "--plot", tmp_path / "check.pdf", "-o", tmp_path / "check.json"
-    )
-    assert status == 0
-    check = paper_check()
-    assert out.strip() == conclusion(check)
-    numbers = json.loads((tmp_path / "check.json").read_text())
-    assert numbers["conclusion"] == out.strip()
-    assert numbers["truth"] == check.truth
-    for place, line in enumerate(numbers["lines"]):
-        expected = check.isel(line=place)
-        assert line.pop("name") == expected.line.item()
-        assert line == {name: expected[name].item() for name in line}
-        assert {"error_at_hottest", "true_at_knee", "discrepancy", "explained"} <= set(line)
-    assert (tmp_path / "check.pdf").read_bytes().startswith(b"%PDF")
+# --- figures -----------------------------------------------------------------
 
 
 def test_figure_holds_spectra_calibration_and_residuals(hot_plate):

@@ -24,6 +24,16 @@ from hotlever.tasks.commands import COMMANDS, Command
 _EVERY = {**COMMANDS, "app": Command(AppRequest, "hotlever.cli.browser", "open_app")}
 #: What the commands are for whose names have a word in common.
 _GROUPS = {"probe": "Write, describe, draw and import probes."}
+#: Commands and options of version 2 that are gone, and what there is in their place.
+_AT_REST = "no controller is followed in time; hotlever sweep --hold-resistance finds its states"
+_GONE = {
+    "raman-check": "the check of the paper's linear law is a section of hotlever reproduce",
+    "fit --drift": "correct the zeros of the file; a note says where one seems to drift",
+    **{
+        f"pulse --{name}": _AT_REST
+        for name in ("controller", "hold-resistance", "filter", "limit", "gain-map")
+    },
+}
 #: The option that takes all paths up to the next option.
 _SPREAD = "--calibrate-from"
 
@@ -51,11 +61,18 @@ def command_line(word: str = "") -> Any:
     return typer.main.get_command(app)
 
 
+def check_gone(words: str) -> None:
+    """Refuse a command, or an option after its command, that is gone."""
+    if words in _GONE:
+        raise InputError(f"{words}: gone since version 3.0; {_GONE[words]}")
+
+
 class Commands(typer.core.TyperGroup):
     """A command group that answers a typo with the nearest command."""
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command, or raise with the nearest name that exists."""
+        check_gone(cmd_name)
         command = super().get_command(ctx, cmd_name)
         if command is None:
             raise unknown_name("command", cmd_name, self.list_commands(ctx))
@@ -104,6 +121,8 @@ class _Command(typer.core.TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Repeat the option before each of its paths, then parse as usual."""
+        for word in args:
+            check_gone(f"{self.name} {word.partition('=')[0]}")
         options = [param for param in self.params if param.param_type_name == "option"]
         valued = [option for option in options if not getattr(option, "is_flag", False)]
         names = {name for option in valued for name in option.opts}

@@ -181,7 +181,7 @@ def estimate(
     weights = "errors" if informed else options.weights
     base = probe.circuit.base_temperature_K
     common = errors_of_scales(measurement, observables, priors, base) if informed else []
-    residuals = Residuals(measurement, observables, weights, options.drift, common=common)
+    residuals = Residuals(measurement, observables, weights, common=common)
     if not informed and residuals.different < len(options.varied):
         raise InputError(
             f"{measurement.path or 'measurement'}: {residuals.different} different data for "

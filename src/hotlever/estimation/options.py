@@ -37,8 +37,6 @@ class FitOptions:
     weights : {"maximum", "errors"}
         Divide every observable by its largest measured value, as in the paper, or every datum by
         its measurement error; an observable without errors then takes its scatter about the fit.
-    drift : bool
-        Let the zeros of I_h, V_r and V_bridge lie on straight lines over the order of the rows.
     medium : {"vacuum", "air", "unknown"}, optional
         What the lever was measured in; wins over measurement and probe. If it is unknown both are
         tried (`hotlever.estimation.estimator`).
@@ -65,7 +63,6 @@ class FitOptions:
     fixed: Mapping[str, float | None] = field(default_factory=dict)
     robust: bool = False
     weights: Weights = "maximum"
-    drift: bool = False
     medium: Medium | Literal["unknown"] | None = None
     priors: Mapping[str, Prior | str] = field(default_factory=dict)
     usual_priors: bool = False

@@ -39,7 +39,7 @@ class Residuals:
     Parameters
     ----------
     measurement : Measurement
-    observables, weights, drift
+    observables, weights
         See `hotlever.estimation.options.FitOptions`. An observable without measurement errors
         begins with a hundredth of its largest value for one, see `take_scatter`.
     data_weights : ndarray, shape (observables, rows of the measurement), optional
@@ -75,11 +75,10 @@ class Residuals:
         measurement: Measurement,
         observables: Sequence[str],
         weights: Weights = "maximum",
-        drift: bool = False,
         data_weights: Array | None = None,
         common: Sequence[CommonError] = (),
     ) -> None:
-        self._measurement, self._drift = measurement, drift
+        self._measurement = measurement
         self._where = measurement.path or "measurement"
         self.observables = tuple(observables)
         self.rows = [list(FITTED).index(name) for name in observables]
@@ -165,10 +164,8 @@ class Residuals:
     # --- for predicted values (observables, n) and slopes (observables, n, p) -------------------
 
     def difference(self, values: Array) -> Array:
-        """Return data minus prediction minus drifting zeros, NaN where nothing was measured."""
+        """Return data minus prediction, NaN where nothing was measured."""
         difference: Array = self.data - values[self.rows]
-        if self._drift:
-            difference = difference - self._lines.line(difference, self.errors.weights)
         return difference
 
     def weighted(self, values: Array) -> Array:
@@ -200,8 +197,6 @@ class Residuals:
     def _each_by(self, slopes: Array) -> Array:
         """Return the derivatives of `_each`, (N, p)."""
         jacobian = (self.errors.weights[:, :, None] * slopes[self.rows])[self.present]
-        if self._drift:
-            jacobian = self._lines.removed(jacobian, self.errors.weights)
         return np.asarray(jacobian)
 
     @property
@@ -250,16 +245,12 @@ class Residuals:
         self.errors.take_scatter(difference, values[self.rows], leverage, discrepancy)
 
     def drifting_zeros(self, values: Array, slopes: Array) -> list[str]:
-        """Say how the zeros drift, or that they seem to."""
-        if self._drift:
-            line = self._lines.line(self.data - values[self.rows], self.errors.weights)
-            return self._lines.in_words(line)
+        """Say of which observables the zeros seem to drift."""
         if self.size <= slopes.shape[2] + 2 * len(self.rows):
             return []
-        noticed = self._lines.noticed(
+        return self._lines.noticed(
             -self.weighted(values), self.jacobian(slopes), self.errors.weights
         )
-        return [f"{text}; --drift would take that out" for text in noticed]
 
     def rms(self, values: Array) -> dict[str, float]:
         """Return the rms of data minus prediction by column, for every observable with data."""
@@ -290,17 +281,6 @@ class Drift:
         nonzero = np.any(self._columns, axis=(0, 1))
         self._columns = self._columns[:, :, nonzero]
 
-    def line(self, difference: Array, weights: Array) -> Array:
-        """Return the lines that fit a difference (data minus prediction) best, shape (k, n)."""
-        matrix = (weights[..., None] * self._columns)[self._present]
-        target = (weights * difference)[self._present]
-        return np.asarray(self._columns @ np.linalg.lstsq(matrix, target)[0])
-
-    def removed(self, matrix: Array, weights: Array) -> Array:
-        """Return the columns of a weighted matrix, (N, m), without what lines could take up."""
-        basis = np.linalg.qr((weights[..., None] * self._columns)[self._present])[0]
-        return np.asarray(matrix - basis @ (basis.T @ matrix))
-
     def noticed(self, residual: Array, jacobian: Array, weights: Array) -> list[str]:
         """Say which observables have a zero that stands out of the scatter.
 
@@ -320,16 +300,12 @@ class Drift:
         influence = inverse @ columns.T * rest
         errors = np.sqrt((influence**2).sum(axis=1))
         out = np.abs(sizes) > _NOTICED * errors
-        return self.in_words(self._columns @ sizes, np.any(self._columns, axis=1) @ out)
-
-    def in_words(self, line: Array, which: NDArray[np.bool_] | None = None) -> list[str]:
-        """Describe lines from `line`; some of them, if not all."""
-        which = np.any(self._columns, axis=(1, 2)) if which is None else which
+        lines, which = self._columns @ sizes, np.any(self._columns, axis=1) @ out
         return [
-            f"{name}: the zero goes from {first:+.3g} to {last:+.3g} {FITTED[name].unit} "
-            "along the file"
-            for name, first, last, is_described in zip(
-                self._names, *line[:, [0, -1]].T, which, strict=True
+            f"{name}: the zero seems to go from {first:+.3g} to {last:+.3g} "
+            f"{FITTED[name].unit} along the file"
+            for name, first, last, is_out in zip(
+                self._names, *lines[:, [0, -1]].T, which, strict=True
             )
-            if is_described
+            if is_out
         ]

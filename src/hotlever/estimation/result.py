@@ -259,7 +259,6 @@ class Fit(Outcome):
         return Residuals(
             self.measurement,
             self.observables,
-            drift=self.options.drift,
             data_weights=self.data_weights,
             common=common,
         )
@@ -298,7 +297,14 @@ _Band = Annotated[xr.Dataset, stored_as(dict[str, Vector], _read_band, _written_
 
 
 def _options(values: Any, check: ValidatorFunctionWrapHandler, info: ValidationInfo) -> FitOptions:
-    """Read the options of a fit; what these refuse names the file too."""
+    """Read the options of a fit; what these refuse names the file too.
+
+    Up to version 2 zeros could drift: a fit that let them cannot be taken up again.
+    """
+    if isinstance(values, dict) and "drift" in values:
+        values = dict(values)
+        if values.pop("drift"):
+            raise InputError(f"{info.context}: options: zeros that drift are no part of fits now")
     try:
         return cast("FitOptions", check(values))
     except InputError as error:

@@ -65,7 +65,7 @@ from hotlever.figures.maps import (
 )
 from hotlever.figures.raman import one_spectrum, raman_check, thermometry
 from hotlever.figures.style import COLOURS, entitle, figure, save_figure
-from hotlever.figures.transient import gain_map, harmonics, history_overview, small_signals
+from hotlever.figures.transient import harmonics, history_overview, small_signals
 from hotlever.lever import probe_of
 
 if TYPE_CHECKING:
@@ -76,7 +76,6 @@ _FIGURES: dict[str, Callable[[Any], Figure]] = {
     "apex_K current_change_mA": lambda data: contact_overview(data, probe_of(data)),
     "state set_ohm tip_K": held_states,
     "state set_mW tip_K": held_states,
-    "growth_per_us settling_us overshoot": gain_map,
     "supplied_nJ air_stored_nJ bias_V lever_V reader_V tip_K": history_overview,
     "bias_V current_mA lever_V reader_V tip_K heater_ohm": sweep_overview,
     "dlnR_dz_per_um source_V_per_rtHz": reader_overview,

@@ -1,15 +1,13 @@
-"""Figures of levers in time and frequency, and of the controllers that hold them."""
+"""Figures of levers in time and frequency."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION
+from hotlever.colours import BLUE, GREEN, ORANGE, PURPLE, VERMILION
 from hotlever.figures.style import (
     axis_label,
     bridge_beside,
@@ -23,15 +21,11 @@ from hotlever.figures.style import (
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Share of a step of which a line is drawn; and of the gains, whose times are told apart.
-_OVERSHOOT, _COLOURED_SHARE = 0.1, 0.8
-
 
 def history_overview(history: xr.Dataset) -> Figure:
     """Draw what a lever shows in time: voltages, current, tip temperature, heat.
 
-    Where the bias stays what it is, time is logarithmic. Where a controller sets it, the resistance
-    that it holds takes the place of the current.
+    Where the bias stays what it is, time is logarithmic.
     """
     data = history.isel(time=history.time > 0) if settled(history) else history
     style: Any = {"marker": marker(data, "time"), "ms": 3}
@@ -48,10 +42,7 @@ def history_overview(history: xr.Dataset) -> Figure:
         ):
             curve(voltage, data, "time", name, color=colour, label=label, **style)
         voltage.set(ylabel="voltage (V)")
-        if "resistance_ohm" in data:
-            _resistance(current, data, style)
-        else:
-            curve(current, data, "time", "current_mA", color=BLUE, **style)
+        curve(current, data, "time", "current_mA", color=BLUE, **style)
         curve(tip, data, "time", "tip_K", color=VERMILION, **style)
         for name, (label, colour) in energies.items():
             curve(heat, data, "time", name, color=colour, label=label, **style)
@@ -63,14 +54,6 @@ def history_overview(history: xr.Dataset) -> Figure:
             tip.set_xscale("log")
         entitle(fig, history, more=history.attrs.get("waveform", ""))
     return fig
-
-
-def _resistance(axes: Axes, data: xr.Dataset, style: Any) -> None:
-    """Draw what a controller holds, and its set point."""
-    axes.plot(data.time, data.resistance_ohm / 1000, color=BLUE, label="V$_l$/I$_h$", **style)
-    axes.plot(data.time, data.set_ohm / 1000, "--", color="0.4", label="set point")
-    axes.set(ylabel="resistance (kΩ)")
-    axes.legend()
 
 
 def small_signals(spectrum: xr.Dataset) -> Figure:
@@ -131,38 +114,4 @@ def harmonics(data: xr.Dataset) -> Figure:
         _along_frequency(size, phase)
         driven = f"bias {data.attrs['bias_V']:.3g} V + {data.attrs['amplitude_V']:.3g} V sine"
         entitle(fig, data, more=driven)
-    return fig
-
-
-def gain_map(data: xr.Dataset, gains: tuple[float, float] | None = None) -> Figure:
-    """Draw over gains how fast a closed loop settles, and where it is not stable.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        Of `hotlever.lever.transient.closed_loop.ClosedLoop.gain_map`.
-    gains : tuple of float, optional
-        P (V/kΩ) and I (V/(kΩ ms)) to mark.
-    """
-    P, per_ms = (np.abs(data[name].values) for name in ("proportional", "integral"))
-    settling, minus = data.settling_us.values.T, "−" if data.integral.values[0] < 0.0 else ""
-    with figure(5.4, 4.4) as (fig, axes):
-        lowest, highest = np.nanquantile(settling, [0.0, _COLOURED_SHARE])
-        cells: Any = {"norm": LogNorm(lowest, highest), "cmap": "cividis_r", "rasterized": True}
-        colours = axes.pcolormesh(P, per_ms, settling, shading="nearest", **cells)
-        fig.colorbar(colours, extend="max").set_label("time until a step has settled to 2 % (µs)")
-        axes.set(facecolor="0.85", xscale="log", yscale="log")
-        style: Any = {"colors": BLACK, "linewidths": 1.2}
-        axes.contour(P, per_ms, data.growth_per_us.values.T, [0.0], **style)
-        axes.contour(P, per_ms, data.overshoot.values.T, [_OVERSHOOT], linestyles="--", **style)
-        if gains is not None:
-            at = np.clip(abs(gains[0]), *P[[0, -1]]), np.clip(abs(gains[1]), *per_ms[[0, -1]])
-            mark: Any = {"color": VERMILION, "mec": "w", "ms": 7, "ls": "none", "clip_on": False}
-            axes.plot(*at, "o", label=f"P, I = {gains[0]:g}, {gains[1]:g}", **mark)
-        axes.plot([], [], "--", color=BLACK, lw=1.2, label=f"overshoot {_OVERSHOOT:.0%}")
-        axes.fill_between([], [], color="0.85", label="not stable")
-        axes.set(xlabel=f"{minus}P (V/kΩ)", ylabel=f"{minus}I (V/(kΩ ms))")
-        fig.legend(loc="outside lower center", ncols=3)
-        held = f"{data.attrs['set_ohm']:.5g} Ω, tip at {data.attrs['tip_K']:.0f} K"
-        entitle(fig, data, more=f"{held}, filter {data.attrs['filter_us']:g} µs")
     return fig

@@ -12,7 +12,6 @@ from hotlever.tasks.measured_requests import (
     CalibrateRequest,
     FitRequest,
     JoinRequest,
-    RamanCheckRequest,
     RamanRequest,
 )
 from hotlever.tasks.planning_requests import (
@@ -80,7 +79,6 @@ COMMANDS = {
     "design": Command(DesignRequest, "hotlever.tasks.designing", "vary_design"),
     "raman": Command(RamanRequest, "hotlever.tasks.spectra", "measure_spectra"),
     "join": Command(JoinRequest, "hotlever.tasks.spectra", "join_spectra"),
-    "raman-check": Command(RamanCheckRequest, "hotlever.tasks.spectra", "check_linear_law"),
     "fit": Command(FitRequest, "hotlever.tasks.estimating", "fit_files"),
     "calibrate": Command(CalibrateRequest, "hotlever.tasks.estimating", "calibrate_files"),
     "next": Command(NextRequest, "hotlever.tasks.estimating", "propose"),

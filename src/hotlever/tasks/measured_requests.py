@@ -136,9 +136,6 @@ class FitRequest(DriveRequest, LeversRequest):
         "of the probe.",
     )
     robust: bool = option(False, "--robust", help="Lessen the weight of points far off the others.")
-    drift: bool = option(
-        False, "--drift", help="Let the zeros of I_h, V_r and V_bridge drift along the file."
-    )
     weights: str = option(
         "maximum", help="maximum: of each observable, as in the paper; or errors, as measured."
     )
@@ -163,7 +160,7 @@ class FitRequest(DriveRequest, LeversRequest):
         usual = USUAL in (self.prior or [])
         priors, stated = parse_priors(self.prior, probe), probe.stated_priors
         choices: dict[str, Any] = {
-            name: getattr(self, name) for name in ("robust", "drift", "weights", "medium")
+            name: getattr(self, name) for name in ("robust", "weights", "medium")
         }
         return FitOptions(
             observables=None if self.observables is None else self.observables.split(","),
@@ -258,8 +255,8 @@ class CalibrateRequest(PlotRequest, LeversRequest):
 
 
 @dataclass(kw_only=True)
-class RamanLawRequest(Request):
-    """A calibration of Raman spectra."""
+class ThermometerRequest(Request):
+    """How the silicon line is found, and what its shift is read with; see `set_up`."""
 
     calibration: str | None = option(
         None,
@@ -267,15 +264,6 @@ class RamanLawRequest(Request):
         help="A calibration that --save-calibration wrote, or 'published' for the published "
         "laws (then --reference is needed).",
     )
-
-    def inputs(self) -> list[Path]:
-        """Return the files that are read, the calibration too."""
-        return super().inputs() + ([] if self.calibration is None else [Path(self.calibration)])
-
-
-@dataclass(kw_only=True)
-class ThermometerRequest(RamanLawRequest):
-    """How the silicon line is found, and what its shift is read with; see `set_up`."""
 
     calibrate_from: list[Path] | None = option(
         None, metavar="FILE_OR_DIR...", help="Hot-plate spectra to calibrate from; one or more."
@@ -316,6 +304,10 @@ class ThermometerRequest(RamanLawRequest):
         0.0, metavar="MPA", help="Unknown stress in the silicon; enters the error."
     )
 
+    def inputs(self) -> list[Path]:
+        """Return the files that are read, the calibration too."""
+        return super().inputs() + ([] if self.calibration is None else [Path(self.calibration)])
+
 
 def spectra_argument() -> Any:
     """Return the field of the spectra that are measured."""
@@ -347,11 +339,3 @@ class JoinRequest(ThermometerRequest):
     bias_log: Path = argument(MISSING, metavar="BIAS_LOG.csv", help="The bias sweep.")
     spectra: list[Path] = spectra_argument()
     output: File = written((".csv",), "--output", "-o", metavar="DATA.csv", help="Left out: print.")
-
-
-@dataclass(kw_only=True)
-class RamanCheckRequest(RamanLawRequest):
-    """How far the paper's linear law is off above 900 K, and what that does to the knee."""
-
-    plot: File = written(FIGURE_TYPES, metavar="FILE.png|.svg|.pdf", help="The check as a figure.")
-    output: File = written((".json",), "--output", "-o", metavar="FILE.json", help="The numbers.")

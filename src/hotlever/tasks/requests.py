@@ -280,27 +280,6 @@ class TimesRequest(DriveRequest):
 class PulseRequest(TableRequest, LeverRequest, TimesRequest):
     """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
 
-    hold_resistance: str | None = option(
-        None,
-        metavar="OHM",
-        help="Begin at rest at this V_l/I_h, held by --controller; --step is then that of the set "
-        "point, such as 3kohm.",
-    )
-    controller: str | None = option(
-        None,
-        metavar="P,I",
-        help="Gains in V/kohm and V/(kohm ms), such as 1,30: below 0 where the resistance falls "
-        "with the temperature.",
-    )
-    filter: str = option("1us", metavar="TIME", help="Time constant of the measured resistance.")
-    limit: str | None = option(
-        None,
-        metavar="V",
-        help="Highest bias of the controller; 1.5 times that at rest if left out.",
-    )
-    gain_map: File = written(
-        FIGURE_TYPES, help="Draw the gains that are stable to this file, as --plot."
-    )
     fields: File = written(FOLDER, help="Write the fields as a series of VTU to this folder.")
     film: File = written(
         FILM_TYPES,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.files import json_text, write_text
+from hotlever.files import write_text
 from hotlever.raman import series
 from hotlever.raman.calibration import (
     RamanCalibration,
@@ -31,7 +31,6 @@ from hotlever.raman.tables import (
 from hotlever.raman.thermometer import Law, Thermometer, laser_heating
 from hotlever.tasks.measured_requests import (
     JoinRequest,
-    RamanCheckRequest,
     RamanRequest,
     ThermometerRequest,
 )
@@ -95,23 +94,6 @@ def join_spectra(reporter: Reporter, request: JoinRequest) -> None:
         with outputs.together():
             write_text(request.output, text)
     _answer(reporter, text, request.output)
-
-
-def check_linear_law(reporter: Reporter, request: RamanCheckRequest) -> None:
-    """Say how far the paper's linear law of Raman shifts is off above 900 K."""
-    from hotlever.studies.raman_check import conclusion, paper_check
-
-    outputs = request.outputs()
-    check = paper_check(calibration_named(request.calibration))
-    statement = conclusion(check)
-    with outputs.together():
-        draw(request.plot, lambda figures: figures.raman_check(check))
-        if request.output is not None:
-            lines = check.drop_dims("temperature_K").to_dataframe().rename_axis("name")
-            numbers = {"truth": check.truth, "hottest_K": check.hottest_K}
-            numbers |= {"lines": lines.reset_index().to_dict("records"), "conclusion": statement}
-            write_text(request.output, json_text(numbers))
-    reporter.give(f"{statement}\n")
 
 
 def _answer(reporter: Reporter, text: str, output: Path | None) -> None:

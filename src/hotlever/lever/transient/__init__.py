@@ -1,6 +1,5 @@
 """Levers in time: wave forms, what a lever shows under them, and its time constants."""
 
-from hotlever.lever.transient.controller import Controller
 from hotlever.lever.transient.frequency_domain import spectrum
 from hotlever.lever.transient.history import integrate, write_history
 from hotlever.lever.transient.modes import rise_times, time_constants, with_times
@@ -16,7 +15,6 @@ from hotlever.lever.transient.waveform import (
 )
 
 __all__ = [
-    "Controller",
     "Waveform",
     "integrate",
     "pulse",

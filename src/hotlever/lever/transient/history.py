@@ -17,7 +17,7 @@ from hotlever.lever.dataset import in_a_file, probe_attributes, range_notes
 from hotlever.lever.lever import State
 from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.observables import with_bridge
-from hotlever.lever.transient.problem import MONITORED
+from hotlever.lever.transient.problem import MONITORED, TransientProblem
 from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.types import Array, Progress
@@ -75,7 +75,7 @@ def time_steps(
     length: float | None = None
     x: Array | None = None
     for piece in waveform.pieces(until):
-        problem = waveform.problem(lever.equations, lever.circuit, piece)
+        problem = TransientProblem(lever.equations, lever.circuit, piece.bias)
         x = problem.begin(begin) if x is None else x
         stepper = Stepper(problem, tolerance_K)
         first = None if piece.jumps else length
@@ -293,8 +293,7 @@ def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Datase
         columns[name] = np.where(np.abs(columns[name]) < noise, 0.0, columns[name])
     columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
     # the reader, where there is none, is NaN throughout
-    variables = {"time_us": np.array(recorder.time)}
-    variables |= waveform.history_columns(lever.circuit, columns, np.array(recorder.bias))
+    variables = {"time_us": np.array(recorder.time), "bias_V": np.array(recorder.bias)}
     more = ("max_K", "supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ")
     variables |= {name: columns[name] for name in (*TIME_COLUMNS[2:], *more)}
     variables |= monitors.columns(values[:, count:])

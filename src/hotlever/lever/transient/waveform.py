@@ -9,7 +9,7 @@ import math
 import os
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -18,9 +18,6 @@ from typing import Any
 import numpy as np
 
 from hotlever.errors import InputError, counted, excerpt
-from hotlever.lever.equations import LeverEquations
-from hotlever.lever.transient.problem import TransientProblem
-from hotlever.probe import Circuit
 from hotlever.tables import read_table
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS, bias_setting, name_and_unit, setting
@@ -45,7 +42,7 @@ class Piece:
     start, end : float
         µs.
     bias : callable
-        V_b (V) at a time (µs); of a controller its set point (kΩ).
+        V_b (V) at a time (µs).
     jumps : bool
         Whether the bias jumps at its start.
     longest : float
@@ -90,16 +87,6 @@ class Waveform(ABC):
     @abstractmethod
     def pieces(self, until: float) -> Iterator[Piece]:
         """Give the smooth parts up to a time (µs)."""
-
-    def problem(self, equations: LeverEquations, circuit: Circuit, piece: Piece) -> Any:
-        """Return what is stepped in time while one of the pieces lasts."""
-        return TransientProblem(equations, circuit, piece.bias)
-
-    def history_columns(
-        self, circuit: Circuit, columns: Mapping[str, Array], driven: Array
-    ) -> dict[str, Array]:
-        """Return what a history shows of it, by its columns and the values of the pieces."""
-        return {"bias_V": driven}
 
     def bias(self, times: Array) -> Array:
         """Return the bias (V) at times (µs, rising); where it jumps that before, but at 0."""
