@@ -16,7 +16,7 @@ import xarray as xr
 from hotlever import __version__
 from hotlever.errors import ComputationError
 from hotlever.probe import Probe
-from hotlever.tasks.texts import parse_bias, parse_frequencies
+from hotlever.tasks.texts import parse_bias, parse_frequencies, parse_settings
 from of_materials import p_type_probe
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
@@ -320,3 +320,32 @@ def test_reproduce_writes_the_page(run, tmp_path):
     for figure in ("probe", "iv", "temperature_power", "field_maps", "fit_data_and_model"):
         assert (tmp_path / "page" / f"{figure}.pdf").exists()
     assert "Published operating points" in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("sweep", "boron-lever.toml", "--set", "n_d=1e17"), "'n_d': did you mean 'hot.n_d'?"),
+        (("sweep", "--set", "leg_um=3"), "unknown name 'leg_um': did you mean 'leg_width_um'?"),
+        (("sweep", "--set", "surface_gap_um=1"), "--set surface_gap_um: counts in air, and this"),
+        (
+            ("design", "--minimise", "tip_K", "--at", "700K", "--within", "heater_width_um=1:2"),
+            "--minimise tip_K: it is what --at 700K holds, expected another quantity",
+        ),
+        (
+            ("design", "--minimise", "power_mW", "--at", "8V", "--within", "bias_V=1:2"),
+            "--within bias_V: it is what --at 8V holds",
+        ),
+    ],
+)
+def test_what_would_do_nothing_or_is_not_there_is_refused(run, arguments, words):
+    known = {path.name: str(path) for path in EXAMPLE.parent.glob("*.toml")}
+    status, out, err = run(*(known.get(word, word) for word in arguments))
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+
+
+def test_a_number_that_may_also_be_a_word_is_set_as_a_number():
+    probe = Probe.reference()
+    assert parse_settings(["c_kappa=0.7"], probe) == {"c_kappa": 0.7}
+    assert parse_settings(["c_kappa=thickness"], probe) == {"c_kappa": "thickness"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import platform
+import re
 import tempfile
 import traceback
 from collections.abc import Callable, Iterable
@@ -124,21 +125,27 @@ def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") 
     "unknown parameter 'c_kapa': did you mean 'c_kappa'? (expected one of: c_kappa, delta)"
     """
     names = list(choices)
-    # of longer names the last word may be meant, though the whole is less alike than others are
-    ends = [other for other in names if other.endswith(f".{name}")]
+    # a longer name may be meant that has all its words, though the whole is less alike than others
+    whole = [other for other in names if _words(name) <= _words(other)]
+    whole = difflib.get_close_matches(name[:_QUOTED], whole, n=_NEAREST, cutoff=0.0)
     # of names that are less alike, one that begins as it does is meant, not any other
     alike = difflib.get_close_matches(name[:_QUOTED], names, n=_NEAREST, cutoff=0.5)
     near = difflib.get_close_matches(name[:_QUOTED], names, n=1)
-    near = near or [other for other in alike if other[:1].lower() == name[:1].lower()]
+    near = whole or near or [other for other in alike if other[:1].lower() == name[:1].lower()]
     if len(names) > _MOST_CHOICES:
         nearest = difflib.get_close_matches(name[:_QUOTED], names, n=_NEAREST, cutoff=0.0)
-        nearest = list(dict.fromkeys([*ends, *nearest]))[:_NEAREST]
+        nearest = list(dict.fromkeys([*whole, *nearest]))[:_NEAREST]
         names = [*nearest, f"and {len(names) - len(nearest)} more"]
     hint = f": did you mean '{near[0]}'?" if near else ""
     prefix = f"{where}: " if where else ""
     return InputError(
         f"{prefix}unknown {kind} {quoted(name)}{hint} (expected one of: {', '.join(names)})"
     )
+
+
+def _words(name: str) -> set[str]:
+    """Return the words of a name such as ``tip.height_um``."""
+    return set(re.split(r"[._ -]", name.lower()))
 
 
 def unforeseen_error(error: BaseException, arguments: list[str]) -> str:

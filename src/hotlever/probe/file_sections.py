@@ -233,10 +233,14 @@ def field_of(probe: ProbeParts, name: str) -> tuple[str, str, type[Record]]:
     own = [part for part in PARTS if getattr(probe, part)]
     # those of a named material have its name before them
     for part in [section] if dot else ["probe", *own, *PARTS]:
+        if part == MATERIAL and not probe.has_plain_silicon:
+            continue
         if key in keys[part] or (dot and records[part] is PriorTexts):
             return part, key, records[part]
     # a prior has the name of what it is of
     dotted = {*named, *wired}
+    if not probe.has_plain_silicon:
+        del keys[MATERIAL]
     full = [f"{part}.{key}" if part in dotted else key for part in keys for key in keys[part]]
     choices = keys[section] if dot else full
     raise unknown_name("name", key, dict.fromkeys(choices))

@@ -9,6 +9,7 @@ from hotlever.files import write_text
 from hotlever.probe.shapes import DRAWING
 from hotlever.studies import design as study
 from hotlever.tasks.planning_requests import DesignRequest
+from hotlever.errors import InputError
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.shared import draw, read_probe
 from hotlever.tasks.texts import check_number, parse_bounds, parse_setting, parse_varied
@@ -72,6 +73,15 @@ def optimise_design(reporter: Reporter, request: DesignRequest) -> None:
     probe = request.with_physics(read_probe(reporter, request.probe))
     point = WorkingPoint(*parse_setting(request.at, tip=True))
     quantity, bounds = request.minimise or request.maximise or "", parse_bounds(request.within)
+    for option, name in (
+        ("--minimise" if request.minimise else "--maximise", quantity),
+        *(("--within", name) for name in bounds),
+    ):
+        if name == point.column:
+            raise InputError(
+                f"{option} {name}: it is what --at {request.at} holds, expected another quantity, "
+                "or another --at"
+            )
     with reporter.progress("design") as update:
         greatest = request.maximise is not None
         optimum = optimise(probe, quantity, point, bounds, greatest=greatest, progress=update)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 from hotlever.errors import InputError, excerpt
 from hotlever.files import FIGURE_TYPES, FILM_TYPES, Outputs
@@ -140,6 +140,9 @@ class PhysicsRequest(Request):
 class LeverRequest(PhysicsRequest, ProbeRequest):
     """A lever to solve: its probe, with some values changed, the medium and the effects."""
 
+    #: Whether the task takes air where nothing is said.
+    finds_air: ClassVar = False
+
     medium: str | None = option(None, help="vacuum or air; what the files say if left out.")
     set: list[str] | None = option(
         None, "--set", metavar="NAME=VALUE", help="Change a value of the probe file."
@@ -150,7 +153,10 @@ class LeverRequest(PhysicsRequest, ProbeRequest):
         check_medium(self.medium)
         probe = read_probe(reporter, self.probe, self.set)
         probe = self.with_physics(probe)
-        return probe if self.medium is None else probe.in_medium(self.medium)
+        probe = probe if self.medium is None else probe.in_medium(self.medium)
+        if probe.surroundings.medium == "vacuum" and not self.finds_air:
+            refuse_air(self.set, probe)
+        return probe
 
 
 @dataclass(kw_only=True)
@@ -340,6 +346,8 @@ class SpectrumRequest(TableRequest, LeverRequest):
 class ReaderRequest(TableRequest, LeverRequest):
     """Read the distance to a surface: signal, noise, resolution."""
 
+    finds_air = True
+
     distance: str = option(
         "0.3um:3um:10",
         metavar="START:STOP:COUNT",
@@ -372,3 +380,17 @@ def check_medium(medium: str | None, *more: str) -> None:
     media = *get_args(Medium), *more
     if medium is not None and medium not in media:
         raise InputError(f"--medium {excerpt(medium)}: expected {' or '.join(media)}")
+
+
+def refuse_air(settings: list[str] | None, probe: Probe) -> None:
+    """Refuse settings of the air around a lever that is in vacuum, where they do nothing."""
+    from hotlever.probe.file_sections import field_of
+    from hotlever.tasks.texts import parse_settings
+
+    for name, value in parse_settings(settings, probe).items():
+        section, key, _ = field_of(probe, name)
+        if section == "surroundings" and key != "medium" and value not in (None, False):
+            raise InputError(
+                f"--set {name}: counts in air, and this lever is in vacuum; expected --medium air "
+                "too"
+            )

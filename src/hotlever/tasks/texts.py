@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
 from hotlever.errors import InputError, excerpt, quoted
 from hotlever.units import NUMBER, bias_setting, setting
@@ -116,7 +116,10 @@ def parse_settings(texts: Sequence[str] | None, probe: Probe) -> dict[str, Any]:
         # a key of another shape than the probe's is a dimension
         number = section == "probe" or section in probe.materials
         kind = field.annotation if field is not None else float if number else str
-        values[name] = _as_kind(text, (kind, *get_args(kind)), f"--set {name}")
+        # of a number with bounds the first is what it is
+        one_of = get_args(kind)
+        kinds = [get_args(one)[0] if get_origin(one) is Annotated else one for one in one_of]
+        values[name] = _as_kind(text, (kind, *kinds), f"--set {name}")
     return values
 
 
