@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from hotlever.datasets import write_dataset
+from hotlever.errors import InputError
 from hotlever.files import write_text
 from hotlever.probe.shapes import DRAWING
 from hotlever.studies import design as study
 from hotlever.tasks.planning_requests import DesignRequest
-from hotlever.errors import InputError
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.shared import draw, read_probe
 from hotlever.tasks.texts import check_number, parse_bounds, parse_setting, parse_varied
