@@ -133,7 +133,9 @@ def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") 
     near = difflib.get_close_matches(name[:_QUOTED], names, n=1)
     fewest = min((len(_words(other)) for other in whole), default=0)
     meant = [other for other in whole if len(_words(other)) == fewest]
-    near = (meant if len(meant) == 1 else near) or [other for other in alike if other[:1].lower() == name[:1].lower()]
+    near = (meant if len(meant) == 1 else near) or [
+        other for other in alike if other[:1].lower() == name[:1].lower()
+    ]
     if len(names) > _MOST_CHOICES:
         nearest = difflib.get_close_matches(name[:_QUOTED], names, n=_NEAREST, cutoff=0.0)
         nearest = list(dict.fromkeys([*whole, *nearest]))[:_NEAREST]
