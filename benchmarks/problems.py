@@ -228,6 +228,8 @@ def run_python(
     Modules may come from a source folder, before all others.
     """
     environment = os.environ | {CACHE_VARIABLE: str(cache)}
+    # what is installed is compiled once
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     if source is not None:
         environment["PYTHONPATH"] = str(source)
     subprocess.run(

@@ -20,7 +20,7 @@ import pytest
 from scipy.sparse.csgraph import connected_components
 
 import hotlever
-from documents import ROOT
+from documents import EXAMPLES, ROOT
 from hotlever.errors import InputError
 
 SOURCE = Path(hotlever.__file__).parent
@@ -116,17 +116,22 @@ IMPORTED_BY_A_SWEEP = {
 }
 
 
-def test_a_plain_sweep_imports_what_it_needs_and_no_more(tmp_path):
-    """Not matplotlib, nor Shapely, nor SciPy's optimisers: each takes as long as all levers."""
+def imported_by(words: str, folder: Path) -> list[str]:
+    """Return the modules that a command imports."""
     script = (
         "import runpy, sys; sys.argv = ['hotlever', *sys.argv[1:]];\n"
         "try: runpy.run_module('hotlever', run_name='__main__')\n"
         "except SystemExit as end: assert not end.code\n"
-        "print(*sys.modules, file=sys.stderr)"
+        "open('modules.txt', 'w').write(' '.join(sys.modules))"
     )
-    command = [sys.executable, "-c", script, "sweep", "--bias", "1:3:3", "-o", "sweep.csv"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-    modules = done.stderr.split()
+    command = [sys.executable, "-c", script, *words.split()]
+    subprocess.run(command, cwd=folder, capture_output=True, check=True)
+    return (folder / "modules.txt").read_text().split()
+
+
+def test_a_plain_sweep_imports_what_it_needs_and_no_more(tmp_path):
+    """Not matplotlib, nor Shapely, nor SciPy's optimisers: each takes as long as all levers."""
+    modules = imported_by("sweep --bias 1:3:3 -o sweep.csv", tmp_path)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     every = [*project["dependencies"], *chain(*project["optional-dependencies"].values())]
     named = {re.split(r"[^\w-]", requirement)[0].replace("-", "_") for requirement in every}
@@ -138,6 +143,19 @@ def test_a_plain_sweep_imports_what_it_needs_and_no_more(tmp_path):
     assert dearer == {}
     of_scipy = {".".join(name.split(".")[:2]) for name in modules if name.startswith("scipy.")}
     assert not {"scipy.optimize", "scipy.interpolate", "scipy.stats", "scipy.spatial"} & of_scipy
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        f"fit {EXAMPLES}/lever-a.csv -o out.json",
+        f"calibrate {EXAMPLES}/lever-a.csv -o out.json",
+        "pulse --pulse 8V,5us -o out.csv",
+    ],
+)
+def test_what_is_estimated_or_in_time_imports_no_arrays_of_dask(tmp_path, words):
+    """Which xarray does for a number out of a dataset, and takes a third of a second for."""
+    assert "dask.array" not in imported_by(words, tmp_path)
 
 
 def test_datasets_offer_figures_before_matplotlib_is_loaded():

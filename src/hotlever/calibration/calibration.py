@@ -152,12 +152,12 @@ class Calibration(Outcome):
     @property
     def tip_temperature_uncertainty_K(self) -> float:
         """Largest standard error of the tip temperature in the table (K)."""
-        return float(self.table.tip_stderr_K.max())
+        return float(np.fmax.reduce(self.table.tip_stderr_K.values))
 
     @property
     def knee_measured(self) -> bool:
         """Whether the knee lies in the measured range."""
-        return self.knee.measured and self.knee.bias_V <= float(self.table.bias_V.max())
+        return self.knee.measured and bool(self.knee.bias_V <= self.table.bias_V.values[-1])
 
     def tip_temperature(self, power_mW: ArrayLike) -> Array:
         """Return the tip temperature (K) by power (mW); NaN outside the measured range.

@@ -202,7 +202,7 @@ def calibrated_by_estimate(
         law, residual = law_of_model(vacuum, None if threshold is None else threshold.power_mW)
     return Calibration(
         table=tip.table,
-        gum=budget_of_estimate(estimate, priors, tip.table.isel(bias=row), of),
+        gum=budget_of_estimate(estimate, priors, tip.table.isel(bias=slice(row, row + 1)), of),
         weights=_weights(measured, estimate),
         route=route,
         medium=medium,

@@ -9,7 +9,7 @@ import xarray as xr
 
 from hotlever.calibration.calibration import Calibration
 from hotlever.calibration.pulses import PulseCalibration
-from hotlever.calibration.table import BUDGETS
+from hotlever.calibration.table import BUDGETS, budgets_of
 from hotlever.calibration.uncertainty_budget import TemperatureBudget
 from hotlever.estimation.summary import NEAREST, prior_lines
 from hotlever.text import aligned, significant, value_with_error
@@ -208,7 +208,7 @@ def _rows(
     """
     along = table[columns[0][1]].values
     numbers = [(head, table[name].values, digits) for head, name, digits in columns]
-    numbers += [(error.source.item(), error.values, 1) for error in table[budget]]
+    numbers += [(source, error, 1) for source, error in budgets_of(table)[budget].items()]
     cells = [
         [head, *(f"{number:.{digits}f}" for number in np.interp(at, along, values))]
         for head, values, digits in numbers
@@ -219,7 +219,8 @@ def _rows(
 def _verdict(calibration: Calibration) -> str:
     stated = calibration.tip_temperature_uncertainty_K
     word = "good" if stated <= _GOOD else "fair" if stated <= _FAIR else "rough"
-    largest = calibration.table.budget_K.max("bias").idxmax("source").item()
+    budget = budgets_of(calibration.table)[BUDGETS[0]]
+    largest = max(budget, key=lambda source: np.fmax.reduce(budget[source]))
     text = f"{word}; mostly from {largest}"
     by_law = calibration.route == "power law"
     if largest in _ADVICE and not (by_law and largest == "constant k"):

@@ -54,7 +54,7 @@ def table_with_budgets(
 def budgets_of(table: xr.Dataset) -> dict[str, dict[str, Array]]:
     """Return the standard errors (K) of a table by source, independent of each other."""
     return {
-        name: {error.source.item(): error.values for error in table[name]}
+        name: dict(zip(table.source.values.tolist(), table[name].values, strict=True))
         for name in BUDGETS
         if name in table
     }

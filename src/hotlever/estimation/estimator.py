@@ -253,7 +253,7 @@ def undetermined(fit: Fit) -> list[str]:
         f"data (correlation {correlation[first, second]:+.2f})"
         for first, second in np.argwhere(np.abs(correlation) > _ENTANGLED)
     ]
-    largest = float(fit.band.tip_stderr_K.max())
+    largest = float(np.fmax.reduce(fit.band.tip_stderr_K.values))
     if texts and np.isfinite(largest):
         texts.append(
             "the tip temperature that follows has nevertheless a standard error of at most "

@@ -152,9 +152,9 @@ def _times(data: xr.Dataset) -> list[list[str]]:
     rows, of = [], data.attrs
     if "tip_mean_K" in of:
         highest = f"{of['tip_highest_K']:.1f} K at {of['tip_highest_at_us']:.4g} µs"
-        end = f"{data.tip_K[-1].item():.1f} K at {data.time[-1].item():.4g} µs"
+        end = f"{data.tip_K.values[-1]:.1f} K at {data.time.values[-1]:.4g} µs"
         rows += [["tip, highest", highest], ["tip, at the end", end]]
-        took = data.time[-1].item() - data.time[0].item()
+        took = np.ptp(data.time.values)
         rows += [["tip, mean", f"{of['tip_mean_K']:.1f} K over {took:.4g} µs"]]
     for name in ("heating", "cooling"):
         time = data.attrs.get(f"{name}_us", math.nan)
