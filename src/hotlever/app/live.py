@@ -31,6 +31,8 @@ from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.response_surface import is_papers
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
 from hotlever.lever.streamline import current_path
+from hotlever.materials.departures import departure_of
+from hotlever.materials.parameters import own_name
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.probe.shapes import EDGE_BIAS
@@ -239,7 +241,11 @@ def described(report: Report, name: str) -> dict[str, Any]:
     """Return what sliders need of a probe: by group names, values, bounds and units."""
     probe = probe_of(name)
     sliders: dict[str, list[Any]] = {"material": [], "dimensions": [], "circuit": []}
-    parameters = of_materials(probe)
+    parameters = {
+        name: parameter
+        for name, parameter in of_materials(probe).items()
+        if departure_of(own_name(name)) is None
+    }
     values = probe.values(list(parameters)).tolist()
     for (key, parameter), value in zip(parameters.items(), values, strict=True):
         low, high = max(parameter.lower, value / 2), min(parameter.upper, value * 2)

@@ -40,8 +40,8 @@ from hotlever.probe.priors import (
     PriorUse,
     default_priors,
     known_beforehand,
-    priors_of,
     published_material,
+    updated,
 )
 from hotlever.types import Array, Progress
 
@@ -131,8 +131,8 @@ def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Pri
     """
     if priors is not None and not priors:
         return {}
-    stated = priors_of({**fit.options.priors, **(priors or {})}, fit.probe, "priors")
-    before = default_priors(fit.probe, published_material()) | stated
+    stated = {**fit.options.priors, **(priors or {})}
+    before = updated(default_priors(fit.probe, published_material()), stated, fit.probe, "priors")
     return {name: prior for name, prior in before.items() if name not in fit.options.fixed}
 
 

@@ -295,7 +295,7 @@ def _error_of_model(lever: LinearisedLever, bias: Array) -> Array:
     """Return what the model leaves out of the tip temperature (K) at some biases (V)."""
     fine = np.linspace(_LOWEST, 1.0, _FINE) * bias.max()
     rise = lever.tip(fine)[0] - lever.probe.circuit.base_temperature_K
-    error = error_of_model(lever.probe.surroundings, lever.names, fine, rise)
+    error = error_of_model(lever.probe.surroundings, fine, rise)
     return np.interp(bias, fine, error)
 
 

@@ -310,7 +310,7 @@ def _with_errors(
     if around.medium == "air":
         share = _share_of_air(probe, timing.length_us) / HEAT_CAPACITY_SPREAD
         parts["heat in air"] = parts["heat capacity"] * _HEAT_IN_AIR_SPREAD * share
-    of_model = [error_of_model(around, varied, bias, column) for column in rise.T]
+    of_model = [error_of_model(around, bias, column) for column in rise.T]
     parts["model"] = np.stack(of_model, axis=1)
     tip = probe.circuit.base_temperature_K + rise
     stderr = total_error(parts)

@@ -8,7 +8,7 @@ still be cold, or hot already.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -29,6 +29,7 @@ from hotlever.estimation.inverse_problem import Estimate
 from hotlever.estimation.posterior import Posterior, standard_errors
 from hotlever.estimation.profile import profile_of_tip
 from hotlever.lever import Branch
+from hotlever.materials.departures import departure_of
 from hotlever.materials.parameters import is_of_material, own_name
 from hotlever.measurement import Measurement
 from hotlever.piecewise import spline_through
@@ -58,9 +59,6 @@ _MODEL = {"vacuum": 3e-4, "air": 7e-4}
 #: one of 0.9 air takes up 6 % less, more where the lever is narrow, and an estimate without it is
 #: off by so much (rms of six simulated levers from number 1000 on, of both shapes, linearised).
 _JUMP = 7e-3
-#: The same by the law of the mobility: how far two estimates of a lever are apart, with another law
-#: (MINIMOS) in place of Eq. 8 (rms of seven pairs of simulated levers from number 1000 on).
-_MOBILITY = 4e-3
 #: Share by which the resistances of tip and sample differ from full 3-D (benchmarks/contact_3d.py).
 _CONTACT = 0.022
 #: Rows that are on another part of the branch than a ramp takes by more than so many kelvins, so
@@ -118,7 +116,7 @@ def tip_by_bias(
     parts = errors_by_source(estimate.posterior, slopes)
     stderr = total_error(parts)
     rise = tip - circuit.base_temperature_K
-    parts["model"] = error_of_model(probe.surroundings, estimate.options.varied, bias, rise)
+    parts["model"] = error_of_model(probe.surroundings, bias, rise)
     low, high, asymmetry = _credible_interval(
         estimate, tip, stderr, parts["model"], samples, progress
     )
@@ -230,23 +228,19 @@ def errors_by_source(posterior: Posterior, slopes: Array) -> dict[str, Array]:
     errors: dict[str, Array] = {}
     for name, share in posterior.shares.items():
         own = "material" if is_of_material(name) else "geometry"
+        own = own if departure_of(own_name(name)) is None else "laws"
         source = name if name in ("measurement", "fit") else OF_THE_MEASUREMENT.get(name, own)
         errors[source] = np.hypot(errors.get(source, 0.0), standard_errors(slopes, share))
     return errors
 
 
-def error_of_model(around: Surroundings, varied: Sequence[str], bias: Array, rise: Array) -> Array:
-    """Return by how much the tip may be off since the model is (K); most where the tip is steep.
-
-    The law of the mobility counts where its exponents are estimated.
-    """
+def error_of_model(around: Surroundings, bias: Array, rise: Array) -> Array:
+    """Return by how much the tip may be off since the model is (K); most where the tip is steep."""
     # a rise that grows as the square of the bias is that of a lever of constant properties
     square, size = np.abs(0.5 * bias * np.gradient(rise, bias)), np.abs(rise)
     error = _MODEL[around.medium] * np.maximum(size, square)
     if around.medium == "air" and around.accommodation is None:
         error = np.hypot(error, _JUMP * size)
-    if any(own_name(name) == "impurity_exponent" for name in varied):
-        error = np.hypot(error, _MOBILITY * size)
     return np.asarray(error)
 
 

@@ -25,6 +25,8 @@ from hotlever.estimation.outcome import IF_ANY, Correlations, Section
 from hotlever.estimation.posterior import CurvedQuantity
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.estimation.surrogate import Rows
+from hotlever.materials.departures import DEPARTURES, departure_of
+from hotlever.materials.parameters import own_name
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import SCALES, PriorUse
 from hotlever.quantities import FITTED, OBSERVABLES
@@ -186,6 +188,11 @@ def budget_of_estimate(
     units = {name: each.unit for name, each in parameters_of(estimate.probe, anywhere=True).items()}
     units |= dict.fromkeys(SCALES, "1")
     by_fit = contributions.pop(_FIT, None)
+    for law, parts in _by_law(contributions).items():
+        # a row for a law, whatever its coefficients are called
+        spread = DEPARTURES[own_name(law)].spread_hot * priors[next(iter(parts))].spread
+        sensitivity = float(np.linalg.norm([*parts.values()])) / spread
+        rows.append(InputQuantity(f"law.{law}", 0.0, "1", spread, "B", "normal", sensitivity))
     for name, by in contributions.items():
         use = priors[name]
         sensitivity = by.item() / use.spread
@@ -223,6 +230,19 @@ def budget_of_estimate(
     hottest = surrogate.contact.added(ended, estimate.probe.values(objective.names))[observable, 0]
     beyond = max(interval.high, temperature_budget.interval_K[1]) > hottest
     return replace(temperature_budget, monte_carlo=_NO_INTERVAL if beyond else interval)
+
+
+def _by_law(contributions: dict[str, Array]) -> dict[str, dict[str, float]]:
+    """Take out the contributions of coefficients, and return them by law and coefficient.
+
+    A law of a named material has the material's name before its own.
+    """
+    laws: dict[str, dict[str, float]] = {}
+    for name in list(contributions):
+        if (departing := departure_of(own_name(name))) is not None:
+            law = name.removesuffix(own_name(name)) + departing[0].law
+            laws.setdefault(law, {})[name] = contributions.pop(name).item()
+    return laws
 
 
 def _rows_of_fit(

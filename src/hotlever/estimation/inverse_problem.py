@@ -40,7 +40,15 @@ from hotlever.measurement.data import check_sample
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
 from hotlever.probe.parameters import dimensions_of, parameters_of
-from hotlever.probe.priors import ALL_DIMENSIONS, Prior, PriorUse, default_priors, priors_of
+from hotlever.probe.priors import (
+    ALL_DIMENSIONS,
+    Prior,
+    PriorUse,
+    default_priors,
+    is_of_laws,
+    priors_of,
+    updated,
+)
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.types import Array, Progress
 
@@ -160,14 +168,18 @@ def estimate(
     notes += note_on_averages(whole, measurement) + check_sample(measurement, probe)
     options = options.of(probe, in_time=in_time)
     priors = priors_of(options.priors, probe, "priors", in_time=in_time)
-    without_effect = [name for name in options.priors if name not in (*priors, ALL_DIMENSIONS)]
+    without_effect = [
+        name
+        for name in options.priors
+        if name not in (*priors, ALL_DIMENSIONS) and not is_of_laws(name)
+    ]
     if without_effect:
         notes.append(
             f"priors that do not count in {probe.surroundings.medium}, and have no effect: "
             f"{', '.join(without_effect)}"
         )
     if options.usual_priors:
-        usual = default_priors(probe)
+        usual = updated(default_priors(probe), options.priors, probe, "priors", in_time=in_time)
         priors = {name: usual[name] for name in usual if name not in options.fixed} | priors
     options = replace(options, priors=priors, usual_priors=False)
     if in_time:

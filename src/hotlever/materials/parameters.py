@@ -26,11 +26,6 @@ LOW_DOPED, HIGH_DOPED = "low-doped", "high-doped"
 _DOPING = 0.15
 #: What is known of films of other materials: they differ from the bulk, and from each other.
 _FILM = 0.2
-#: Of the exponent of the temperature in mobility limited by impurities: half of what it is without
-#: screening, 1.5. The paper takes 0.
-_IMPURITIES = 0.75
-#: Of the intrinsic carrier density of hot silicon, of which published formulas differ (theory).
-_INTRINSIC = 0.15
 #: Of the power of the energy in the relaxation time of carriers: half of what lies between acoustic
 #: phonons, −1/2, and the half-way to ionised impurities, 3/2; and of a metal's Seebeck coefficient
 #: (µV/K), which films have another of than the bulk.
@@ -126,6 +121,7 @@ def _coefficients(departure: Departure) -> list[Parameter]:
         Parameter(
             *(name, f"{name.rpartition('_')[0]}{_SUBSCRIPTS[number]}", "1", 10.0, -10.0, 10.0),
             f"departure of the law of the {departure.words}, mode {number + 1}; 0: none",
+            spread=1.0,
             relative=False,
             value=0.0,
         )
@@ -154,14 +150,12 @@ OF_SILICON = _table(
     Parameter(
         *("impurity_exponent", "s", "1", 10.0, -2.0, 4.0),
         "power of T / 300 K in mobility limited by impurities; 0: Eq. 9",
-        spread=_IMPURITIES,
         relative=False,
         value=0.0,
     ),
     Parameter(
         *("intrinsic_scale", "c_i", "1", 1.0, 0.2, 5.0),
         "scale of the intrinsic carrier density; 1: Eq. 7",
-        spread=_INTRINSIC,
         value=1.0,
     ),
     Parameter(

@@ -31,6 +31,17 @@ class PriorTexts(Record):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, str]
 
+    @model_validator(mode="before")
+    @classmethod
+    def _names_may_have_dots(cls, values: Any) -> Any:
+        if not isinstance(values, Mapping):
+            return values
+        flat = dict[str, Any]()
+        for name, value in values.items():
+            inner = value.items() if isinstance(value, Mapping) else ()
+            flat |= {f"{name}.{own}": text for own, text in inner} if inner else {name: value}
+        return flat
+
 
 #: What the sections of a probe file hold, beside the shape in ``[probe]``.
 PARTS: dict[str, type[Record]] = {

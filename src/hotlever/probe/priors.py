@@ -5,7 +5,10 @@ unit, ``0.40 ± 0.02``; with a share, ``3.3e17 ± 15%``; or with a factor, ``1e1
 value, ``± 5%`` or ``×/ 3``, it is about the probe's own. ``+-`` stands for ``±``, ``x/`` and ``*/``
 for ``×/``. A share is a standard deviation of the logarithm, and so is the logarithm of a factor.
 
-The name ``dimensions`` means all of the drawing and the thickness. The scales of meters and of the
+The name ``dimensions`` means all of the drawing and the thickness. ``law.kappa`` and the like mean
+a law: ``± 10%`` is the standard deviation of its departure at 1000 K
+(`hotlever.materials.departures`), and ``exact`` that it holds to the letter; ``laws`` means all of
+them, ``uncertain`` as is usual, or the ``paper``'s. The scales of meters and of the
 Raman thermometer have priors too, shares such as ``± 2%``: by so much all that they show may be
 wrong together.
 """
@@ -22,7 +25,8 @@ import numpy as np
 from pydantic import Field
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.materials.parameters import Parameter
+from hotlever.materials.departures import DEPARTURES
+from hotlever.materials.parameters import Parameter, own_name
 from hotlever.probe.parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.parts import ProbeParts
 from hotlever.records import StandardError
@@ -30,6 +34,15 @@ from hotlever.spieser2017 import PUBLISHED_SCATTER
 from hotlever.text import with_unit
 
 ALL_DIMENSIONS = "dimensions"
+#: All laws, and what begins the name of one; what they may be, and what one may be beside a spread.
+ALL_LAWS, LAW = "laws", "law."
+PAPERS, UNCERTAIN, EXACT = "paper", "uncertain", "exact"
+#: The parameters that are the departures of the other laws, and have no shape of their own: what is
+#: around a lever, and how its heat capacity is measured, move them as a whole by more than
+#: published curves differ in shape.
+_SCALE_OF_LAW = {"air": "gas_conductivity", "heat_capacity": "heat_capacity_scale"}
+#: All that have a spread.
+LAWS = (*DEPARTURES, *_SCALE_OF_LAW)
 #: Scales of what is shown, and the observable that each belongs to.
 SCALES = {
     "current_scale": "current",
@@ -181,6 +194,10 @@ class PriorShift(NamedTuple):
         return self.size / float(np.sqrt(max(self.contraction, _LEAST_CONTRACTION)))
 
 
+#: Of the coefficients of a departure, by which its spread is as published.
+_OF_COEFFICIENTS = Prior(0.0, 1.0, relative=False)
+
+
 def published_material() -> dict[str, Prior]:
     """Return what is known of the material of any lever: the published ones, and their scatter."""
     return {name: Prior(*scatter) for name, scatter in PUBLISHED_SCATTER.items()}
@@ -205,7 +222,7 @@ def default_priors(
     order = sorted(priors, key=lambda name: (name in in_units, in_units.get(name, False)))
     usual = {name: priors[name] for name in order}
     own = {name: prior for name, prior in (material or {}).items() if name in usual}
-    return usual | own | priors_of(probe.stated_priors, probe, "[prior]")
+    return updated(usual | own, probe.stated_priors, probe, "[prior]")
 
 
 def known_beforehand(
@@ -220,7 +237,35 @@ def known_beforehand(
     """
     if stated is not None and not stated:
         return {}
-    return default_priors(probe) | priors_of(stated or {}, probe, "priors")
+    return updated(default_priors(probe), stated or {}, probe, "priors")
+
+
+def updated(
+    priors: Mapping[str, Prior],
+    stated: Mapping[str, Prior | str],
+    probe: ProbeParts,
+    where: str,
+    *,
+    in_time: bool = False,
+) -> dict[str, Prior]:
+    """Return priors with those stated in their place, and without those of laws that are exact.
+
+    Raises
+    ------
+    InputError
+        See `priors_of`.
+    """
+    anew = priors_of(stated, probe, where, in_time=in_time)
+    exact = {name.removeprefix(LAW) for name, text in stated.items() if text == EXACT}
+    if ALL_LAWS in stated:
+        exact |= DEPARTURES.keys()
+    names = {name for law in exact for name in _names_of_law(law, probe)}
+    return {name: prior for name, prior in priors.items() if name not in names} | anew
+
+
+def is_of_laws(name: str) -> bool:
+    """Return whether a prior is of a law, or of all."""
+    return name == ALL_LAWS or name.startswith(LAW)
 
 
 def priors_of(
@@ -242,10 +287,17 @@ def priors_of(
     Prior(value=3.3e+17, spread=0.15, relative=True)
     """
     table, priors = parameters_of(probe, anywhere=True), dict[str, Prior]()
+    if ALL_LAWS in stated:
+        priors |= _of_all_laws(stated[ALL_LAWS], probe, f"{where}: {ALL_LAWS}")
     for name, text in stated.items():
-        if name not in table and name not in (ALL_DIMENSIONS, *SCALES):
-            raise unknown_name("prior", name, [*table, ALL_DIMENSIONS, *SCALES], where)
         here = f"{where}: {name}"
+        if is_of_laws(name):
+            if name != ALL_LAWS:
+                priors |= _of_law(name.removeprefix(LAW), text, probe, here)
+            continue
+        if name not in table and name not in (ALL_DIMENSIONS, *SCALES):
+            others = [*table, ALL_DIMENSIONS, ALL_LAWS, *(LAW + law for law in LAWS), *SCALES]
+            raise unknown_name("prior", name, others, where)
         if isinstance(text, Prior):
             priors[name] = text
         elif name in SCALES:
@@ -267,6 +319,38 @@ def priors_of(
             _check(priors[name], table[name], here, written)
     counting = parameters_of(probe, in_time=in_time)
     return {name: prior for name, prior in priors.items() if name in counting or name in SCALES}
+
+
+def _names_of_law(law: str, probe: ProbeParts) -> list[str]:
+    """Return the parameters by which a law departs in a probe."""
+    own = DEPARTURES[law].names if law in DEPARTURES else (_SCALE_OF_LAW[law],)
+    return [name for name in parameters_of(probe, anywhere=True) if own_name(name) in own]
+
+
+def _of_all_laws(text: Prior | str, probe: ProbeParts, where: str) -> dict[str, Prior]:
+    """Return the priors of all departures: as is usual, or none."""
+    if text not in (PAPERS, UNCERTAIN):
+        raise unknown_name("choice", str(text), (PAPERS, UNCERTAIN), where)
+    names = [name for law in DEPARTURES for name in _names_of_law(law, probe)]
+    return dict.fromkeys(names, _OF_COEFFICIENTS) if text == UNCERTAIN else {}
+
+
+def _of_law(law: str, text: Prior | str, probe: ProbeParts, where: str) -> dict[str, Prior]:
+    """Return the priors by which a law is as uncertain as a text says."""
+    if law not in LAWS:
+        raise unknown_name("law", law, LAWS, where.removesuffix(f": {LAW}{law}"))
+    if text == EXACT:
+        return {}
+    share = share_of(str(text), where, ("share", "factor"))
+    if law not in DEPARTURES:
+        own = _names_of_law(law, probe)
+        return {
+            name: Prior(value, share)
+            for name, value in zip(own, probe.values(own).tolist(), strict=True)
+        }
+    spread = share / DEPARTURES[law].spread_hot
+    prior = Prior(0.0, spread, relative=False)
+    return dict.fromkeys(_names_of_law(law, probe), prior)
 
 
 def share_of(text: str, where: str, allowed: tuple[Written, ...] = ("share",)) -> float:

@@ -37,7 +37,7 @@ from hotlever.materials.silicon import (
     minimos_mobility,
 )
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.priors import default_priors
+from hotlever.probe.priors import ALL_LAWS, PAPERS, default_priors, updated
 from hotlever.probe.tip import Tip
 from hotlever.text import BAND
 from hotlever.types import Array
@@ -108,11 +108,15 @@ def draw(
 
 
 def values_from_priors(nominal: Probe, rng: np.random.Generator) -> dict[str, float]:
-    """Return what a lever may have in place of the nominal values, drawn from the usual priors."""
+    """Return what a lever may have in place of the nominal values, drawn from the usual priors.
+
+    Its laws do not depart from their formulas.
+    """
+    lawful = updated(default_priors(nominal), {ALL_LAWS: PAPERS}, nominal, "twins")
     return {
         name: prior.at(float(rng.standard_normal()))
-        for name, prior in default_priors(nominal).items()
-        if name not in ("series_resistance_ohm", "impurity_exponent")
+        for name, prior in lawful.items()
+        if name != "series_resistance_ohm"
     }
 
 

@@ -153,7 +153,7 @@ def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
     how: dict[str, Any] = {
         "probe": like if of_lever is None and law is None else None,
         "law": law,
-        "priors": parse_priors(request.prior, like),
+        "priors": parse_priors(request.beforehand, like),
         "medium": request.medium,
         "budget_of": request.budget_of,
         "pulse": None if request.pulse is None else parse_timing(request.pulse),
@@ -220,7 +220,7 @@ def propose(reporter: Reporter, request: NextRequest) -> None:
             beforehand["calibration"] = _calibrated_first(reporter, request, request.data, probe)
         else:
             probe = probe if request.medium is None else probe.in_medium(request.medium)
-            beforehand |= {"probe": probe, "priors": parse_priors(request.prior, probe)}
+            beforehand |= {"probe": probe, "priors": parse_priors(request.beforehand, probe)}
     with reporter.progress("next"):
         plan = plan_next(**beforehand, **choices)
     reporter.note(*plan.notes)
@@ -236,7 +236,7 @@ def _calibrated_first(
 ) -> Calibration:
     measurement = read_measurement_of(like, data, request.columns)
     reporter.note(*measurement.notes)
-    priors = parse_priors(request.prior, like)
+    priors = parse_priors(request.beforehand, like)
     with reporter.progress("calibrate") as update:
         result = calibrate(
             measurement, probe=like, priors=priors, medium=request.medium, progress=update

@@ -53,9 +53,21 @@ class MeasuredRequest(PhysicsRequest):
         help="What is known beforehand, as n_d=3.3e17±15%, n_d=1e17×/3 (to a factor), "
         "dimensions=±2%, usual (what a calibration takes) or none; repeated.",
     )
+    laws: str | None = option(
+        None,
+        metavar="paper|uncertain",
+        help="Whether laws of silicon hold to the letter or are as uncertain as published values "
+        "differ; left out: uncertain in a calibration, the paper's in a fit.",
+    )
     medium: str | None = option(
         None, help="vacuum, air or unknown (both are tried); what the files say if left out."
     )
+
+    @property
+    def beforehand(self) -> list[str]:
+        """What is known beforehand, as ``--prior`` has it."""
+        laws = [] if self.laws is None else [f"laws={self.laws}"]
+        return [*(self.prior or []), *laws]
 
     @property
     def columns(self) -> dict[str, str]:
@@ -156,9 +168,12 @@ class FitRequest(DriveRequest, LeversRequest):
     def options(self, probe: Probe) -> FitOptions:
         """Return what the fit of a probe is asked."""
         from hotlever.estimation import FitOptions
+        from hotlever.probe.priors import is_of_laws
 
         usual = USUAL in (self.prior or [])
-        priors, stated = parse_priors(self.prior, probe), probe.stated_priors
+        priors, stated = parse_priors(self.beforehand, probe), probe.stated_priors
+        if self.laws is not None:
+            stated = {name: text for name, text in stated.items() if not is_of_laws(name)}
         choices: dict[str, Any] = {
             name: getattr(self, name) for name in ("robust", "weights", "medium")
         }

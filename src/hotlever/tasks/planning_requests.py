@@ -209,7 +209,7 @@ class NextRequest(PlotRequest, MeasuredRequest):
         check_medium(self.medium, *([] if self.data is None else [UNKNOWN_MEDIUM]))
         check_number("--count", self.count, 1, MOST_PROPOSALS)
         if self.calibrated:
-            of_levers = "probe", "prior", "medium", "physics", "column"
+            of_levers = "probe", "prior", "laws", "medium", "physics", "column"
             why = "the calibration has its own; expected a measurement file"
             self.refuse(*of_levers, why=why)
         elif self.data is None:
