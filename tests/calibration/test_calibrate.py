@@ -19,8 +19,9 @@ from hotlever.calibration.summary import calibration_text
 from hotlever.calibration.table import TABLE_COLUMNS
 from hotlever.errors import InputError
 from hotlever.lever import Lever
+from hotlever.materials.departures import DEPARTURES
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.priors import PriorUse, default_priors
+from hotlever.probe.priors import PriorUse, as_known, default_priors
 from made_up import GONE, damaged
 from synthetic_curves import measured_curve, measurement_of
 
@@ -80,7 +81,7 @@ def test_the_knee_is_that_of_the_estimated_lever(calibrated, reference):
 def test_the_budget_adds_up_and_every_source_counts(calibrated):
     budget = calibrated.table.budget_K
     sources = {"measurement", "electronics", "base temperature", "geometry", "material", "model"}
-    assert set(budget.source.values) == sources
+    assert set(budget.source.values) == sources | {"laws"}
     together = np.sqrt((budget**2).sum("source"))
     np.testing.assert_allclose(calibrated.table.tip_stderr_K, together)
     assert (budget.max("bias") > 0.1).all()
@@ -96,7 +97,13 @@ def test_the_budget_after_the_gum_is_the_table_s_row_by_row(calibrated, tmp_path
     assert content["gum_bias_V"] == hottest.bias_V.item() == calibrated.table.bias_V.max()
     parts = {row["quantity"]: row["contribution_K"] for row in rows}
     assert np.linalg.norm(list(parts.values())) == pytest.approx(stderr, rel=1e-6)
-    assert set(parts) == {"noise of current", "model", *calibrated.priors}
+    # a law has one row, whatever its coefficients
+    of_laws = {name for each in DEPARTURES.values() for name in each.names}
+    others = {name for name in calibrated.priors if name not in of_laws}
+    laws = {f"law.{law}" for law in DEPARTURES}
+    assert set(parts) == {"noise of current", "model", *others, *laws}
+    together = np.linalg.norm([parts[law] for law in laws])
+    assert together == pytest.approx(hottest.budget_K.sel(source="laws").item(), rel=1e-6)
     for source, names in {
         "measurement": ("noise of current", "current_scale"),
         "electronics": ("series_resistance_ohm",),
@@ -119,7 +126,7 @@ def test_the_budget_after_the_gum_is_the_table_s_row_by_row(calibrated, tmp_path
 
 
 def test_priors_say_what_was_known_and_what_the_data_made_of_it(calibrated):
-    priors = default_priors(Probe.reference())
+    priors = default_priors(as_known(Probe.reference(), None))
     assert set(calibrated.priors) == {*priors, "current_scale"}
     use = calibrated.priors["n_d"]
     assert (use.value, use.spread) == (5.75e17, pytest.approx(0.15 * 5.75e17))

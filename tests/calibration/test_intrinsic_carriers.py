@@ -9,6 +9,7 @@ import pytest
 
 from hotlever.calibration.procedure import calibrate
 from hotlever.lever import Lever
+from hotlever.materials.departures import DEPARTURES
 from hotlever.materials.silicon import intrinsic_density
 from hotlever.probe import Probe
 from synthetic_curves import measured_curve, measurement_of
@@ -39,7 +40,7 @@ def test_the_shift_is_that_of_the_density():
 
 @pytest.mark.slow
 def test_held_they_make_an_error_beyond_all_that_is_stated():
-    priors = {"intrinsic_scale": "1 ± 0.01%"}
+    priors = {"laws": "paper"}
     branch, data = measured(SCALE)
     usual, curve = measured(1.0)
     held, stated = off(calibrate(data, priors=priors), branch)
@@ -61,6 +62,8 @@ def test_tip_temperatures_bring_them_up_to_date():
     error, stated = off(calibration, branch)
     assert abs(error) < 2.0 * stated
     assert stated < 6.0
-    scale = calibration.priors["intrinsic_scale"]
-    assert scale.posterior_value == pytest.approx(SCALE, abs=2.0 * scale.posterior_spread)
-    assert scale.posterior_spread < 0.7 * scale.spread
+    law = DEPARTURES["n_i"]
+    uses = [calibration.priors[name] for name in law.names]
+    departed = np.array([use.posterior_value for use in uses]) @ law.modes(AT_K)
+    assert departed == pytest.approx(np.log(SCALE), abs=0.5 * law.spread(AT_K))
+    assert uses[0].spread_ratio < 0.7

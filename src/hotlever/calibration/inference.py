@@ -38,6 +38,7 @@ from hotlever.probe.priors import (
     SCALES,
     Prior,
     PriorUse,
+    as_known,
     default_priors,
     known_beforehand,
     published_material,
@@ -132,7 +133,8 @@ def _before(fit: Fit, priors: Mapping[str, Prior | str] | None) -> dict[str, Pri
     if priors is not None and not priors:
         return {}
     stated = {**fit.options.priors, **(priors or {})}
-    before = updated(default_priors(fit.probe, published_material()), stated, fit.probe, "priors")
+    probe = as_known(fit.probe, stated)
+    before = updated(default_priors(probe, published_material()), stated, probe, "priors")
     return {name: prior for name, prior in before.items() if name not in fit.options.fixed}
 
 

@@ -27,7 +27,7 @@ from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
-from hotlever.probe.priors import METERS, SCALES, THERMOMETER, Prior, known_beforehand
+from hotlever.probe.priors import METERS, SCALES, THERMOMETER, Prior, as_known, known_beforehand
 from hotlever.quantities import FITTED
 from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.text import BAND
@@ -107,6 +107,7 @@ class LinearisedLever:
         cls, probe: Probe, stated: Mapping[str, Prior | str] | None = None
     ) -> LinearisedLever:
         """Return a lever that was not measured yet; of priors some may be stated."""
+        probe = as_known(probe, stated)
         priors = known_beforehand(probe, stated)
         if not priors:
             raise InputError(

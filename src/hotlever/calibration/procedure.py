@@ -33,7 +33,7 @@ from hotlever.measurement.contents import colder_than_base
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
 from hotlever.probe.parameters import parameters_of
-from hotlever.probe.priors import Prior, known_beforehand
+from hotlever.probe.priors import Prior, as_known, known_beforehand
 from hotlever.types import Progress
 
 #: The resistance of a cold lever is within this factor of its model's.
@@ -147,6 +147,7 @@ def calibrate(
     def within(medium: str | None) -> tuple[Estimate, Calibration]:
         """Calibrate the lever in a medium."""
         probe, of_circuit = with_measured_circuit(origin, measured, medium)
+        probe = as_known(probe, priors)
         causes = Diagnosis(measured, probe, priors)
         check_plausible(measured, probe, causes, known_beforehand(probe, priors))
         check_in_range(at_V, *limits_of_range(measured, probe))

@@ -34,6 +34,7 @@ from hotlever.materials.parameters import is_of_material, own_name
 from hotlever.measurement import Measurement
 from hotlever.piecewise import spline_through
 from hotlever.probe import Circuit, Probe
+from hotlever.probe.chip import CHIP
 from hotlever.probe.surroundings import Surroundings
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.text import BAND
@@ -50,6 +51,7 @@ OF_THE_MEASUREMENT = {
     "gas_conductivity": "air",
     "surface_gap_um": "air",
     "base_temperature_K": "base temperature",
+    CHIP: "base temperature",
     "interface_K_per_mW": "contact",
 }
 #: Share of the rise by which the flat lever, or air as panels, differ from full 3-D where the tip

@@ -39,11 +39,13 @@ from hotlever.measurement import Measurement, with_measured_circuit
 from hotlever.measurement.data import check_sample
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
+from hotlever.probe.chip import CHIP
 from hotlever.probe.parameters import dimensions_of, parameters_of
 from hotlever.probe.priors import (
     ALL_DIMENSIONS,
     Prior,
     PriorUse,
+    as_known,
     default_priors,
     is_of_laws,
     priors_of,
@@ -166,6 +168,8 @@ def estimate(
         nominal.circuit.need_cold_start("a fit in time")
     probe, notes = with_measured_circuit(nominal, measurement, options.medium)
     notes += note_on_averages(whole, measurement) + check_sample(measurement, probe)
+    if not in_time and (options.usual_priors or CHIP in options.priors):
+        probe = as_known(probe, options.priors)
     options = options.of(probe, in_time=in_time)
     priors = priors_of(options.priors, probe, "priors", in_time=in_time)
     without_effect = [

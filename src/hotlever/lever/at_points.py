@@ -1,7 +1,8 @@
 """The states of a lever at its quadrature points: fields, fluxes, and the heat that they hold.
 
 Each terminal gives its potential V one equation, and the leg end there the temperature at which the
-chip holds it:
+chip holds it, the base temperature; or all of them one temperature, above it by ``chip_K_per_mW``
+times the heat that enters the chip:
 
 =======  =========================================  ===========================================
 kind     what it is                                 equation of the potential
@@ -63,6 +64,8 @@ class Terminals:
     ----------
     conductance : ndarray, shape (held,)
         G of the held terminals (mA/V).
+    chip_mW_per_K : float
+        Of the chip below the leg ends; infinite if it stays at the base temperature.
     source_mA : ndarray, shape (held,)
         J of the held terminals.
     end_rises : dict of str to float
@@ -72,6 +75,7 @@ class Terminals:
     def __init__(self, space: Space, circuit: Circuit) -> None:
         self._space, self._held = space, np.array(list(space.held.values()), dtype=int)
         self.conductance, self.source_mA = circuit.norton(space.held)
+        self.chip_mW_per_K = np.inf if space.chip is None else 1.0 / circuit.chip_K_per_mW
         self.end_rises = circuit.end_rises()
 
     def scaled(self, sources: float, rises: float) -> Terminals:
@@ -80,6 +84,21 @@ class Terminals:
         other.source_mA = sources * self.source_mA
         other.end_rises = {name: rises * rise for name, rise in self.end_rises.items()}
         return other
+
+    @property
+    def behind(self) -> Array:
+        """The conductances behind all unknowns that have one, that of the chip last."""
+        chip = [] if self._space.chip is None else [self.chip_mW_per_K]
+        return np.append(self.conductance, chip)
+
+    def add_heat_into_chip(self, weak: Array, x: Array, mW_per_K: float | None = None) -> None:
+        """Add what the chip takes up of states or changes of them, or by another conductance."""
+        if self._space.chip is None:
+            return
+        unknowns, weights = self._space.chip
+        rise = np.tensordot(weights, x[unknowns], axes=1)
+        heat = (self.chip_mW_per_K if mW_per_K is None else mW_per_K) * rise
+        weak[unknowns] += np.multiply.outer(weights, heat)
 
     def add_currents(self, weak: Array, x: Array) -> None:
         """Add what held terminals take from states (size + 1, n), G V − J, to the balances there.

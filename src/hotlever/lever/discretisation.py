@@ -33,6 +33,7 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.materials import Kind, Material
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, Wiring, mesh_layout
+from hotlever.probe.chip import in_pulses
 from hotlever.probe.surroundings import Surroundings
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index, Progress
@@ -112,6 +113,11 @@ class MeshedProbe:
     def in_medium(self, medium: str) -> Self:
         """Return the same lever in vacuum or in air; mesh and operators are shared."""
         return self.with_probe(self.probe.in_medium(medium))
+
+    def in_pulses(self) -> Self:
+        """Return the same lever while the holder of its chip stays cold."""
+        probe = in_pulses(self.probe)
+        return self if probe is self.probe else self.with_probe(probe)
 
     def with_probe(self, probe: Probe) -> Self:
         """Return the lever of a probe of the same shape and tip; what is the same is shared."""
@@ -319,6 +325,8 @@ def conduction_modes(space: FullSpace, count: int) -> Array:
     They vanish at the leg ends and are orthonormal over the area.
     """
     hot = np.flatnonzero(space.is_temperature)
+    if space.chip is not None:
+        hot = np.setdiff1d(hot, space.chip[0])
     kinds, points = space.temperature.kinds, space.weights.size
     maps = space.temperature.matrix[:, hot].tocsr()
     weights = diags(space.weights[:, 0])

@@ -261,11 +261,12 @@ def numbered(
     conducts: Index,
     contact_nodes: Mapping[str, Index],
     wiring: Wiring,
+    on_chip: Index,
 ) -> tuple[Index, Index, int]:
     """Give every nodal value its unknown, in an order with little fill.
 
     Values that are held get -1, the potential of the swept supply the number after all others; a
-    held terminal has that of its first node.
+    held terminal, and the leg ends on the chip, have that of their first node.
 
     Parameters
     ----------
@@ -275,6 +276,8 @@ def numbered(
     contact_nodes : mapping of str to ndarray of int
         Those of each terminal that conduct.
     wiring : Wiring
+    on_chip : ndarray of int
+        Those nodes of leg ends that have the temperature of the chip below.
 
     Returns
     -------
@@ -286,6 +289,7 @@ def numbered(
     free = np.zeros((2, elements.size), dtype=bool)
     free[0], free[1, conducts] = True, True
     free[0, ends] = free[1, contact_nodes[wiring.swept]] = False
+    free[0, on_chip[:1]] = True
     for name in wiring.grounds:
         free[1, contact_nodes[name]] = False
     for name in wiring.held:
@@ -297,6 +301,7 @@ def numbered(
     number = np.full((elements.size, 2), -1, dtype=np.intp)
     number[order] = ordered
     T, V = number.T.copy()
+    T[on_chip] = T[on_chip[:1]]
     V[contact_nodes[wiring.swept]] = size
     for name in wiring.held:
         V[contact_nodes[name]] = V[contact_nodes[name][0]]

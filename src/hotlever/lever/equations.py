@@ -31,6 +31,7 @@ from hotlever.lever.laws import BASE, GAP, GAS
 from hotlever.lever.newton import refined
 from hotlever.lever.space import LEVER, TIP, Constraint, Factors, SurfaceTangent
 from hotlever.lever.transport import Fluxes, fluxes_of
+from hotlever.probe.chip import CHIP
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.types import Array, Index
 
@@ -64,6 +65,7 @@ class LeverEquations(StatesAtPoints):
         """Return the residuals of heat and charge, and last the current I_h (mA), (size + 1, n)."""
         weak = self.space.weak_form(self.fluxes(x))
         self.terminals.add_currents(weak, x)
+        self.terminals.add_heat_into_chip(weak, x)
         for points, (heat, _) in self.losses(x).items():
             getattr(self, points).add_heat(weak, heat)
         return weak + self.space.air.weak_form(self.kirchhoff(x)[0])
@@ -87,7 +89,7 @@ class LeverEquations(StatesAtPoints):
         taken_up = self.heat_in_air.taken_up(per_us) if per_us else None
         slopes = {points: by["T"] for points, (_, by) in self.losses(x).items()}
         surface = SurfaceTangent(self.kirchhoff(x)[1], taken_up, slopes)
-        return self.space.factorised(tangent, surface, constraint, self.terminals.conductance)
+        return self.space.factorised(tangent, surface, constraint, self.terminals.behind)
 
     # --- derivatives --------------------------------------------------------------------------
 
@@ -102,6 +104,7 @@ class LeverEquations(StatesAtPoints):
         """Return how `balance` changes with the unknowns: the Jacobian times changes."""
         weak = self.space.weak_form(self.flux_changes(x, change))
         self.terminals.add_current_changes(weak, change)
+        self.terminals.add_heat_into_chip(weak, change)
         more = (..., *(None,) * (change.ndim - 2))
         kappa = self.kirchhoff(x)[1][more]
         for name, (_, by) in self.losses(x).items():
@@ -142,6 +145,9 @@ class LeverEquations(StatesAtPoints):
                 weak[..., column] += air.weak_form(kappa_air - cold)
             elif name == GAP:
                 weak[..., column] += air.change_with_gap(theta)
+            elif name == CHIP:
+                by_chip = -(self.terminals.chip_mW_per_K**2)
+                self.terminals.add_heat_into_chip(weak[..., column], x, by_chip)
         return weak
 
     def tip_by_parameter(self, x: Array, names: Sequence[str]) -> Array:
@@ -337,6 +343,9 @@ def _heat_out(
     heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
     by_ends = -np.einsum("dp,dpn->n", space.end_test, heat)
     into_air, at_ends = space.air.heat(leaving.theta)
+    if space.chip is not None:
+        unknowns, weights = space.chip
+        at_ends = at_ends + weights @ space.air.weak_form(leaving.theta)[unknowns]
     light = (space.weights * leaving.faces).sum(axis=0)
     if "rim" in leaving.losses:
         at_ends = at_ends + equations.rim.end_test @ leaving.losses["rim"]

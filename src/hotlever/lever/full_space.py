@@ -2,12 +2,13 @@
 
 The unknowns are the temperature and the potential at the nodes, without those held at the base
 temperature or at ground; the nodes of a contact share one unknown, that of the swept supply the
-lever voltage. Where nothing conducts there is no potential.
+lever voltage, and so do leg ends on a chip that gets warmer. Where nothing conducts there is no
+potential.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
 from typing import Any, get_args
@@ -79,8 +80,11 @@ class FullSpace(Space):
         self.contact_nodes = {
             name: np.intersect1d(nodes, conducts) for name, nodes in self.end_nodes.items()
         }
+        on_chip = np.unique(
+            np.concatenate([ends[:0], *(self.end_nodes[name] for name in self.wiring.on_chip)])
+        )
         self._T, self._V, self.size = numbered(
-            self.elements, ends, conducts, self.contact_nodes, self.wiring
+            self.elements, ends, conducts, self.contact_nodes, self.wiring, on_chip
         )
         self.is_temperature = np.zeros(self.size + 1, dtype=bool)
         self.is_temperature[self._T[self._T >= 0]] = True
@@ -88,9 +92,11 @@ class FullSpace(Space):
         (element,), (weights,), _ = self.elements.at_points(np.array([mesh.layout.tip]))
         self.tip = (self._T[self.elements.dofs[element]], weights)
         self.held = {name: int(self._V[self.contact_nodes[name][0]]) for name in self.wiring.held}
+        self.chip = (self._T[on_chip[:1]], np.ones(1)) if on_chip.size else None
         unknowns = np.stack([self._T, self._V])
+        behind = [*self.held.values(), *(self._T[on_chip[:1]].tolist())]
         self._jacobian = SparseJacobian(
-            self.elements, unknowns, self.size, self.held, self.tip, factorisation
+            self.elements, unknowns, self.size, behind, self.tip, factorisation
         )
         self._losses: dict[str, ElementLosses] = {}
         self.air = AirLoss.nothing(self.size + 1)

@@ -109,6 +109,8 @@ class Space(ABC):
         The same for the reader voltage V_r; None without a reader.
     held : dict of str to int
         The unknowns that are potentials of held terminals, see `hotlever.lever.at_points`.
+    chip : tuple of (ndarray of int, ndarray), or None
+        Unknowns and weights that give the rise of leg ends on the chip; None if it stays cold.
     end_test : ndarray, shape (1 + dimension, points)
         Values and slopes of the function that is one at the leg ends.
     end_tests : dict of str to ndarray
@@ -133,6 +135,7 @@ class Space(ABC):
     tip: tuple[Index, Array]
     reader: tuple[Index, Array] | None
     held: Mapping[str, int]
+    chip: tuple[Index, Array] | None
     end_test: Array
     end_tests: Mapping[str, Array]
     elements: FiniteElements
@@ -221,7 +224,8 @@ class Space(ABC):
     ) -> Factors:
         """Put the Jacobians of all states together, the constraint last, and factorise.
 
-        Behind each held terminal is a conductance (mA/V).
+        Behind each held terminal is a conductance (mA/V), and last that of the chip (mW/K), if
+        there is one.
         """
 
 

@@ -7,7 +7,7 @@ Numer. Methods Eng. 8, 198 (1974)). Of cubic triangles a fifth of the unknowns i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -32,8 +32,8 @@ class SparseJacobian:
         Those of temperature and potential at each node, -1 where they are held.
     size : int
         How many there are, without the lever voltage, which has this number itself.
-    held : mapping of str to int
-        Unknowns on whose diagonal there are conductances, by terminal.
+    held : sequence of int
+        Unknowns on whose diagonal there are conductances: held terminals, and the chip.
     tip : tuple of (ndarray of int, ndarray)
         Unknowns and weights that give the rise of the tip temperature.
     options : FactorisationOptions, optional
@@ -44,7 +44,7 @@ class SparseJacobian:
         elements: FiniteElements,
         unknowns: Index,
         size: int,
-        held: Mapping[str, int],
+        held: Sequence[int],
         tip: tuple[Index, Array],
         options: FactorisationOptions | None = None,
     ) -> None:
@@ -70,7 +70,7 @@ class SparseJacobian:
             count**2,  # after all others: dropped
         )
         of_constraint = left[np.append(tip_unknowns, size)] * count + count - 1
-        diagonal = left[np.array(list(held.values()), dtype=int)] * (count + 1)
+        diagonal = left[np.array(held, dtype=int)] * (count + 1)
         every = np.concatenate([keys.ravel(), of_constraint, diagonal])
         unique, slots = np.unique(every, return_inverse=True)
         unique = unique[unique < count**2]
@@ -106,7 +106,7 @@ class SparseJacobian:
     ) -> LinearSolver:
         """Factorise the sum of element matrices, which are used up, with a constraint below.
 
-        Behind each held terminal is a conductance (mA/V).
+        Behind each held terminal is a conductance (mA/V), and last that of the chip (mW/K).
         """
         condensed = self._condensation.of(element_matrices)
         # numpy's stubs overlook that weights make the counts floats

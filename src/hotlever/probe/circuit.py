@@ -51,6 +51,12 @@ class SweptSupply(Record):
     base_temperature_K: float = Field(
         default=BASE_TEMPERATURE_K, ge=250, le=1000, description="of the leg ends"
     )
+    chip_K_per_mW: float = Field(
+        default=0.0,
+        ge=0,
+        le=1000,
+        description="by which leg ends get warmer for the heat that enters the chip by them",
+    )
     bridge_upper_ohm: float | None = _of_bridge("from the bias source to what V_l is compared with")
     bridge_lower_ohm: float | None = _of_bridge("from there to ground")
     bridge_gain: float | None = Field(
@@ -211,12 +217,15 @@ class Wiring:
         Each of one potential that follows from what is behind it: a supply of its own, or ground.
     senses : tuple of str
         No current.
+    on_chip : tuple of str
+        Those whose leg ends share one temperature that follows from the heat into the chip.
     """
 
     swept: str
     grounds: tuple[str, ...]
     held: tuple[str, ...]
     senses: tuple[str, ...]
+    on_chip: tuple[str, ...] = ()
 
     @property
     def measurable(self) -> tuple[str, ...]:
@@ -332,7 +341,10 @@ class Circuit(SweptSupply):
             for name, contact in wired.items()
             if contact.kind == "ground" and not contact.series_resistance_ohm
         )
-        return Wiring(self.swept, bare, tuple(name for name in wired if name not in bare), senses)
+        held = tuple(name for name in wired if name not in bare)
+        warm = self.end_rises() if self.chip_K_per_mW else names
+        on_chip = tuple(name for name in names if name not in warm)
+        return Wiring(self.swept, bare, held, senses, on_chip)
 
     def check(self, terminals: Iterable[str], medium: str, where: str) -> None:
         """Refuse what does not fit some terminals in a medium.

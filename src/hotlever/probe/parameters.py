@@ -11,6 +11,7 @@ import math
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
 from hotlever.materials.parameters import IN_TIME, parameter_named
+from hotlever.probe.chip import CHIP, usual_chip
 from hotlever.probe.circuit import MOST_OFFSET_V
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
@@ -24,6 +25,8 @@ _OF_THE_VALUE, _OF_THE_BASE, _OF_THE_GAS = (0.5, 1.5), (0.8, 1.2), (0.2, 5.0)
 _DIMENSIONS, RESISTANCE = 0.05, 1e-3
 #: Of the base temperature (K): a room, or a hot plate and its thermocouple.
 _BASE_K = 1.0
+#: Of how warm a chip gets, as a share of what is usual: the holder is not known; bounds (K/mW).
+_CHIP, _OF_THE_CHIP = 0.6, (0.01, 100.0)
 #: Of a tip, as far as it is stated: its height, half-angle and radius, from a micrograph.
 _TIP = 0.2
 #: Of what air takes up: humidity, what is around, and dimensions as far as they matter to it.
@@ -177,6 +180,12 @@ def parameters_of(
         add("interface_K_per_mW", _INTERFACE, _OF_THE_INTERFACE)
     add("base_temperature_K", _BASE_K, _OF_THE_BASE)
     table["base_temperature_K"] = table["base_temperature_K"]._replace(relative=False)
+    if anywhere or (probe.circuit.chip_K_per_mW and not in_time):
+        usual = usual_chip(probe)
+        add(CHIP, _CHIP * usual, _OF_THE_CHIP)
+        table[CHIP] = table[CHIP]._replace(
+            scale=usual, lower=_OF_THE_CHIP[0], upper=_OF_THE_CHIP[1], relative=False
+        )
     if probe.circuit.series_resistance_ohm > 0:
         add("series_resistance_ohm", RESISTANCE)
     if probe.circuit.has_bridge:

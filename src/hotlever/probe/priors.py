@@ -19,7 +19,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -27,6 +27,7 @@ from pydantic import Field
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials.departures import DEPARTURES
 from hotlever.materials.parameters import Parameter, own_name
+from hotlever.probe.chip import on_usual_chip
 from hotlever.probe.parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.parts import ProbeParts
 from hotlever.records import StandardError
@@ -64,6 +65,8 @@ _AS_A_FACTOR = 0.4
 Written = Literal["unit", "share", "factor"]
 _PRIOR = re.compile(r"([^±/]{0,40}?)(±|[×xX*] ?/)([^±/]{1,40})")
 _LARGEST_FACTOR = 1000.0
+
+ProbesParts = TypeVar("ProbesParts", bound=ProbeParts)
 
 
 @dataclass(frozen=True)
@@ -261,6 +264,16 @@ def updated(
         exact |= DEPARTURES.keys()
     names = {name for law in exact for name in _names_of_law(law, probe)}
     return {name: prior for name, prior in priors.items() if name not in names} | anew
+
+
+def as_known(probe: ProbesParts, stated: Mapping[str, Prior | str] | None) -> ProbesParts:
+    """Return a probe as far as its priors say more than its file: on a chip as is usual.
+
+    Not where priors are none, or laws the paper's, whose leg ends stay at the base temperature.
+    """
+    texts = {**probe.stated_priors, **(stated or {})}
+    nothing = stated is not None and not stated
+    return on_usual_chip(probe, without=nothing or texts.get(ALL_LAWS) == PAPERS)
 
 
 def is_of_laws(name: str) -> bool:

@@ -131,6 +131,10 @@ class ReducedSpace(Space):
         self.thickness_um, self.plate_um = full.thickness_um, full.plate_um
         unknowns, weights = full.tip
         self.tip = (np.arange(self.count), modes_T[:, unknowns] @ weights)
+        self.chip = None
+        if full.chip is not None:
+            unknowns, weights = full.chip
+            self.chip = np.arange(self.count), modes_T[:, unknowns] @ weights
         self.reader = None
         if full.reader is not None:
             unknowns, weights = full.reader
@@ -233,6 +237,8 @@ class ReducedSpace(Space):
             self._assemble(tangent.of(state), matrices[state])
             of_modes = matrices[state, : self.count, : self.count]
             of_modes += self.air.matrix(surface.kappa[:, state], surface.taken_up)
+            if self.chip is not None:
+                of_modes += conductance[-1] * np.multiply.outer(self.chip[1], self.chip[1])
             for name, slopes in surface.at_points.items():
                 seen = getattr(self, name).temperature.matrix
                 of_modes += seen.T @ (slopes[:, [state]] * seen)

@@ -52,9 +52,11 @@ def can_be_reduced(probe: Probe, names: Collection[str]) -> bool:
 
     With dimensions among the parameters it does not, since its modes are those of one geometry, nor
     in another circuit than the paper's, nor with effects beyond the paper or a tip in contact: with
-    these a scale of κ changes more than the power, and the two polarities may differ.
+    these a scale of κ changes more than the power, and the two polarities may differ. A chip that
+    gets warmer does not scale with κ either.
     """
-    plain = probe.circuit.is_plain and not probe.physics and probe.contact is None
+    circuit = probe.circuit
+    plain = circuit.is_plain and not (circuit.chip_K_per_mW or probe.physics or probe.contact)
     return plain and set(names) <= set(of_materials(probe))
 
 

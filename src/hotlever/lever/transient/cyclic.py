@@ -131,6 +131,7 @@ def cyclic_steady_state(
     What is left of the beginning decays with the slowest modes. From a few periods it is
     extrapolated away by reduced rank extrapolation (Sidi, J. Comput. Appl. Math. 36, 305 (1991)).
     """
+    lever = lever.in_pulses()
     options["tolerance_K"] = tolerance_K
     starts, last_K = [initial_state(lever, waveform) if start is None else start], 0.0
     for _ in range(_MOST):

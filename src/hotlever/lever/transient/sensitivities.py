@@ -88,7 +88,7 @@ def with_sensitivities(
     HistoryEndError, ComputationError
         If silicon melts, or a step fails.
     """
-    times = checked_times(at)
+    lever, times = lever.in_pulses(), checked_times(at)
     if waveform.before_V != 0.0:
         raise InputError(f"found a wave form that begins at {waveform.before_V:g} V, expected 0 V")
     if not names:

@@ -72,6 +72,7 @@ def simulate(
     >>> history.tip_K.values.round().tolist()
     [410.0, 293.0]
     """
+    lever = lever.in_pulses()
     end, period = waveform.usual_end if until is None else until, waveform.period
     if at is not None and until is None:
         end = float(checked_times(at)[-1])

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import norm, qmc
 
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.probe.priors import Prior, default_priors
+from hotlever.probe.priors import Prior, as_known, default_priors
 from hotlever.steps import each
 from hotlever.studies.validation.case import Case, Stored
 from hotlever.text import BAND
@@ -146,7 +146,8 @@ def predict(case: Case, progress: Progress | None = None) -> Prediction:
         If too many of the draws do not show it.
     """
     probe, (_, uncertain) = case.probe(), case.numbers()
-    priors: dict[str, Prior] = {**({} if probe is None else default_priors(probe)), **uncertain}
+    known = {} if probe is None else default_priors(as_known(probe, None))
+    priors: dict[str, Prior] = {**known, **uncertain}
     draws = norm.ppf(qmc.LatinHypercube(len(priors), seed=_SEED).random(DRAWS))
     values, impossible = [], 0
     for draw in each(list(draws), progress):
