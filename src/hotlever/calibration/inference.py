@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import xarray as xr
 from scipy.special import chdtrc
 
 from hotlever.calibration.calibration import Calibration, rms
@@ -27,11 +28,12 @@ from hotlever.calibration.uncertainty_budget import BudgetOf, budget_of_estimate
 from hotlever.errors import ComputationError, counted
 from hotlever.estimation import Fit, FitOptions, Measurement
 from hotlever.estimation.diagnosis import lack_of_fit_text, outlier_notes, run_of_outliers
-from hotlever.estimation.experiment import PredictionAtRest
+from hotlever.estimation.experiment import TIP, PredictionAtRest
 from hotlever.estimation.inverse_problem import Estimate, estimate
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
+from hotlever.measurands import FITTED, OF_A_CONTACT
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.priors import (
@@ -44,6 +46,7 @@ from hotlever.probe.priors import (
     published_material,
     updated,
 )
+from hotlever.spieser2017 import RAMAN_ERROR_K, RAMAN_ERROR_SHARE
 from hotlever.types import Array, Progress
 
 #: Share of the measured biases that a lever must reach to show the data.
@@ -54,6 +57,9 @@ _FEW = 6
 _COARSE, _EVEN = 0.01, 0.02
 #: A lever is cold that was never hotter (K).
 _COLD_K = 400.0
+#: Observables that are temperatures of the tip or of what it touches, and spectra that are offered
+#: where there are none.
+_OF_A_TIP, _SPECTRA = {"tip", *OF_A_CONTACT}, 5
 #: Data are not described where parameters are as far from their priors as one lever in 500 is.
 _UNLIKELY = 2e-3
 #: The same where data and all other priors are so many standard deviations from one prior: of the
@@ -170,6 +176,7 @@ def calibrated_by_estimate(
     notes = [*what_data_lack(measured, circuit, tip.table.tip_K.values), *estimate.notes]
     notes += [tip.asymmetry] if tip.asymmetry and not reason else []
     notes += [jump.note for jump in tip.jumps]
+    notes += [] if reason else what_spectra_would_do(estimate, tip.table)
     notes += outlier_notes(estimate.residuals, estimate.prediction.values, robust=True)
     own, lever = estimate.branch, Lever(probe.in_medium("vacuum"), COARSE)
     vacuum = lever.branch()
@@ -222,6 +229,39 @@ def calibrated_by_estimate(
         converged=converged,
         notes=notes,
     )
+
+
+def what_spectra_would_do(estimate: Estimate, table: xr.Dataset) -> list[str]:
+    """Say how well a lever without tip temperatures is known, and how well it would be with some.
+
+    They are spectra at even tip temperatures, with the errors that those of the paper have. There
+    is nothing to say where nothing was known beforehand.
+    """
+    if not estimate.objective.informed or set(estimate.residuals.observables) & _OF_A_TIP:
+        return []
+    tip = table.tip_K.values
+    rise = tip - estimate.probe.circuit.base_temperature_K
+    even = np.linspace(tip.min(), tip.max(), _SPECTRA + 1)[1:]
+    spots = np.unique([int(np.argmin(np.abs(tip - each))) for each in even])
+    predicted = estimate.predicted(table.bias_V.values[spots])
+    slopes = predicted.slopes[TIP][:, estimate.objective.columns]
+    error = np.hypot(RAMAN_ERROR_K, RAMAN_ERROR_SHARE * rise[spots])
+    together = slopes @ estimate.posterior.covariance @ slopes.T
+    # their thermometer's scale is an error that they share
+    shared = np.outer(rise[spots], rise[spots]) * RAMAN_ERROR_SHARE**2
+    noise = np.diag(error**2) + shared
+    left = together - together @ np.linalg.solve(together + noise, together)
+    hottest = int(np.argmax(rise[spots]))
+    now, then = (
+        100.0 * float(np.sqrt(covariance[hottest, hottest])) / rise[spots][hottest]
+        for covariance in (together, left)
+    )
+    seen = " and ".join(FITTED[name].symbol for name in estimate.residuals.observables)
+    return [
+        f"from {seen} alone the rise of its hottest tip is known to ± {now:.2g} %; {_SPECTRA} "
+        f"Raman spectra of ± {RAMAN_ERROR_K:g} K and {RAMAN_ERROR_SHARE:.0%} of the rise would "
+        f"make it ± {then:.2g} %"
+    ]
 
 
 def _weights(measured: Measurement, estimate: Estimate) -> dict[str, Array] | None:

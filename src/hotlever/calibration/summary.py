@@ -33,6 +33,8 @@ _ADVICE = {
     "measurement": "less noise, or tip temperatures at some points, would help",
     "geometry": "better known dimensions would help (--prior dimensions=±2%)",
     "material": "a fit of this lever (--fit), or its tip temperatures, would know its material",
+    "laws": "tip temperatures at some points would help; what is known better of a law may be said "
+    "(--prior law.n_i=±5%)",
     "fit": "more data for the fit would help",
     "air": "a fit in air would measure the loss to air",
     "k": "a finer measurement near the knee would help",
