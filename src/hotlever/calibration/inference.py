@@ -33,11 +33,11 @@ from hotlever.estimation.inverse_problem import Estimate, estimate
 from hotlever.estimation.prior_density import PriorDensity
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
-from hotlever.measurands import FITTED, OF_A_CONTACT
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.priors import (
     SCALES,
+    THERMOMETER,
     Prior,
     PriorUse,
     as_known,
@@ -46,7 +46,8 @@ from hotlever.probe.priors import (
     published_material,
     updated,
 )
-from hotlever.spieser2017 import RAMAN_ERROR_K, RAMAN_ERROR_SHARE
+from hotlever.quantities import FITTED, OF_A_CONTACT
+from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.types import Array, Progress
 
 #: Share of the measured biases that a lever must reach to show the data.
@@ -245,11 +246,10 @@ def what_spectra_would_do(estimate: Estimate, table: xr.Dataset) -> list[str]:
     spots = np.unique([int(np.argmin(np.abs(tip - each))) for each in even])
     predicted = estimate.predicted(table.bias_V.values[spots])
     slopes = predicted.slopes[TIP][:, estimate.objective.columns]
-    error = np.hypot(RAMAN_ERROR_K, RAMAN_ERROR_SHARE * rise[spots])
-    together = slopes @ estimate.posterior.covariance @ slopes.T
     # their thermometer's scale is an error that they share
-    shared = np.outer(rise[spots], rise[spots]) * RAMAN_ERROR_SHARE**2
-    noise = np.diag(error**2) + shared
+    shared = np.outer(rise[spots], rise[spots]) * THERMOMETER**2
+    noise = np.diag(np.full(spots.size, RAMAN_ERROR_K**2)) + shared
+    together = slopes @ estimate.posterior.covariance @ slopes.T
     left = together - together @ np.linalg.solve(together + noise, together)
     hottest = int(np.argmax(rise[spots]))
     now, then = (
@@ -259,7 +259,7 @@ def what_spectra_would_do(estimate: Estimate, table: xr.Dataset) -> list[str]:
     seen = " and ".join(FITTED[name].symbol for name in estimate.residuals.observables)
     return [
         f"from {seen} alone the rise of its hottest tip is known to ± {now:.2g} %; {_SPECTRA} "
-        f"Raman spectra of ± {RAMAN_ERROR_K:g} K and {RAMAN_ERROR_SHARE:.0%} of the rise would "
+        f"Raman spectra of ± {RAMAN_ERROR_K:g} K and {100.0 * THERMOMETER:g} % of the rise would "
         f"make it ± {then:.2g} %"
     ]
 
