@@ -61,7 +61,8 @@ def test_tip_temperatures_bring_them_up_to_date():
     calibration = calibrate(spectra, probe=Probe.reference())
     error, stated = off(calibration, branch)
     assert abs(error) < 2.0 * stated
-    assert stated < 6.0
+    # most of it is the thermometer's scale, 1.5 % of the rise
+    assert stated < 9.0
     law = DEPARTURES["n_i"]
     uses = [calibration.priors[name] for name in law.names]
     departed = np.array([use.posterior_value for use in uses]) @ law.modes(AT_K)

@@ -180,9 +180,10 @@ def parameters_of(
         add("interface_K_per_mW", _INTERFACE, _OF_THE_INTERFACE)
     add("base_temperature_K", _BASE_K, _OF_THE_BASE)
     table["base_temperature_K"] = table["base_temperature_K"]._replace(relative=False)
-    if anywhere or (probe.circuit.chip_K_per_mW and not in_time):
+    if anywhere or probe.circuit.chip_K_per_mW:
         usual = usual_chip(probe)
-        add(CHIP, _CHIP * usual, _OF_THE_CHIP)
+        # in pulses the spreading counts alone, which is known
+        add(CHIP, None if in_time else _CHIP * usual, _OF_THE_CHIP)
         table[CHIP] = table[CHIP]._replace(
             scale=usual, lower=_OF_THE_CHIP[0], upper=_OF_THE_CHIP[1], relative=False
         )

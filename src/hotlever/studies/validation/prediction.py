@@ -146,8 +146,8 @@ def predict(case: Case, progress: Progress | None = None) -> Prediction:
         If too many of the draws do not show it.
     """
     probe, (_, uncertain) = case.probe(), case.numbers()
-    known = {} if probe is None else default_priors(as_known(probe, None))
-    priors: dict[str, Prior] = {**known, **uncertain}
+    of_lever = {} if probe is None else default_priors(as_known(probe, None))
+    priors: dict[str, Prior] = {**of_lever, **uncertain}
     draws = norm.ppf(qmc.LatinHypercube(len(priors), seed=_SEED).random(DRAWS))
     values, impossible = [], 0
     for draw in each(list(draws), progress):
