@@ -129,7 +129,7 @@ def test_a_terminal_of_few_characters_gets_escapes(tmp_path, encoding):
     environment = {**os.environ, "PYTHONIOENCODING": encoding}
     done = subprocess.run([*COMMAND, "probe", "new"], capture_output=True, env=environment)
     assert (done.returncode, done.stderr) == (0, b"")
-    assert rb"c_\u03ba" in done.stdout
+    assert rb"profile, \u0394" in done.stdout
 
 
 @pytest.mark.parametrize(
