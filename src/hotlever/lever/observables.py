@@ -127,10 +127,10 @@ def by_parameter(
 
     The constraint is fixed; if it is the rise of the tip, that does not change. Beside those of the
     material the parameters may be dimensions whose motions the equations know. The states have
-    power; factors are those of these very states. Adjoint: one solve for each quantity that changes
-    and each state, however many parameters there are.
+    power; factors are those of these very states. Without, each state is factorised and solved for
+    before the next, whose pivots it has then, and memory. Adjoint: one solve for each quantity that
+    changes and each state, however many parameters there are.
     """
-    factors = factors or equations.factorised(x, constraint)
     direct, of_tip = equations.by_parameter(x, names), equations.tip_by_parameter(x, names)
     missing = -direct
     missing[-1] = -np.reshape(constraint.tip, (-1, 1)) * of_tip
@@ -140,7 +140,10 @@ def by_parameter(
         tip = np.zeros((*x.shape, 1))
         tip[unknowns, :, 0] = weights[:, None]
         gradient = np.concatenate([gradient, tip], axis=-1)
-    adjoint = factors.solve(gradient, np.arange(x.shape[1]), transposed=True)
+    adjoint, every = np.empty_like(gradient), np.arange(x.shape[1])
+    for some in every[:, None] if factors is None else [every]:
+        own = factors or equations.factorised(x[:, some], constraint.among(some))
+        adjoint[:, some] = own.solve(gradient[:, some], some - some[0], transposed=True)
     output_slopes = np.zeros((x.shape[1], TIP_RISE + 1, len(names)))
     output_slopes[:, : gradient.shape[-1]] = np.einsum("sno,snk->nok", adjoint, missing)
     output_slopes[:, 1] += direct[-1]
