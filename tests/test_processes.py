@@ -8,13 +8,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import psutil
 import pytest
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.processes import Patience, local_executor, run_all
+from hotlever.processes import Patience, WorkerDiedError, local_executor, run_all
 
 # --- tasks --------------------------------------------------------------------------------------
 
@@ -99,6 +100,27 @@ def test_a_worker_that_takes_too_long_is_replaced(tmp_path):
     with local_executor(2, Patience(task_s=2.0)) as workers:
         tasks = [(str(tmp_path / name),) for name in "ab"]
         assert dict(run_all(workers, stop_once, tasks)) == dict.fromkeys(range(2), "done")
+
+
+def test_processes_stopped_at_work_are_ended_by_one_thread_at_a_time(tmp_path, monkeypatch):
+    """By whoever ends all, or by the thread that hears of the death: both would close one pipe."""
+    shutdown, inside, most = ProcessPoolExecutor.shutdown, [], []
+
+    def slowly(self, **how):
+        inside.append(self)
+        time.sleep(0.3)
+        most.append(inside.count(self))
+        shutdown(self, **how)
+        inside.remove(self)
+
+    monkeypatch.setattr(ProcessPoolExecutor, "shutdown", slowly)
+    with local_executor(1) as workers:
+        task = workers.submit(stop_once, str(tmp_path / "mark"))
+        while not (tmp_path / "mark").exists():
+            time.sleep(0.01)
+    assert isinstance(task.exception(), WorkerDiedError)
+    # by both, one after the other
+    assert most == [1, 1]
 
 
 def test_nobody_can_connect_to_them():

@@ -276,7 +276,9 @@ class LocalExecutor:
             pool.submit(int).result(self.patience.start_s)
             return pool.submit(_call, task).result(self.patience.task_s)
         except (BrokenExecutor, TimeoutError) as error:
-            _kill(pool)
+            # not while all are ended: two threads would close the same pipe
+            with self._lock:
+                _kill(pool)
             pool = self._new_pool()
             raise WorkerDiedError from error
         finally:
