@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever import InputError, read_measurement
+from hotlever.lever.transient.waveform import read_waveform
 from hotlever.measurement import file_groups
 from hotlever.tables.binary import TDMS
 
@@ -108,3 +109,11 @@ def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"iv\.tdms: .*pip install 'hotlever\[tdms\]'") as error:
         read_measurement(path)
     assert "\n" not in str(error.value)
+
+
+def test_where_a_group_cannot_be_named_a_file_of_one_is_asked_for(tmp_path):
+    pulse = [("t", "us", np.sort(BIAS)), ("V_b", "V", np.sort(BIAS))]
+    path = written(tmp_path / "wave.tdms", pulse, pulse)
+    with pytest.raises(InputError, match=r"'sweep 1'; expected a file of one group$"):
+        read_waveform(path)
+    assert read_waveform(written(tmp_path / "one.tdms", pulse)).volts[-1] == 8.25

@@ -227,10 +227,21 @@ def name_and_unit(heading: str) -> tuple[str, str | None]:
     for mark in _BETWEEN:
         name, _, unit = heading.rpartition(mark)
         name, unit = name.strip(" _/,"), unit.strip()
-        of_time = name.casefold() in TIMES and conversion(unit, "s") is not None
-        if name and (is_unit(unit) or of_time):
+        if name and is_unit_of(name, unit):
             return name, unit
     return heading, None
+
+
+def is_unit_of(name: str, unit: str) -> bool:
+    """Whether a column of some name may have a unit; that of a time is one of a time only.
+
+    Examples
+    --------
+    >>> is_unit_of("time", "s"), is_unit_of("V", "s"), is_unit_of("V", "mV")
+    (True, False, True)
+    """
+    of_time = name.casefold() in TIMES and conversion(unit, "s") is not None
+    return of_time or is_unit(unit)
 
 
 def key_and_value(line: str) -> tuple[str, str]:
@@ -291,12 +302,14 @@ def plain_powers(text: str) -> str:
     return re.sub(r"(?<![\d.,])10\^(?=[-+]?\d)", "1e", text)
 
 
-def may_be_thousands(number: str) -> bool:
-    """Whether a number such as ``10,000`` may be ten or ten thousand."""
-    return re.match(r"[-+]?\d{1,3},\d{3}(?!\d)", number, re.ASCII) is not None
+def may_be_thousands(number: str, marks: str = ",") -> bool:
+    """Whether a number such as ``10,000`` may be ten or ten thousand, by one of some marks."""
+    return re.match(rf"[-+]?\d{{1,3}}[{marks}]\d{{3}}(?!\d)", number, re.ASCII) is not None
 
 
-def amount(text: str, unit: str | None, inside: str, where: str) -> float | None:
+def amount(
+    text: str, unit: str | None, inside: str, where: str, thousands: str = ","
+) -> float | None:
     """Return what a text such as ``5.6 kOhm (four wires)`` is in another unit; None if unclear.
 
     Parameters
@@ -307,6 +320,8 @@ def amount(text: str, unit: str | None, inside: str, where: str) -> float | None
         If it is not, or not only, behind the number.
     inside, where : str
         The unit wanted, and what an error begins with.
+    thousands : str
+        Signs that may stand between thousands, so that ``10,000`` is unclear.
 
     Raises
     ------
@@ -326,9 +341,11 @@ def amount(text: str, unit: str | None, inside: str, where: str) -> float | None
         raise unknown_unit(unit, inside, where)
     # as in 5.6x, or with a setting of something else behind it
     odd = (behind is None and rest[:1].strip(" ,;([±")) or re.search("[=:]", rest)
-    if number is None or odd or may_be_thousands(text):
+    unclear = may_be_thousands(text, thousands)
+    if number is None or odd or unclear:
         if unit is not None:
-            raise InputError(f"{where}: found '{excerpt(text)}', expected a number")
+            without = " without marks of thousands" * unclear
+            raise InputError(f"{where}: found '{excerpt(text)}', expected a number{without}")
         return None
     return None if scale is None or behind not in (None, scale) else scale[0] * number + scale[1]
 

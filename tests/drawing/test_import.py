@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import ezdxf
 import gdstk
 import numpy as np
 import pytest
@@ -120,6 +121,30 @@ def test_layers_that_are_nothing_of_the_lever_do_not_disturb(run, tmp_path):
         "–",
         "–",
     ]
+
+
+def test_a_frame_around_a_lever_is_no_terminal(run, tmp_path):
+    document = ezdxf.readfile(pointed_lever(tmp_path / "lever.dxf"))
+    document.modelspace().add_lwpolyline(box(-10, -30, 70, 30), close=True)
+    document.saveas(tmp_path / "lever.dxf")
+    probe, out, _ = imported(run, tmp_path, "lever.dxf")
+    assert re.search(r"^0 +1 +4800 .* –$", out, re.M)
+    assert {terminal.name for terminal in probe.layout().terminals} == {"supply", "ground"}
+
+
+def test_lines_that_are_drawn_twice_are_one_outline(run, tmp_path):
+    document = ezdxf.readfile(pointed_lever(tmp_path / "lever.dxf"))
+    space = document.modelspace()
+    once, *_ = imported(run, tmp_path, "lever.dxf")
+    for number, line in enumerate(space.query('LINE[layer=="SI"]')):
+        start, end = line.dxf.start, line.dxf.end
+        # all of it, or a part
+        space.add_line(end, start if number else start.lerp(end), dxfattribs={"layer": "SI"})
+    document.saveas(tmp_path / "lever.dxf")
+    probe, out, _ = imported(run, tmp_path, "lever.dxf")
+    assert re.search("^SI .* silicon$", out, re.M)
+    areas = [sum(region.area for region in each.layout().regions) for each in (once, probe)]
+    assert areas[1] == pytest.approx(areas[0], rel=1e-6)
 
 
 def test_what_cannot_be_told_is_left_to_the_user(run, tmp_path):

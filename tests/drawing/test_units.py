@@ -102,6 +102,20 @@ def test_gdsii_and_oasis_in_another_unit(run, tmp_path, kind):
     assert area(Probe.from_file(tmp_path / "own.toml")) == pytest.approx(732.1, abs=0.1)
 
 
+def test_a_dxf_in_mils_is_read_and_an_unknown_unit_is_named(run, tmp_path, lever_um2):
+    document = ezdxf.readfile(unitless(tmp_path / "own.dxf", 1.0))
+    for entity in document.modelspace():
+        entity.scale(1 / 25.4, 1 / 25.4, 1 / 25.4)
+    document.units = 9
+    document.saveas(tmp_path / "own.dxf")
+    assert area(read(tmp_path, tmp_path / "own.dxf")) == pytest.approx(lever_um2, rel=1e-4)
+    document.units = 21
+    document.saveas(tmp_path / "own.dxf")
+    status, _, err = run("probe", "import", "own.dxf")
+    assert status == 2
+    assert "$INSUNITS, 21, is no unit that is understood; say it with --unit" in err
+
+
 def test_a_unit_that_does_not_exist(run, tmp_path):
     pointed_lever(tmp_path / "own.dxf")
     status, _, err = run("probe", "import", "own.dxf", "--unit", "inches")

@@ -25,11 +25,8 @@ ADVERSARIAL = [
 #: What is refused, and the words of the line.
 REFUSED = {
     "thousands": lab(WITH_TABS + "1\t143\n2\t285\n8\t1,041\n"),
-    "thousands and decimals": lab(WITH_TABS + "1\t143.4\n8\t1,041.5\n"),
     "thousands with commas": lab(IV + "1,143.4\n8,1,041.5\n"),
-    "thousands with points": lab("V_b (V);I_h (µA)\n1;143,4\n8;1.041,5\n"),
     "thousands with blanks": lab("V_b (V);I_h (µA)\n1;143,4\n8;1 041,5\n"),
-    "thousands with apostrophes": lab("V_b (V);I_h (µA)\n1;143.4\n8;1'041.5\n"),
     "decimal commas between commas": lab(IV + "1,0,0,1434\n2,0,0,2849\n"),
     "two decimal signs": lab("V_b (V);I_h (mA)\n1,0;0.14\n2,0;0.28\n"),
     "no units": lab("V_b,I_h\n1,0.14\n"),
@@ -79,11 +76,8 @@ REFUSED = {
 }
 WORDS = {
     "thousands": "line 4: I_h: '1,041' may be 1.041 or 1041, expected numbers without marks of",
-    "thousands and decimals": "line 3: I_h: found '1,041.5', expected a number",
     "thousands with commas": "line 3: 3 cells, expected 2 as in line 1",
-    "thousands with points": "line 3: I_h: found '1.041,5', expected a number with a decimal comma",
     "thousands with blanks": "line 3: I_h: found '1 041,5', expected a number",
-    "thousands with apostrophes": "line 3: I_h: found '1'041.5', expected a number",
     "decimal commas between commas": "line 2: 4 cells, expected 2 .*tabs or semicolons must",
     "two decimal signs": "line 2: I_h: found '0.14', expected a number with a decimal comma",
     "no units": r"line 1: column 'V_b' has no unit.*--column 'V_b \(V\)=V_b' gives one",

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from hotlever.errors import InputError
 from hotlever.raman.fit import fit_peak
 from hotlever.raman.reading import read_file, read_spectra, read_spectrum, spectrum_files
+from hotlever.raman.series import measure
 from hotlever.raman.spectrum import temperature_in_metadata, temperature_in_name
 from hotlever.tables import find_tables
 
@@ -221,7 +222,7 @@ BAD = {
     "binary": (bytes(range(256)) * 20, "a binary file"),
     "picture": (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR" + bytes(99), "a binary file"),
     "prose": (b"Dear all,\nhere is no spectrum.\nYours\n", "no table of numbers"),
-    "page": (b"<html><body><p>404</p></body></html>", "no table of numbers"),
+    "page": (b"<html><body><p>404</p></body></html>", "an XML or HTML file"),
     "one column": ("\n".join(map(str, range(400, 600))).encode(), "one column"),
     "bias log": (
         b"V_b (V),I_h (mA)\n" + b"".join(b"%d.5,0.%d\n" % (i, i) for i in range(1, 40)),
@@ -370,3 +371,20 @@ def test_saturated_real_spectrum_is_flagged(real_spectra: list[Path]):
     assert "saturated" in peak.flags
     assert spectrum.metadata["Instrument"] == "LabRAM HR Evol"
     assert spectrum.temperature is None  # "Temperature= 0" has no unit
+
+
+@pytest.mark.parametrize("word", ["OVERFLOW", "NaN", "9.91E37", "", "#N/A"])
+def test_a_line_whose_top_has_no_values_is_saturated(tmp_path, word):
+    x = np.arange(440.0, 600.0, 0.6)
+    y = np.random.default_rng(3).poisson(200.0 + 5000.0 / (1.0 + ((x - 520.7) / 1.6) ** 2))
+    for name, gaps in {"top": y > 3500, "flank": np.abs(x - 525.0) < 0.4}.items():
+        cells = [word if gap else str(count) for gap, count in zip(gaps, y.tolist(), strict=True)]
+        lines = (f"{place:.3f},{cell}" for place, cell in zip(x, cells, strict=True))
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines))
+    flank, top = measure(read_spectra([tmp_path]))
+    assert "saturated" in top.flags
+    assert "saturated" not in flank.flags
+    assert top.peak.clipped == pytest.approx((x[y > 3500][0], x[y > 3500][-1]), abs=1e-3)
+    assert abs(top.peak.centre - 520.7) < 3.0 * top.peak.centre_stderr < 1.0
+    # the flanks alone say less of the centre
+    assert top.peak.centre_stderr > flank.peak.centre_stderr

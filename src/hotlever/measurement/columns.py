@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hotlever.errors import InputError, excerpt, unknown_name
+from hotlever.errors import InputError, counted, excerpt, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
 from hotlever.quantities import FITTED, MEASURANDS, PLAIN
@@ -182,7 +182,13 @@ def measured_table(path: str | os.PathLike[str], assigned: Sequence[Assignment])
         return named or bool({name.casefold(), bare.casefold()} & headings)
 
     expected = "one like 'V_b (V),I_h (mA),V_r (mV)'"
-    return read_table(path, expected, is_heading=is_heading, group=group)
+    return read_table(
+        path,
+        expected,
+        is_heading=is_heading,
+        group=group,
+        group_stated_by=f"--column '{GROUP}={{group}}'",
+    )
 
 
 def find_columns(
@@ -308,6 +314,12 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
             f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside a "
             f"wave form; another name with --column 't (s)={excerpt(table.names[0]) or 1}'"
         )
+    others, rows = len(table.names) - len(columns), len(table.rows)
+    if columns and not table.is_named and others > rows:
+        raise InputError(
+            f"{table.where(-1)}: {counted(rows, 'row')} of {len(table.names)} numbers without a "
+            "header row, expected a row for each bias: are rows and columns swapped?"
+        )
     observed = {
         *(column.symbol for column in FITTED.values()),
         *([LEVER] if TIME in columns else []),
@@ -356,6 +368,22 @@ def note_on_bias(
         f"{table.path}: {bias.origin} is the only voltage and counts as the bias; if it is "
         f"that over the lever, say {_assignment(LEVER, bias.heading)}"
     ]
+
+
+def note_on_header(table: TextTable, assigned: Sequence[Assignment]) -> list[str]:
+    """Say what was taken for the header row where nobody knows a heading in it."""
+    names = [name for name in table.names if name.strip()]
+    assigned_names = {each.heading.casefold() for each in of_columns(assigned)}
+
+    def is_known(name: str) -> bool:
+        bare, unit = name_and_unit(name)
+        is_assigned = bool({name.casefold(), bare.casefold()} & assigned_names)
+        return is_assigned or unit is not None or quantity_of(name) is not None
+
+    if not names or any(map(is_known, names)):
+        return []
+    row = ", ".join(f"'{excerpt(name)}'" for name in names[:_MOST_NAMES])
+    return [f"{table.where(-1)}: {row} is taken for the header row"]
 
 
 def note_on_unused(table: TextTable, columns: Mapping[str, Column]) -> list[str]:

@@ -109,10 +109,12 @@ class Settings:
         """
         settings = cls()
         mentioned: list[tuple[str, str]] = []
+        # beside decimal commas a point may be a mark of thousands too
+        thousands = ",." if table.dialect.decimal_comma else ","
         for line, text in table.comments:
             where = f"{table.path}: line {line}"
             for part in _BETWEEN.split(text):
-                values = _setting(part, where)
+                values = _setting(part, where, thousands)
                 if values is None:
                     settings.notes.append(
                         f"{where}: '{excerpt(part)}' is not understood and not used, expected a "
@@ -175,7 +177,7 @@ class Settings:
             self.put("gas_conductivity", NITROGEN, f"{self.origin['medium']}, nitrogen")
 
 
-def _setting(text: str, where: str) -> dict[str, Any] | None:
+def _setting(text: str, where: str, thousands: str) -> dict[str, Any] | None:
     """Return what a comment sets, nothing where it is another comment, None where it is unclear."""
     if len(text) > _LONGEST_COMMENT:
         return None
@@ -191,12 +193,14 @@ def _setting(text: str, where: str) -> dict[str, Any] | None:
     attribute = "pressure_mbar" if bare.endswith("pressure") else _SPELLINGS.get(bare)
     if value and attribute == "medium":
         return _gas(value, where) if bare == "medium" or _words(value) & _GASES else None
+    if value and attribute == "pressure_mbar" and unit is None and _words(value) & _GASES:
+        return _gas(value, where)
     if value and attribute == "raman_scale":
         return {attribute: share_of(value[:_LONGEST], f"{where}: {attribute}")}
     if value and attribute:
         setting, inside = _SETTINGS[attribute]
         where = f"{where}: {setting}"
-        converted = amount(value[:_LONGEST], unit, inside, where)
+        converted = amount(value[:_LONGEST], unit, inside, where, thousands)
         if converted is None:
             return None
         if attribute != "pressure_mbar":

@@ -20,6 +20,7 @@ from hotlever.measurement.columns import (
     is_taken_as_bias,
     measured_table,
     note_on_bias,
+    note_on_header,
     note_on_unused,
     of_columns,
     quantity_of,
@@ -99,7 +100,11 @@ def read_measurement(
         series_ohm = circuit.series_resistance_ohm if circuit and assumed else 0.0
         order = _complete_at_rest(contents, circuit, series_ohm, symmetric=not signed)
     unused = note_on_unused(table, quantities)
-    notes = [*contents.notes, *note_on_bias(table, quantities, assigned)]
+    notes = [
+        *note_on_header(table, assigned),
+        *contents.notes,
+        *note_on_bias(table, quantities, assigned),
+    ]
     more = len(notes) - _MOST_NOTES
     if more > 0:
         notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]

@@ -15,6 +15,7 @@ that one's weight.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -107,6 +108,39 @@ def fit_peak(x: Array, y: Array, options: PeakOptions | None = None, where: str 
             f"{prefix}no silicon line found between {LINE_RANGE[0]:g} and {LINE_RANGE[1]:g} cm⁻¹"
         )
     return peak
+
+
+def with_hidden_top(peak: Peak, x: Array, gaps: Sequence[float]) -> Peak:
+    """Return a line as clipped if its top is among the samples without a value.
+
+    Beyond its range a detector may write that there is no number, or none at all.
+
+    Parameters
+    ----------
+    peak : Peak
+    x : (n,) array
+        The samples that have a value, cm⁻¹.
+    gaps : sequence of float
+        Those that have none.
+    """
+    below, above = x[x <= peak.centre].max(initial=-np.inf), x[x > peak.centre].min(initial=np.inf)
+    top = [gap for gap in gaps if below < gap < above]
+    if not top or peak.clipped is not None:
+        return peak
+    return replace(
+        peak,
+        centre_stderr=_of_flanks(peak.centre_stderr, peak.centre, min(top), max(top)),
+        clipped=(min(top), max(top)),
+        flags=("saturated", *peak.flags),
+    )
+
+
+def _of_flanks(error: float, centre: float, low: float, high: float) -> float:
+    """Return the error of a centre by the flanks of a line that is clipped between two places.
+
+    They disagree with the middle of what is hidden by as much as detector blooming skews them.
+    """
+    return math.hypot(error, centre - 0.5 * (low + high))
 
 
 def _step(x: Array) -> float:
@@ -388,8 +422,7 @@ def _peak(solution: Solution) -> Peak | None:
     ends, centre_error = None, growth * float(errors[At.CENTRE])
     if clipped is not None:
         ends = (float(x[clipped.start]), float(x[clipped.stop - 1]))
-        # the flanks disagree with the clipped top by as much as detector blooming skews them
-        centre_error = math.hypot(centre_error, centre - 0.5 * sum(ends))
+        centre_error = _of_flanks(centre_error, centre, *ends)
     return Peak(
         centre=centre,
         centre_stderr=centre_error,

@@ -334,7 +334,7 @@ class Peak:
     misfit: float = 1.0
     samples: int = 0  #: fitted
     spikes: tuple[float, ...] = ()  #: places of the samples left out as cosmic rays
-    clipped: tuple[float, float] | None = None  #: ends of the flat top that was left out
+    clipped: tuple[float, float] | None = None  #: ends of the top that was left out
     #: Of "cosmic-ray", "saturated", "low-shoulder", "low-band", "edge", "coarse", "misfit" and
     #: "band-in-doubt".
     flags: tuple[str, ...] = ()

@@ -81,9 +81,12 @@ def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
     of_file = temperature_in_name(inside.stem)
     for index, (name, spectrum) in enumerate(zip(names, spectra, strict=True)):
         x, y = _checked(spectrum.x, spectrum.y, str(file.with_name(name)))
+        empty = np.isfinite(spectrum.x) & ~np.isfinite(spectrum.y)
+        gaps = tuple(np.setdiff1d(spectrum.x[empty], x).tolist())
         stated = (spectrum.temperature, temperature_in_metadata(spectrum.metadata), of_file)
         temperature = next((kelvin for kelvin in stated if kelvin is not None), None)
-        spectra[index] = Spectrum(x, y, name, spectrum.metadata, temperature, str(file.parent))
+        folder = str(file.parent)
+        spectra[index] = Spectrum(x, y, name, spectrum.metadata, temperature, folder, gaps)
     return spectra
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman.calibration import Point, RamanCalibration, calibrate_raman
-from hotlever.raman.fit import fit_peak
+from hotlever.raman.fit import fit_peak, with_hidden_top
 from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.spectrum import Spectrum, aliases
 from hotlever.raman.tables import NOTHING, Correction, of_spectrum
@@ -102,7 +102,8 @@ def _line(spectrum: Spectrum, correction: Correction, options: PeakOptions) -> L
     peak = None
     if correction.use:
         with suppress(NoSiliconLine):
-            peak = fit_peak(spectrum.x, spectrum.y, correction.of(options), spectrum.name)
+            fitted = fit_peak(spectrum.x, spectrum.y, correction.of(options), spectrum.name)
+            peak = with_hidden_top(fitted, spectrum.x, spectrum.gaps)
     return Line(spectrum, peak, correction)
 
 

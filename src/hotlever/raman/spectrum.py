@@ -27,6 +27,7 @@ class Spectrum:
     metadata: dict[str, str] = field(default_factory=dict)  #: what the file's header says
     temperature: float | None = None  #: of the sample, K, by the header or the file's name
     folder: str = ""
+    gaps: tuple[float, ...] = ()  #: Raman shifts (cm⁻¹) at which the file has no intensity
 
 
 def names_in_file(file: str, labels: list[str]) -> list[str]:

@@ -43,10 +43,13 @@ _UNITS = ("unit_string", "NI_UnitDescription")
 _OFFSET, _STEP = "wf_start_offset", "wf_increment"
 
 
-def lines_of_binary(raw: bytes, where: str, group: str | None = None) -> list[Line] | None:
+def lines_of_binary(
+    raw: bytes, where: str, group: str | None = None, group_stated_by: str = ""
+) -> list[Line] | None:
     """Return comments, header row and rows of a wave or a TDMS file; None of any other file.
 
-    Cells are separated by tabs. A TDMS file of several groups needs one of them named.
+    Cells are separated by tabs. A TDMS file of several groups needs one of them named, for which
+    an error says how, if there is a way.
 
     Raises
     ------
@@ -55,7 +58,7 @@ def lines_of_binary(raw: bytes, where: str, group: str | None = None) -> list[Li
         no such group, or several and none is named.
     """
     if raw.startswith(TDMS):
-        read = partial(_tdms_lines, group=group)
+        read = partial(_tdms_lines, group=group, group_stated_by=group_stated_by)
         return list(enumerate(_read(read, raw, where, *_TDMS), start=1))
     if group is not None:
         raise InputError(f"{where}: is no TDMS file, so that it has no group {quoted(group)}")
@@ -209,7 +212,7 @@ def _tdms_groups(raw: bytes, where: str) -> list[str]:
         return list(_filled_groups(file, where))
 
 
-def _tdms_lines(raw: bytes, where: str, group: str | None) -> list[str]:
+def _tdms_lines(raw: bytes, where: str, group: str | None, group_stated_by: str) -> list[str]:
     """Return the lines of a group of a TDMS file, which must be named if there are several.
 
     Each group is a measurement of its own. Where channels are waveforms, and none has the times,
@@ -220,9 +223,10 @@ def _tdms_lines(raw: bytes, where: str, group: str | None) -> list[str]:
         if group is None and len(groups) > 1:
             some = ", ".join(map(quoted, islice(groups, _MOST_GROUPS)))
             more = f" and {len(groups) - _MOST_GROUPS} more" if len(groups) > _MOST_GROUPS else ""
+            how = group_stated_by.format(group=excerpt(next(iter(groups))))
             raise InputError(
                 f"{where}: {len(groups)} groups, each a measurement of its own: {some}{more}; "
-                f"expected one, which --column 'group={excerpt(next(iter(groups)))}' says"
+                f"expected {f'one, which {how} says' if how else 'a file of one group'}"
             )
         name = next(iter(groups)) if group is None else group
         if name not in groups:

@@ -13,7 +13,7 @@ from itertools import groupby, zip_longest
 import numpy as np
 
 from hotlever.tables.table import DIALECTS, Dialect, Line, is_readable
-from hotlever.units import LONGEST_NUMBER, is_unit, name_and_unit, plain_minus
+from hotlever.units import LONGEST_NUMBER, is_unit, is_unit_of, name_and_unit, plain_minus
 
 #: Lines among which a header row is looked for, how near to the numbers a comment is one, and
 #: characters of a heading.
@@ -190,7 +190,7 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
         if count := width(index):
             cells = headings_in(lines[plain[order + 1]][1]) if order + 1 < len(plain) else []
             if len(cells) == count and any(map(begins_number, cells)):
-                return index
+                return _of_three(lines, index, named)
             named.append(index)
     else:
         return named[0] if named else _above_the_rows(lines, plain)
@@ -198,6 +198,18 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
     if len(texts) > 1 and any(map(is_unit, headings_in(lines[texts[-1]][1]))):
         texts.pop()
     return next(iter(named or texts[-1:]), None)
+
+
+def _of_three(lines: Sequence[Line], index: int, named: Sequence[int]) -> int:
+    """Return the index of the header row, be it the first of three rows above the numbers.
+
+    Origin writes long names, units and comments, of which the last may seem to be headings too.
+    """
+    if not named or index - named[-1] != 2:
+        return index
+    names, units, comments = (headings_in(line) for _, line in lines[named[-1] : index + 1])
+    has_units = len(names) == len(units) == len(comments) and all(map(is_unit, filter(None, units)))
+    return named[-1] if has_units else index
 
 
 def _has_a_number(cells: Sequence[str]) -> bool:
@@ -279,7 +291,7 @@ def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
         units = ["" if name == _X else next(of_channels, "") for name in names]
     units = [*units, *[""] * (len(names) - len(units))]
     return [
-        f"{name} ({unit})" if is_unit(unit) and name_and_unit(name)[1] is None else name
+        f"{name} ({unit})" if is_unit_of(name, unit) and name_and_unit(name)[1] is None else name
         for name, unit in zip(names, units, strict=False)
     ]
 

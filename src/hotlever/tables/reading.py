@@ -46,6 +46,7 @@ def read_table(
     header: bool = True,
     is_heading: Callable[[str], bool] | None = None,
     group: str | None = None,
+    group_stated_by: str = "",
 ) -> TextTable:
     """Read a table of cells separated by tabs, semicolons, commas or, some, by blanks.
 
@@ -67,6 +68,8 @@ def read_table(
         it is the first line that is no comment, and rows may be words alone.
     group : str, optional
         Of a TDMS file, if it has several.
+    group_stated_by : str, optional
+        How a user names it, as ``--column 'group={group}'``; left out where there is no way.
 
     Raises
     ------
@@ -74,7 +77,7 @@ def read_table(
         If there is no such table; the text names file and line.
     """
     raw = read_bytes(path)
-    lines = lines_of_binary(raw, str(path), group) or filled_lines(raw, str(path))
+    lines = lines_of_binary(raw, str(path), group, group_stated_by) or filled_lines(raw, str(path))
     if is_heading is not None and lines:
         lines = below_a_header(lines)
     first = next((i for i, (_, line) in enumerate(lines) if not is_comment(line)), None)

@@ -38,11 +38,14 @@ Line = tuple[int, str]
 _SAMPLE_LINES = 40
 #: How XML and HTML begin.
 _MARKUP = re.compile(r"\s*<(?:\?xml|!doctype|!--|html|head|body|table|lsx_)\b", re.I)
+#: How workbooks begin, packed (.xlsx, .ods) or of old (.xls).
+_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 #: A line of nothing but numbers, in any dialect.
 _PLAIN = re.compile(r"[-+.0-9eE \t;,|]*")
 #: What separates cells without another mark, but for blanks within a number; and blanks before an
 #: exponent.
-_BLANKS, _EXPONENT = re.compile(r"[^\S\u00a0\u2007\u202f]+"), re.compile(r"(?<=\d) +(?=E[-+]\d)")
+_FIXED_BLANKS = "\u00a0\u2007\u202f"
+_BLANKS, _EXPONENT = re.compile(rf"[^\S{_FIXED_BLANKS}]+"), re.compile(r"(?<=\d) +(?=E[-+]\d)")
 #: Cells that say that there is no value, in small letters and without a sign: of databases and
 #: programs; of meters, recorders and oscilloscopes beyond their range; and of open inputs.
 _NO_VALUE = {
@@ -100,6 +103,10 @@ def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
     InputError
         If it is no text or markup, or has too many lines or too long a line.
     """
+    if raw.startswith(_WORKBOOKS):
+        raise InputError(
+            f"{where}: a workbook such as Excel's, expected a table in text: save the sheet as CSV"
+        )
     text = decode(raw, where)
     if _MARKUP.match(text):
         # numbers among its tags are parts of arrays, or settings
@@ -191,13 +198,26 @@ class Dialect:
             return None
 
     def number(self, cell: str) -> float | None:
-        """Return a cell's number as `number` does, with marks of thousands if they are grouped."""
+        """Return a cell's number as `number` does, or with marks of thousands.
+
+        These must be grouped, or nothing else: ``1.041,5`` with a decimal comma, and ``1’041``.
+
+        Examples
+        --------
+        >>> german = Dialect(";", decimal_comma=True)
+        >>> german.number("1.041,5"), german.number("1\u202f041,5"), german.number("1.041")
+        (1041.5, 1041.5, None)
+        """
         value = number(cell, self.decimal_comma)
-        if value is not None or not self.grouped:
+        if value is not None:
             return value
-        sign, other = ",." if self.decimal_comma else ".,"
-        grouped = rf"[+-]?[1-9]\d{{0,2}}([{other}'’\s]\d{{3}})+([{sign}]\d*)?"
-        if not re.fullmatch(grouped, cell[:LONGEST_NUMBER]):
+        cell = plain_minus(cell)
+        sign, other = (",", ".") if self.decimal_comma else (".", ",")
+        # before a decimal sign the other sign is a mark of thousands, and the others always are
+        marks = rf"((['’{_FIXED_BLANKS}]\d{{3}})+([{sign}]\d*)?|([{other}]\d{{3}})+[{sign}]\d*)"
+        if self.grouped:
+            marks = rf"([{other}'’\s]\d{{3}})+([{sign}]\d*)?"
+        if not re.fullmatch(rf"[+-]?[1-9]\d{{0,2}}{marks}", cell[:LONGEST_NUMBER]):
             return None
         return number(re.sub(rf"[^\d{sign}+-]", "", cell), self.decimal_comma)
 

@@ -129,7 +129,7 @@ class _Silicon:
                 continue
             if other in shapes and self._is_cut_by(shapes[other]):
                 self.cutters.append(other)
-            elif self.ends_of(other, sheet, layer):
+            elif not self._is_within(shapes.get(other)) and self.ends_of(other, sheet, layer):
                 self.touching.append(other)
         self.merit = (bool(self.cutters), min(len(self.touching), 2), self.shape.area)
 
@@ -146,9 +146,11 @@ class _Silicon:
     def lies_on(self, other: str) -> bool:
         """Whether another layer is below all of it, and beyond."""
         below = self.areas[other]
-        return below.area > self.shape.area and bool(
-            below.buffer(self.tolerance).covers(self.shape)
-        )
+        return below.area > self.shape.area and self._is_within(below)
+
+    def _is_within(self, other: BaseGeometry | None) -> bool:
+        """Whether another layer covers all of it, as a frame does, and so marks no end of it."""
+        return other is not None and bool(other.buffer(self.tolerance).covers(self.shape))
 
     def _sizable(self, shape: BaseGeometry) -> list[Polygon]:
         return [

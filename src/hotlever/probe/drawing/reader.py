@@ -209,8 +209,17 @@ def read_dxf(
     stated = unit_um is not None or document.units != 0
     if unit_um is None:
         # a file that says no unit is taken to be in µm
-        unit = InsertUnits(document.units or InsertUnits.Microns)
-        unit_um = units.conversion_factor(unit, InsertUnits.Microns)
+        try:
+            unit = InsertUnits(document.units or InsertUnits.Microns)
+            # ezdxf knows no factor of parts of an inch
+            parts = {InsertUnits.Mils: 1e-3, InsertUnits.Microinches: 1e-6}
+            whole = InsertUnits.Inches if unit in parts else unit
+            unit_um = parts.get(unit, 1.0) * units.conversion_factor(whole, InsertUnits.Microns)
+        except (TypeError, ValueError):
+            raise Refusal(
+                f"its $INSUNITS, {document.units}, is no unit that is understood; say it with "
+                "--unit, or as unit_um in [probe]"
+            ) from None
     drawing = _Drawing(document, unit_um, tolerance_um, largest_um)
     drawing.walk(document.modelspace(), None, "", 0)
     drawing.flatten()

@@ -272,6 +272,10 @@ def _joined(lines: tuple[Ring, ...], tolerance: float) -> tuple[tuple[Ring, ...]
     ends = iter([tuple(points[min(some)].tolist()) for some in near])
     met = [(next(ends), *line[1:-1], next(ends)) for line in lines]
     some = [LineString(line) for line in met if len(set(line)) > 1]
+    once = shapely.union_all(some)
+    if once.length < sum(line.length for line in some) - tolerance:
+        # drawn twice, or partly over each other
+        some = shapely.get_parts(once).tolist()
     closed, cuts, dangles, _ = shapely.polygonize_full(some)
     rings = tuple(rings_of(polygon)[0] for polygon in shapely.get_parts(closed))
     rest = [line for group in (cuts, dangles) for line in shapely.get_parts(group)]
