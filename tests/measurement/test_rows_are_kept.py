@@ -171,3 +171,16 @@ def test_a_row_of_units_has_that_of_the_time_too(tmp_path, separator):
     data = read_measurement(path)
     np.testing.assert_allclose(data.time_us, [10.0, 20.0])
     assert data.current_mA.tolist() == [0.7, 0.69]
+
+
+def test_a_row_with_a_word_where_others_count_is_named(tmp_path):
+    path = tmp_path / "iv.csv"
+    path.write_text("Step,V_b (V),I_h (mA)\n1,1,0.143\n2,2,0.285\nTotal,3,0.428\n")
+    (note,) = read_measurement(path).notes
+    assert note.startswith(f"{path}: line 4: 'Total' stands where other rows have a number")
+
+
+def test_headings_in_quotes_between_blanks(tmp_path):
+    path = tmp_path / "from-r.txt"
+    path.write_text('"V_b (V)" "I_h (mA)"\n1 0.143\n2 0.285\n')
+    assert read_measurement(path).current_mA.tolist() == [0.143, 0.285]

@@ -386,6 +386,21 @@ def note_on_header(table: TextTable, assigned: Sequence[Assignment]) -> list[str
     return [f"{table.where(-1)}: {row} is taken for the header row"]
 
 
+def note_on_words(table: TextTable, columns: Mapping[str, Column]) -> list[str]:
+    """Say which rows have a word where nearly all others count, such as ``Total``: no datum."""
+    used = {column.index for column in columns.values()}
+    notes = []
+    for index in set(range(len(table.names))) - used:
+        cells = [row[index] for row in table.rows]
+        words = [row for row, cell in enumerate(cells) if table.dialect.number(cell) is None]
+        if 0 < len(words) < np.isfinite(table.array[:, index]).sum():
+            notes.append(
+                f"{table.where(words[0])}: '{excerpt(cells[words[0]])}' stands where other rows "
+                "have a number, and the row counts; to leave it out, begin it with #"
+            )
+    return notes
+
+
 def note_on_unused(table: TextTable, columns: Mapping[str, Column]) -> list[str]:
     """Say which columns are not used, and what they may be."""
     used = {column.index for column in columns.values()}

@@ -22,6 +22,7 @@ from hotlever.measurement.columns import (
     note_on_bias,
     note_on_header,
     note_on_unused,
+    note_on_words,
     of_columns,
     quantity_of,
 )
@@ -102,6 +103,7 @@ def read_measurement(
     unused = note_on_unused(table, quantities)
     notes = [
         *note_on_header(table, assigned),
+        *note_on_words(table, quantities),
         *contents.notes,
         *note_on_bias(table, quantities, assigned),
     ]

@@ -235,7 +235,8 @@ class Solution:
     def leverage(self) -> Array:
         """The share of each used sample's noise that the parameters have taken up."""
         _, jacobian = self.problem.weighted(self.p, self.variance, self.use)
-        scale = np.linalg.norm(jacobian, axis=0)
+        # a norm would overflow where a fit has gone far off
+        scale = np.abs(jacobian).max(axis=0)
         orthogonal, _ = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))
         return np.asarray(np.sum(orthogonal[: int(self.use.sum())] ** 2, axis=1))
 

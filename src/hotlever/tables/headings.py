@@ -45,6 +45,8 @@ _LIKE_A_NUMBER = re.compile(
     r"(?:[\d\s.,:/'’+-]|[eEdDT](?=[+-]?\d))*(?P<unit>.*?)[\W_]*"
 )
 _UNIT_PREFIXES = set("yzafpnuµμmkMGT")
+#: Headings in quotes, with blanks between them.
+_QUOTED = re.compile(r'\s*"[^"]*"(?:\s+"[^"]*")+\s*')
 #: A row of marks between the headings and the numbers.
 _UNDERLINE = re.compile(r"[\s:=+|-]*")
 
@@ -139,6 +141,8 @@ def headings_in(line: str) -> list[str]:
     if separator is not None and (cells := Dialect(separator).cells(text)) is not None:
         return [cells[0].strip(_MARKS), *cells[1:]]
     names: list[str] = []
+    if _QUOTED.fullmatch(line):
+        return [name.strip(' "') for name in re.findall('"[^"]*"', line)]
     for word in line.strip(_MARKS).split():
         if names and (word[0] in "([{</" or names[-1].endswith("/")):
             names[-1] += f" {word}"
