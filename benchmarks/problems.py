@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from beyond_the_paper import reduced_seebeck_polynomial
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.materials import Kind, full_name
 from hotlever.materials.kinds import PSilicon, Silicon
 from hotlever.probe import Probe, ProbeMesh
 from hotlever.probe.layout import BorderTaper, Region
 from hotlever.spieser2017 import RAMP
-from seebeck import reduced_seebeck_polynomial
 
 BIAS = RAMP
 EXAMPLE = Path(__file__).parents[1] / "src" / "hotlever" / "examples" / "lever-a.csv"

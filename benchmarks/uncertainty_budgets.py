@@ -1,6 +1,6 @@
 """Uncertainty budgets of levers never seen: is linear what they call linear?
 
-The levers are those of which the owner knows little (`little_known_levers`), whose estimates bend
+The levers are those of which the owner knows little (`twins.py --wild`), whose estimates bend
 most; with --known those of `hotlever.studies.simulation_based_calibration`, in vacuum and in air,
 of which more budgets are linear. The referee is what the Monte Carlo method is short for: errors of
 all data and priors are drawn, and the lever is estimated anew from each set of them, by levers that
@@ -35,8 +35,8 @@ from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import draw, measure
 from hotlever.text import BAND
 from hotlever.types import Array
-from little_known_levers import little_known_lever
 from problems import table
+from twins import little_known_lever
 
 #: Data keep the errors that they had in the first estimate.
 _WEIGHTS_STAY = SearchOptions(scatter_rounds=0)

@@ -16,7 +16,7 @@ from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import Here, Run, drop, text_of, until, visit
 
-from bad_files import bad_files
+from app_in_browser import bad_files
 from hotlever.app.jobs import Task
 from hotlever.app.pages.start import QUESTIONS
 from hotlever.app.project import DRAWINGS, EXAMPLES, safe_name

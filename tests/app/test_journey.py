@@ -24,6 +24,7 @@ from app_in_browser import (
     App,
     Seen,
     answer,
+    bad_files,
     browsing,
     chromium_path,
     give,
@@ -31,7 +32,6 @@ from app_in_browser import (
     running,
     stand_still,
 )
-from bad_files import bad_files
 
 pytestmark = [
     pytest.mark.browser,
@@ -262,8 +262,8 @@ def test_many_levers_fill_a_table(app: App, page: Page) -> None:
 
 
 def test_bad_files_in_every_page_are_a_line(app: App, page: Page, folder: Path) -> None:
-    # others are tried without a browser, and by benchmarks/app.py; negative currents are a
-    # measurement, which is refused when it is fitted
+    # others are tried without a browser; negative currents are a measurement, which is refused
+    # when it is fitted
     files = [
         file
         for number, file in enumerate(bad_files())

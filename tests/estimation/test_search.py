@@ -27,7 +27,7 @@ from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from little_known_levers import little_known_lever
+from twins import little_known_lever
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 

@@ -28,7 +28,7 @@ COARSE = SolidMeshOptions(refinement=0.4, grading=0.7)
 
 
 def test_without_air_it_is_the_flat_lever(lever):
-    """benchmarks/air_3d.py prints the difference over all biases and for finer meshes."""
+    """benchmarks/air.py prints the difference over all biases and for finer meshes."""
     bias = [7.6]  # where the difference is largest
     solid = SolidLever(Probe.reference()).sweep(bias)
     flat = lever.sweep(bias)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from seebeck import (
+from beyond_the_paper import (
     BOLTZMANN_EV,
     bands,
     fermi_integral,

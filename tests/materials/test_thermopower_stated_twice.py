@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from beyond_the_paper import PHONON_EXPONENT, conductivity, seebeck
 from hotlever.materials import thermopower
 from hotlever.materials.p_silicon import conductivity_p
 from hotlever.materials.silicon import conductivity_low_doped
-from seebeck import PHONON_EXPONENT, conductivity, seebeck
 
 
 @pytest.mark.parametrize("kind", ["n-silicon", "p-silicon"])

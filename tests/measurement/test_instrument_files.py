@@ -8,7 +8,7 @@ import pytest
 from hotlever import InputError, read_measurement
 from hotlever.probe import Circuit
 from hotlever.tables.headings import below_a_header
-from instrument_files import STYLES, outcome
+from table_files import STYLES, understood
 
 FILES = {f"{file.style}, {file.name}": file for style in STYLES for file in style()}
 #: Everything that a file of such a name says is enough to read it.
@@ -32,7 +32,7 @@ def read(tmp_path, text, columns=None, circuit=None):
 
 @pytest.mark.parametrize("name", FILES)
 def test_each_file_is_read_or_asks_one_question(tmp_path, name):
-    how, message = outcome(FILES[name], tmp_path)
+    how, message = understood(FILES[name], tmp_path)
     assert how in ("read", "asked"), message
     assert how == "read" or name not in CLEAR, message
     assert how == "asked" or name not in ASKED, message

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever import InputError, read_measurement
-from odd_tables import KINDS, REFUSED, RIGHT, WRONG, no_values, outcome, signs
+from table_files import KINDS, REFUSED, RIGHT, WRONG, no_values, outcome, signs
 
 TABLES = {table.name: table for kind in KINDS for table in kind()}
 #: Those of which nothing is unclear.

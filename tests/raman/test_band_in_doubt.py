@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import odd_spectra
 import synthetic_spectra as synthetic
 from hotlever.raman import (
     PeakOptions,
@@ -42,10 +41,10 @@ def spectra_of_one_line(count, *, band, step=2.8, seed=1):
     return spectra, synthetic.true_line(KELVIN, instrument)[0]
 
 
-@pytest.mark.parametrize("case", odd_spectra.CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", synthetic.CASES, ids=lambda case: case.name)
 def test_no_odd_spectrum_is_wrong_without_a_word(case, tmp_path):
-    answer = odd_spectra.judge(case, tmp_path)
-    assert answer.verdict != odd_spectra.WRONG, answer
+    answer = synthetic.judge(case, tmp_path)
+    assert answer.verdict != synthetic.WRONG, answer
 
 
 def test_a_strong_line_on_a_coarse_axis_is_found_wherever_its_pixels_lie():

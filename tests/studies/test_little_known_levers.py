@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import little_known_levers
+import twins
 from hotlever.errors import ComputationError
 from hotlever.lever import Lever
 from hotlever.lever.discretisation import chosen_space
@@ -16,7 +16,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.measurement import read_measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import default_priors
-from little_known_levers import (
+from twins import (
     DOPING,
     FAILED,
     PRIORS,
@@ -31,14 +31,14 @@ NUMBERS = range(12)
 @pytest.fixture(autouse=True)
 def coarse_levers(monkeypatch):
     """What is tested here does not depend on the mesh."""
-    monkeypatch.setattr(little_known_levers, "_finer", lambda true: Lever(true, COARSE))
+    monkeypatch.setattr(twins, "_finer", lambda true: Lever(true, COARSE))
 
 
 @pytest.fixture(scope="module")
 def some():
     """A dozen levers in vacuum."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(little_known_levers, "_finer", lambda true: Lever(true, COARSE))
+        patch.setattr(twins, "_finer", lambda true: Lever(true, COARSE))
         return [little_known_lever(number, "vacuum") for number in NUMBERS]
 
 
@@ -68,7 +68,7 @@ def test_every_shape_has_its_turn_and_nominal_levers_differ(some):
 
 def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
     rng, away = np.random.default_rng(1), []
-    nominal = little_known_levers._nominal(rng, "u-shape")
+    nominal = twins._nominal(rng, "u-shape")
     priors = default_priors(nominal)
     assert priors["delta"].spread == 0.35
     assert priors["thickness_um"].spread == 0.20
@@ -76,8 +76,8 @@ def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
     assert priors["n_d"].spread in (0.6, pytest.approx(np.log(2.5)))
     while len(away) < 200:
         try:
-            true = little_known_levers._drawn(rng, nominal)
-        except little_known_levers.HotleverError:
+            true = twins._drawn(rng, nominal)
+        except twins.HotleverError:
             continue
         assert true.prior is None
         values = true.values(list(priors)).tolist()
@@ -130,13 +130,13 @@ def test_noise_is_half_a_per_cent_and_a_picture_is_read_by_a_share_of_its_full_s
         if lever.digitised:
             assert 3e-4 < np.std(off) / data.current_mA.max() < 9e-3
         else:
-            assert np.std(off / current) == pytest.approx(little_known_levers._NOISE, rel=0.5)
+            assert np.std(off / current) == pytest.approx(twins._NOISE, rel=0.5)
 
 
 def test_the_truth_is_solved_on_a_finer_mesh_than_the_default(monkeypatch):
     monkeypatch.undo()
     probe = Probe.u_shape()
-    usual, finer = chosen_space(probe), little_known_levers._finer(probe)
+    usual, finer = chosen_space(probe), twins._finer(probe)
     assert finer.space.mesh.elements.nelements > 1.2 * usual.mesh.elements.nelements
     assert finer.panels > Lever(probe).panels
 
@@ -149,9 +149,9 @@ def test_a_lever_that_has_no_state_is_drawn_anew_and_counted(monkeypatch):
             raise ComputationError("no state")
         return Lever(true, COARSE)
 
-    monkeypatch.setattr(little_known_levers, "_finer", solved)
+    monkeypatch.setattr(twins, "_finer", solved)
     assert little_known_lever(1, "vacuum").repeated >= 2
-    monkeypatch.setattr(little_known_levers, "_MOST_DRAWN", 2)
+    monkeypatch.setattr(twins, "_MOST_DRAWN", 2)
     failures = iter([True, True])
     with pytest.raises(ComputationError, match="no state"):
         little_known_lever(1, "vacuum")
@@ -181,8 +181,8 @@ def answered(some, monkeypatch):
         arguments.update(data=data, probe=probe)
         return Answer
 
-    monkeypatch.setattr(little_known_levers, "calibrate", calibrated)
-    monkeypatch.setattr(little_known_levers, "little_known_lever", lambda *_: lever)
+    monkeypatch.setattr(twins, "calibrate", calibrated)
+    monkeypatch.setattr(twins, "little_known_lever", lambda *_: lever)
     return Answer, arguments, lever
 
 
@@ -206,7 +206,7 @@ def test_an_error_of_any_type_is_a_result(answered, monkeypatch):
     def broken(*_, **__):
         raise ValueError("x must be strictly increasing")
 
-    monkeypatch.setattr(little_known_levers, "calibrate", broken)
+    monkeypatch.setattr(twins, "calibrate", broken)
     record = judge_little_known(0)
     assert (record["outcome"], record["exception"]) == (FAILED, "ValueError")
     assert record["reason"] == "x must be strictly increasing"

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from beyond_the_paper import Axis, parts, parts_of_lever
 from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
 from hotlever.studies.thermoelectric_shift import of_p_silicon, shift_by_heat
-from thermoelectric_axis import Axis, parts, parts_of_lever
 
 BIAS = (4.0, 7.22)
 

@@ -82,7 +82,7 @@ def test_knee_lies_above_the_inversion_temperature(lever):
 
 @pytest.mark.parametrize("name", ["option I", "option II", "option III"])
 def test_default_mesh_is_accurate_for_the_published_parameters(lever, name):
-    """Against halved sizes and a higher quadrature; benchmarks/mesh_convergence.py goes on."""
+    """Against halved sizes and a higher quadrature; benchmarks/convergence.py mesh goes on."""
     material = published(name).material
     fine_mesh = mesh_layout(lever.probe.layout(), MeshOptions(refinement=2.0))
     fine = Lever(
@@ -140,7 +140,7 @@ def random_probe(rng: np.random.Generator) -> Probe:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_levers_converge_or_say_how_far_they_came(seed):
-    """benchmarks/robustness.py does a thousand."""
+    """benchmarks/convergence.py levers does a thousand."""
     probe = random_probe(np.random.default_rng(seed))
     try:
         sweep = Lever(probe, COARSE).sweep(BIAS)

@@ -55,13 +55,13 @@ OF_THE_MEASUREMENT = {
     "interface_K_per_mW": "contact",
 }
 #: Share of the rise by which the flat lever, or air as panels, differ from full 3-D where the tip
-#: is no steeper in bias than that of a lever of constant properties (benchmarks/air_3d.py).
+#: is no steeper in bias than that of a lever of constant properties (benchmarks/air.py).
 _MODEL = {"vacuum": 3e-4, "air": 7e-4}
 #: The same by the jump of the air's temperature at surfaces, where no accommodation is stated: with
 #: one of 0.9 air takes up 6 % less, more where the lever is narrow, and an estimate without it is
 #: off by so much (rms of six simulated levers from number 1000 on, of both shapes, linearised).
 _JUMP = 7e-3
-#: Share by which the resistances of tip and sample differ from full 3-D (benchmarks/contact_3d.py).
+#: Share by which the resistances of tip and sample differ from full 3-D (benchmarks/contact.py).
 _CONTACT = 0.022
 #: Rows that are on another part of the branch than a ramp takes by more than so many kelvins, so
 #: many of them, show no such lever: one or two beside a jump may.

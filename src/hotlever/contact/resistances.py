@@ -7,7 +7,7 @@ the apex, that is exact. Temperatures jump at both surfaces, and near the contac
 that limit the heat. The lever's own surface is a plate above the sample, and near it the cone adds
 nothing to what that plate gives: of the arcs at the height z above the sample, with the plate at H,
 a share (1 − z/H)^1.5 counts, whose exponent is fitted to meshes of cone, plate and air
-(``benchmarks/contact_3d.py``). Of a cone of height h away from the sample it is less by (h/H)^1.5:
+(``benchmarks/contact.py``). Of a cone of height h away from the sample it is less by (h/H)^1.5:
 a small one hardly changes what flows between plates.
 
 Into the sample, which has layers, it goes from a disc of one temperature through an interface. On

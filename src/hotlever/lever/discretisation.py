@@ -3,9 +3,9 @@
 A lever without power is solved twice on the same triangles, with cubic elements as always and with
 quadratic ones. How far the two are apart, in the energy of their currents and of their heat flows,
 bounds the error of the resistance and of the temperature per power with quadratic elements. With
-cubic ones it is some ten times smaller (``benchmarks/mesh_estimate.py``). Where it is too large,
-as for a border of the doping that is sharper than the triangles of a wide heater, the triangles
-that make most of it are split.
+cubic ones it is some ten times smaller (``benchmarks/convergence.py estimate``). Where it is too
+large, as for a border of the doping that is sharper than the triangles of a wide heater, the
+triangles that make most of it are split.
 
 What the air takes up in time is made once it is asked for, and cached.
 """

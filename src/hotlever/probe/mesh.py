@@ -54,7 +54,7 @@ class MeshOptions(MeshSizes):
     """Sizes of the triangles; see `MeshSizes`.
 
     The defaults keep I_h and V_r within 1e-4 and T_tip within 0.1 K of a converged mesh, from
-    1 to 11 V and for all published parameters; ``benchmarks/mesh_convergence.py`` prints it.
+    1 to 11 V and for all published parameters; ``benchmarks/convergence.py mesh`` prints it.
 
     Attributes
     ----------

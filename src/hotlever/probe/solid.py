@@ -36,7 +36,7 @@ class SolidMeshOptions(MeshSizes):
     """Sizes of the tetrahedra; see `hotlever.probe.mesh.MeshSizes`.
 
     The defaults keep T_tip within 0.3 K and I_h within 3e-4 of the flat lever, from 1 to 11 V
-    without air; ``benchmarks/air_3d.py`` prints it.
+    without air; ``benchmarks/air.py`` prints it.
 
     Attributes
     ----------

@@ -36,7 +36,7 @@ def test_a_step_is_that_of_an_independent_trial(golden):
 
 
 def test_a_step_to_the_knee_takes_long(lever):
-    """The same trial, to three digits; and IDA on our mesh (benchmarks/ida.py), to five."""
+    """The same trial, to three digits; and IDA on our mesh (benchmarks/history.py ida), to five."""
     found = simulate(lever, step(8.268), at=[5.0, 10.0, 100.0, 200.0], tolerance_K=0.01)
     np.testing.assert_allclose(found.tip_K, [365.0, 397.0, 714.0, 864.0], rtol=4e-3)
     np.testing.assert_allclose(found.tip_K, [364.735, 397.552, 715.883, 865.889], atol=0.05)

@@ -1,18 +1,34 @@
-"""A tip in contact against full 3-D: lever, cone and sample meshed; and the air beside a cone.
+"""A tip in contact against full 3-D, and the resistance of its interface from simulated data.
 
-python benchmarks/contact_3d.py [solid|air]
+    python benchmarks/contact.py [solid] [air]      (needs NGSolve)
+    python benchmarks/contact.py twins [COUNT] [CASE...]
 
-solid: heat conduction in the lever of its true thickness, the cone and a half-ball of the sample,
-all meshed by Netgen and solved by NGSolve, with the Joule heat of the flat lever; in three regimes.
-air: a cone between a hot plate and a sample in air whose temperature jumps at surfaces, meshed in
-the plane of its axis. The laws of silicon and air are stated here on their own.
+solid  Heat conduction in the lever of its true thickness, the cone and a half-ball of the sample,
+       all meshed by Netgen and solved by NGSolve, with the Joule heat of the flat lever; in three
+       regimes.
+air    A cone between a hot plate and a sample in air whose temperature jumps at surfaces, meshed in
+       the plane of its axis. The laws of silicon and air are stated here on their own.
+twins  Each has a resistance of its own, between a third and three times what resists beside it, and
+       a material of its own, known to 1 % by priors, as from a fit out of contact. Of its interface
+       nothing is known but its power of ten. Currents have a noise of 1e-4, and a scale that is off
+       by 1e-3, as is assumed of a meter; melting points have a noise of 1.5 K. Simulated and
+       estimated on the same coarse mesh: what is examined is the inference.
+       in: 41 biases in contact. melting: these, and melting points at three of them. in and out: 41
+       biases in contact and the same out of it. approach: in air, where the gas is known to 5 %, a
+       curve at 11.5 V of 200 rows from 3 µm to contact and 200 in it, with 21 biases out of
+       contact; the lever is then near its knee, and its current tells nine times as much of the
+       interface as at 9 V. radius: in and out, where the apex is known to 10 %.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from typing import Any
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import ngsolve as ng
 import numpy as np
@@ -35,13 +51,24 @@ from scipy.integrate import quad
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.optimize import brentq
 
+from hotlever import Measurement, fit
 from hotlever.contact.law import INTERFACE, ContactLaw
+from hotlever.contact.resistances import cold_resistance
+from hotlever.estimation.experiment import ExperimentAtRest
+from hotlever.estimation.over_a_sample import with_distances
 from hotlever.lever import Lever
 from hotlever.lever.contact import sweep_in_contact
+from hotlever.lever.lever import COARSE
+from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.mesh import face_of
+from hotlever.probe.parameters import usual_parameters
+from hotlever.probe.priors import METERS
 from hotlever.probe.tip import OUT_OF_CONTACT
+from hotlever.quantities import FITTED
 from problems import table
+
+# --- full 3-D ------------------------------------------------------------------------------------
 
 #: Contact radius (nm), height (µm), half-angle (°), sample, interface (K/mW), bias (V).
 CASES = (
@@ -281,9 +308,8 @@ def kappa_air(T: Any) -> Any:
     return 0.1 * (rising - 6.63e-2 / T + 9.14 / T**2 - 6.50e2 / T**3)
 
 
-def main() -> None:
+def meshed(asked: list[str]) -> None:
     """Print the tables that are asked for."""
-    asked = sys.argv[1:] or ["solid", "air"]
     if "solid" in asked:
         heads = ["contact", "heat (µW)", "3-D", "off (%)", "T_tip (K)", "3-D", "unknowns"]
         table(heads, [solid(*case) for case in CASES])
@@ -292,5 +318,121 @@ def main() -> None:
         table(heads, [in_air(*case) for case in IN_AIR])
 
 
+# --- twins ---------------------------------------------------------------------------------------
+
+#: Noise of the current, and what is known of the material.
+NOISE, KNOWN = 1e-4, 0.01
+#: Biases (V) of a sweep, of some rows before an approach, and of that.
+BIAS, FEW, AT = np.linspace(5.0, 10.5, 41), np.linspace(5.0, 10.5, 21), 11.5
+#: Distances of an approach (µm), and temperatures near which samples melt, with their error (K).
+DISTANCE, MELTING, MELTING_ERROR = np.geomspace(3.0, 0.003, 200), (333.0, 403.0, 528.0), 1.5
+PROBE = Probe.reference().with_(
+    **{"tip.height_um": 0.7, "tip.apex_radius_um": 0.02}, sample="glass", interface_K_per_mW=1e4
+)
+PROBE_IN_AIR = PROBE.with_(medium="air", surface_gap_um=0.7)
+#: Errors that an interface may have where it counts, and the quantile of a band of 95 %.
+GOOD, BAND = 0.1, 1.96
+
+
+class Case(NamedTuple):
+    """What is measured: where, and what else than the material is known to a share."""
+
+    probe: Probe
+    bias: np.ndarray
+    distance: np.ndarray
+    melting: bool = False
+    known: Mapping[str, float] = MappingProxyType({})
+
+
+def both(bias: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return biases and distances of rows in contact, and of the same out of it."""
+    return np.tile(bias, 2), np.repeat([0.0, 1.0], bias.size)
+
+
+TWINS = {
+    "in": Case(PROBE, BIAS, 0.0 * BIAS),
+    "melting": Case(PROBE, BIAS, 0.0 * BIAS, melting=True),
+    "in and out": Case(PROBE, *both(BIAS)),
+    "approach": Case(
+        PROBE_IN_AIR,
+        np.concatenate([FEW, np.full(400, AT)]),
+        np.concatenate([np.full(FEW.size, 3.0), DISTANCE, np.zeros(200)]),
+        known={"gas_conductivity": 0.05},
+    ),
+    "radius": Case(PROBE, *both(BIAS), known={"apex_radius_um": 0.1}),
+}
+
+
+def model(probe: Probe, bias: np.ndarray, names: Any = None) -> ExperimentAtRest:
+    """Return the lever on a coarse mesh, not corrected."""
+    names = usual_parameters(probe) if names is None else names
+    return ExperimentAtRest(SimilarLevers(Lever(probe, COARSE)), None, bias, names)
+
+
+def twin(case: Case, number: int) -> tuple[float, float]:
+    """Return by how much the logarithm of the resistance is off, and its standard error."""
+    random, probe = np.random.default_rng(number), case.probe
+    law = ContactLaw(probe)
+    assert probe.tip is not None
+    beside = law.spreading_K_per_mW + cold_resistance(probe.tip, 293.0)
+    known = dict.fromkeys(usual_parameters(probe), KNOWN) | dict(case.known)
+    values = dict(zip(known, probe.values(list(known)), strict=True))
+    truth = {name: values[name] * np.exp(known[name] * random.normal()) for name in known}
+    truth[INTERFACE] = beside * np.exp(random.uniform(-1.0, 1.0) * np.log(3.0))
+    experiment = with_distances(model(probe, case.bias), probe, case.distance)
+    shown = experiment.measuring(case.bias, None, case.distance).predict(probe.replace(truth))
+    rows = {column.name: shown.values[row] for row, column in enumerate(FITTED.values())}
+    nothing = np.full(case.bias.size, np.nan)
+    shares = 1.0 + NOISE * random.normal(size=nothing.size)
+    current = rows["current_mA"] * shares * (1.0 + METERS * random.normal())
+    measured = Measurement(case.bias, current, nothing, nothing, nothing)
+    measured = replace(measured, distance_um=case.distance)
+    if case.melting:
+        # of materials that melt at what the rows show: what is between rows is not interpolated
+        melts = [int(np.argmin(np.abs(rows["surface_K"] - near))) for near in MELTING]
+        at = case.bias[melts]
+        found = rows["surface_K"][melts] + MELTING_ERROR * random.normal(size=at.size)
+        empty = np.full(at.size, np.nan)
+        columns = {
+            "bias_V": np.append(case.bias, at),
+            "current_mA": np.append(current, empty),
+            "surface_K": np.append(nothing, found),
+            "surface_error_K": np.append(nothing, np.full(at.size, MELTING_ERROR)),
+            "distance_um": np.append(case.distance, 0.0 * at),
+        }
+        missing = dict.fromkeys(("reader_V", "tip_K", "tip_error_K"), np.append(nothing, empty))
+        measured = Measurement(**columns, **missing)
+    priors = {name: f"± {100 * share:g}%" for name, share in known.items()}
+    result = fit(measured, probe, priors=priors | {INTERFACE: "×/ 10"}, model=model)
+    of = result.parameters[INTERFACE]
+    error = np.nan if of.stderr is None else of.stderr / of.value
+    return float(np.log(of.value / truth[INTERFACE])), error
+
+
+def twins(number: str = "200", *names: str) -> None:
+    """Print how far off the resistances are, and how often the bands hold them."""
+    count, rows = int(number), []
+    for name in names or TWINS:
+        began = time.process_time()
+        off, error = np.array([twin(TWINS[name], number) for number in range(count)]).T
+        rows.append(
+            [
+                name,
+                f"{count}",
+                f"{100 * np.median(np.abs(off)):.1f}",
+                f"{100 * np.mean(np.abs(off) < GOOD):.0f}",
+                f"{100 * np.mean(np.abs(off) < BAND * error):.1f}",
+                f"{np.sqrt(np.mean((off / error) ** 2)):.2f}",
+                f"{(time.process_time() - began) / count:.1f}",
+            ]
+        )
+        print(rows[-1], file=sys.stderr)
+    heads = ["measured", "twins", "median error (%)", "within 10 % (%)", "held by 95 % (%)"]
+    table([*heads, "pulls (rms)", "s each"], rows)
+
+
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] == ["twins"]:
+        twins(*sys.argv[2:])
+    else:
+        meshed(sys.argv[1:] or ["solid", "air"])
