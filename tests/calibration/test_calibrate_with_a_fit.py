@@ -41,8 +41,8 @@ def test_calibrate_command_with_a_fit(run, tmp_path, shared_fit, example):
     content = json.loads((tmp_path / "cal.json").read_text())
     assert content["k"] == pytest.approx(1.0, abs=1e-6)
     # the data of the fit are those calibrated, and know the material
-    sources = {"measurement", "electronics", "base temperature", "geometry", "material", "model"}
-    assert set(content["uncertainty_budget_K"]) == sources
+    sources = {"measurement", "electronics", "base temperature", "geometry", "material", "laws"}
+    assert set(content["uncertainty_budget_K"]) == sources | {"model"}
     assert content["priors"]["heater_length_um"]["spread"] == pytest.approx(0.04)
     (stderr,) = (row["tip_stderr_K"] for row in content["table"] if row["bias_V"] == 8.05)
     parts = [row["contribution_K"] for row in content["gum"]]
