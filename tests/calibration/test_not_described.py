@@ -119,7 +119,7 @@ def test_nothing_says_what_to_set(refused, folder):
     here: Any = None
     with pytest.raises(InputError, match="what to set"):
         showing.settings(here, str(folder / "cal.json"), "tip_K", 600.0)
-    assert showing.doubted(here, str(folder / "cal.json")) == refused.doubt
+    assert showing.result(here, str(folder / "cal.json"))["doubt"] == refused.doubt
 
 
 def test_no_band_is_drawn_and_the_figure_says_so(refused):
