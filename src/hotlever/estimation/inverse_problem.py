@@ -169,7 +169,8 @@ def estimate(
     probe, notes = with_measured_circuit(nominal, measurement, options.medium)
     notes += note_on_averages(whole, measurement) + check_sample(measurement, probe)
     if not in_time and (options.usual_priors or CHIP in options.priors):
-        probe = as_known(probe, options.priors)
+        # that none is stated says nothing against the usual ones
+        probe = as_known(probe, options.priors or None)
     options = options.of(probe, in_time=in_time)
     priors = priors_of(options.priors, probe, "priors", in_time=in_time)
     without_effect = [
