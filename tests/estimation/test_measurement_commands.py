@@ -121,8 +121,8 @@ def rows_of(out: str) -> list[dict[str, str]]:
     [
         ("n_d=5e17", "material.a0=9e-4"),
         ("circuit.series_resistance_ohm=5e3",),
-        ("chip=true", "surface_gap_um=none"),
-        ("medium=vacuum", "surroundings.gas_conductivity=1.1"),
+        ("medium=air", "chip=true", "surface_gap_um=none"),
+        ("medium=air", "surroundings.gas_conductivity=1.1"),
         ("tip.height_um=0.7", "half_angle_deg=15"),
         ("prior.n_d=±15%", "prior.dimensions=±2%"),
         ("shape=three-leg", "probe.gap_um=3.5", "reader_centre_um=none"),
