@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from test_silicon import BEYOND, TEMPERATURES, numerical_derivative
 
@@ -114,6 +114,7 @@ def test_every_law_states_range_and_source(name):
 
 
 @given(st.floats(-1e9, 1e9), st.sampled_from(sorted(MATERIALS)))
+@example(5e-324, sorted(MATERIALS)[0])
 def test_laws_are_finite_and_not_negative_at_any_temperature(T, name):
     kind, T = MATERIALS[name], np.array([T])
     for value, partials in (

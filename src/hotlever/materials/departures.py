@@ -84,9 +84,9 @@ class Departure:
         """Return exp(δ) at temperatures (K), and the derivative of δ by the temperature."""
         series = np.asarray(coefficients) @ self._modes
         position = _position(T)
-        inside = (T > FORMULA_FROM) & (T < FORMULA_TO)
-        slope = chebyshev.chebval(position, chebyshev.chebder(series)) * (2.0 / _WIDTH)
-        return np.exp(chebyshev.chebval(position, series)), np.where(inside, slope / T, 0.0)
+        inside = np.clip(T, FORMULA_FROM, FORMULA_TO)
+        slope = chebyshev.chebval(position, chebyshev.chebder(series)) * (2.0 / _WIDTH) / inside
+        return np.exp(chebyshev.chebval(position, series)), np.where(T == inside, slope, 0.0)
 
     @property
     def variance_left(self) -> float:
