@@ -86,7 +86,7 @@ class Departure:
         position = _position(T)
         inside = np.clip(T, FORMULA_FROM, FORMULA_TO)
         slope = chebyshev.chebval(position, chebyshev.chebder(series)) * (2.0 / _WIDTH) / inside
-        return np.exp(chebyshev.chebval(position, series)), np.where(T == inside, slope, 0.0)
+        return np.exp(chebyshev.chebval(position, series)), np.where(inside == T, slope, 0.0)
 
     @property
     def variance_left(self) -> float:
