@@ -140,7 +140,7 @@ def _at_limit(measurement: Measurement, column: _Column, options: ComplianceOpti
         return np.zeros_like(level)
     distance = measurement.distance_um
     place = np.zeros(level.shape) if distance is None else np.nan_to_num(distance)
-    for each in np.unique(place):
+    for each in np.unique(place[usable]):
         rows = np.flatnonzero(usable & (place == each))
         for sweep in sweeps_of(measurement.bias_V[rows]):
             part = rows[sweep]
