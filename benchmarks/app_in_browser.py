@@ -42,7 +42,7 @@ EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"
 #: Seconds for the app to say its address, and to end.
 _START_S, _END_S = 60, 15
 #: Seconds in which a line must be said of a file.
-_SAID_S = 8.0
+_SAID_S = 20.0
 #: Milliseconds in which a page that is there comes to rest.
 _IDLE_MS = 10_000
 #: There is no input while another file is on its way.

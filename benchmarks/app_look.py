@@ -153,6 +153,10 @@ def command(folder: Path, line: str) -> None:
     subprocess.run(words, cwd=folder, check=True, capture_output=True)
 
 
+#: Milliseconds that the numbers of a page may take.
+_WORK_MS = 60_000
+
+
 def look(page: Page, app: App, view: str, folder: Path) -> Look:
     """Look at a page, or one of `VIEWS`, at its widths, light and dark, and walk by keyboard."""
     address, opened, widths = VIEWS.get(view, (view, None, WIDTHS))
@@ -169,6 +173,8 @@ def look(page: Page, app: App, view: str, folder: Path) -> Look:
         for width in widths:
             page.set_viewport_size({"width": width, "height": _HEIGHTS[width]})
             page.evaluate("scrollTo(0, 0)")
+            # numbers of before are pale until those of the full lever are there
+            page.wait_for_function("!document.querySelector('.of-before')", timeout=_WORK_MS)
             stand_still(page)
             picture = folder / f"{made.page}-{theme}-{width}.png"
             page.screenshot(path=picture, full_page=True)
