@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -127,6 +128,9 @@ def run(
         with pytest.raises(SystemExit) as ended:
             main([str(argument) for argument in arguments])
         captured = capsys.readouterr()
-        return int(ended.value.code or 0), captured.out, captured.err
+        status = int(ended.value.code or 0)
+        if status == 1:  # a test that did not expect it shows what went wrong
+            sys.stderr.write(captured.err)
+        return status, captured.out, captured.err
 
     return call

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import pickle
 from dataclasses import replace
 from importlib.util import find_spec
@@ -106,6 +107,18 @@ def test_memory_is_given_back():
         used.append(process.memory_info().rss)
     # one of these factorisations holds some megabytes
     assert used[2] - used[0] < 8e6
+
+
+def test_factors_in_a_cycle_of_references_leave_a_solver_that_serves(options):
+    matrix = random_matrix(1)
+    factorisation = factorisation_of(matrix, options)
+    cycle = [factorisation.factorised(matrix.data)]
+    cycle.append(cycle)
+    del cycle
+    gc.collect()
+    right = np.ones(factorisation.size)
+    solution = factorisation.factorised(matrix.data).solve(right)
+    np.testing.assert_allclose(matrix @ solution, right, atol=1e-10)
 
 
 @KLU_INSTALLED

@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Literal
-from weakref import WeakSet
+from weakref import WeakSet, finalize
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -217,11 +217,10 @@ def _free_all() -> None:
 
 class _KLUFactors:
     def __init__(self, solver: _KLUSolver, unused: list[_KLUSolver], spare: int) -> None:
-        self._solver, self._unused, self._spare = solver, unused, spare
-
-    def __del__(self) -> None:
-        if len(self._unused) < self._spare:
-            self._unused.append(self._solver)
+        self._solver = solver
+        # A destructor would not do: where these factors go with a cycle of references, Python calls
+        # the destructor of the solver too, which then is freed and yet among the unused.
+        finalize(self, _give_back, solver, unused, spare).atexit = False
 
     def solve(self, right_hand_side: Array, transposed: bool = False) -> Array:
         klu = self._solver.klu
@@ -229,3 +228,8 @@ class _KLUFactors:
         solve = klu.tsolve if transposed else klu.solve
         solution: Array = solve(np.ascontiguousarray(right_hand_side.T)).T
         return solution
+
+
+def _give_back(solver: _KLUSolver, unused: list[_KLUSolver], spare: int) -> None:
+    if len(unused) < spare:
+        unused.append(solver)
