@@ -28,7 +28,7 @@ from scipy.interpolate import PchipInterpolator
 from hotlever.air import surface
 from hotlever.air.operator import PanelledAir
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.estimation.experiment import experiment_of
+from hotlever.estimate.experiment import experiment_of
 from hotlever.lever import Lever
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.lever3d import SolidLever

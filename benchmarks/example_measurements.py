@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from hotlever.calibration import Calibration, calibrate
+from hotlever.estimate import Calibration, calibrate
 from hotlever.files import write_text
 from hotlever.lever import Lever
 from hotlever.measurement import read_measurement

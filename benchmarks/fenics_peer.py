@@ -43,7 +43,7 @@ from skfem.element import ElementTriP2, ElementTriP3
 
 from drawings import levers as drawn_levers
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.estimation import fit, read_measurement
+from hotlever.estimate import fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace

@@ -37,8 +37,8 @@ import numpy as np
 import xarray as xr
 
 from hotlever.errors import HotleverError
-from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment_in_time import ExperimentInTime
+from hotlever.estimate import Measurement, fit
+from hotlever.estimate.experiment_in_time import ExperimentInTime
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.transient import Waveform, integrate, pulse, simulate, sine, step
 from hotlever.lever.transient.problem import TransientProblem

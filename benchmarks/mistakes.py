@@ -27,9 +27,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.calibration.procedure import calibrate
 from hotlever.errors import HotleverError
-from hotlever.estimation import Measurement
+from hotlever.estimate import Measurement
+from hotlever.estimate.procedure import calibrate
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import ALL, draw, measure
 from hotlever.types import Array

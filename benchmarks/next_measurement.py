@@ -24,10 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.calibration import Calibration, calibrate, plan_next
-from hotlever.calibration.linearised_lever import LinearisedLever
 from hotlever.errors import BranchEndError, HotleverError
-from hotlever.estimation import Measurement
+from hotlever.estimate import Calibration, Measurement, calibrate, plan_next
+from hotlever.estimate.linearised_lever import LinearisedLever
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import (

@@ -8,8 +8,8 @@ from __future__ import annotations
 import sys
 import time
 
-from hotlever.estimation import fit, read_measurement
-from hotlever.estimation.sampling import predictive_band, sample_posterior
+from hotlever.estimate import fit, read_measurement
+from hotlever.estimate.sampling import predictive_band, sample_posterior
 from problems import EXAMPLE, table
 
 

@@ -13,9 +13,9 @@ from statistics import median
 import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.estimation import fit, read_measurement
-from hotlever.estimation.experiment import ExperimentAtRest, experiment_of
-from hotlever.estimation.surrogate import Rows
+from hotlever.estimate import fit, read_measurement
+from hotlever.estimate.experiment import ExperimentAtRest, experiment_of
+from hotlever.estimate.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.reduced.lever import estimated_error

@@ -21,11 +21,11 @@ from functools import wraps
 from io import StringIO
 from typing import Any
 
-import hotlever.calibration.tip_temperature as tips
+import hotlever.estimate.tip_temperature as tips
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.cli import main as command
-from hotlever.estimation.experiment import Predictor
-from hotlever.estimation.optimiser import Optimiser
+from hotlever.estimate.experiment import Predictor
+from hotlever.estimate.optimiser import Optimiser
 from hotlever.lever.full_space import FullSpace, SparseFactors
 from hotlever.lever.similar import SimilarLevers
 from problems import EXAMPLE, table

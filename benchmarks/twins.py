@@ -40,9 +40,9 @@ import numpy as np
 import xarray as xr
 from numpy.random import Generator
 
-from hotlever.calibration.procedure import calibrate
 from hotlever.errors import HotleverError, InputError
-from hotlever.estimation import Measurement
+from hotlever.estimate import Measurement
+from hotlever.estimate.procedure import calibrate
 from hotlever.lever import Branch, Lever
 from hotlever.lever.discretisation import chosen_space, energy_between_degrees, making
 from hotlever.lever.full_space import FullSpace

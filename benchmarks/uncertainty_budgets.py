@@ -24,12 +24,12 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from hotlever.calibration.inference import calibrated_by_estimate, estimate_lever
 from hotlever.errors import HotleverError
-from hotlever.estimation.experiment import TIP, Predictor
-from hotlever.estimation.inverse_problem import Estimate
-from hotlever.estimation.objective import Objective
-from hotlever.estimation.optimiser import Optimiser, SearchOptions
+from hotlever.estimate.experiment import TIP, Predictor
+from hotlever.estimate.inference import calibrated_by_estimate, estimate_lever
+from hotlever.estimate.inverse_problem import Estimate
+from hotlever.estimate.objective import Objective
+from hotlever.estimate.optimiser import Optimiser, SearchOptions
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import draw, measure

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from hotlever.estimation import Fit, fit
-from hotlever.estimation.experiment import ExperimentAtRest
+from hotlever.estimate import Fit, fit
+from hotlever.estimate.experiment import ExperimentAtRest
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever

@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from hotlever.datasets import labelled
-from hotlever.estimation import FittedParameter
-from hotlever.estimation.summary import compare_levers
+from hotlever.estimate import FittedParameter
+from hotlever.estimate.fit_summary import compare_levers
 from hotlever.materials import PARAMETERS
 from hotlever.studies.simulation_based_calibration import WAYS, concatenated
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.calibration.knee import IVCurve
 from hotlever.errors import InputError
-from hotlever.estimation import Measurement
+from hotlever.estimate import Measurement
+from hotlever.estimate.knee import IVCurve
 from hotlever.lever import Branch
 from hotlever.probe import Circuit
 from hotlever.types import Array

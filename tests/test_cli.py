@@ -188,7 +188,7 @@ def test_a_fit_is_written_even_if_its_posterior_cannot_be_sampled(run, tmp_path,
     def fails(*_, **__):
         raise ComputationError("no start found")
 
-    monkeypatch.setattr("hotlever.estimation.uncertainty.sample_posterior", fails)
+    monkeypatch.setattr("hotlever.estimate.uncertainty.sample_posterior", fails)
     options = ("--observables", "current", "--fix", "delta", "--fix", "p", "--fix", "a0")
     status, out, err = run(
         "fit", EXAMPLE, *options, "--posterior", "-o", "fit.json", "--report", "report"

@@ -44,10 +44,8 @@ LAWS = (
     "spieser2017.py",
     "materials",
     "probe/tip.py",
-    "calibration",
     "lever/reduced/lever.py",
-    "estimation/optimiser.py",
-    "estimation/noise.py",
+    "estimate",
 )
 
 with_examples = [

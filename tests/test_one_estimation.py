@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import hotlever
-from hotlever.calibration import calibrate
-from hotlever.estimation import fit
+from hotlever.estimate import calibrate, fit
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 

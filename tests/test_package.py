@@ -52,8 +52,7 @@ FLOORS = {
     "contact": ("contact",),
     "lever": ("lever",),
     "measurement": ("lever3d", "measurement", "raman"),
-    "estimation": ("estimation",),
-    "calibration": ("calibration",),
+    "estimate": ("estimate",),
     "studies": ("studies",),
     "figures": ("figures",),
     "report": ("report",),
@@ -171,7 +170,7 @@ def test_datasets_offer_figures_before_matplotlib_is_loaded():
 
 @pytest.mark.parametrize("name", MODULES)
 def test_no_module_has_the_name_of_something_in_it(name):
-    """`import hotlever.estimation.fit` would give a function in its place."""
+    """`import hotlever.estimate.fit` would give a function in its place."""
     package, _, last = name.rpartition(".")
     module = import_module(name)
     assert not hasattr(module, last)

@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from hotlever.calibration import knee
+from hotlever.estimate import knee
 from hotlever.threads import one_blas_thread
 
 

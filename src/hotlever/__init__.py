@@ -37,8 +37,8 @@ _MODULES = {
     "hotlever.materials": ("Material", "published"),
     "hotlever.lever": ("Lever", "Branch", "sweep", "read_sweep", "write_sweep"),
     "hotlever.lever.transient": ("simulate",),
-    "hotlever.estimation": ("Measurement", "read_measurement", "FitOptions", "fit", "read_fit"),
-    "hotlever.calibration": (
+    "hotlever.estimate": (
+        *("Measurement", "read_measurement", "FitOptions", "fit", "read_fit"),
         *("calibrate", "read_calibration", "plan_next", "PowerLaw", "read_power_law"),
     ),
     "hotlever.raman": (

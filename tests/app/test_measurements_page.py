@@ -21,8 +21,8 @@ from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.page import MEDIA
 from hotlever.app.project import EXAMPLES
 from hotlever.app.session import Session
-from hotlever.calibration.power_law import EQ12
-from hotlever.calibration.procedure import calibrate
+from hotlever.estimate.power_law import EQ12
+from hotlever.estimate.procedure import calibrate
 from hotlever.files import CALIBRATION, TABLE
 from hotlever.probe import Probe
 

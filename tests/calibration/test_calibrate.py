@@ -11,13 +11,13 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from hotlever.calibration.calibration import read_calibration
-from hotlever.calibration.knee_scaling import curve_of_law, curve_of_model
-from hotlever.calibration.power_law import EQ12, read_power_law
-from hotlever.calibration.procedure import calibrate
-from hotlever.calibration.summary import calibration_text
-from hotlever.calibration.table import TABLE_COLUMNS
 from hotlever.errors import InputError
+from hotlever.estimate.calibration import read_calibration
+from hotlever.estimate.calibration_summary import calibration_text
+from hotlever.estimate.knee_scaling import curve_of_law, curve_of_model
+from hotlever.estimate.power_law import EQ12, read_power_law
+from hotlever.estimate.procedure import calibrate
+from hotlever.estimate.tip_table import TABLE_COLUMNS
 from hotlever.lever import Lever
 from hotlever.materials.departures import DEPARTURES
 from hotlever.probe import Circuit, Probe
@@ -288,7 +288,7 @@ def test_damaged_calibration_files_get_one_line(calibrated, tmp_path, keys, valu
 
 
 def test_a_budget_out_of_the_data_is_refused_before_the_work(calibrated, monkeypatch):
-    monkeypatch.setattr("hotlever.calibration.procedure.estimate_lever", None)
+    monkeypatch.setattr("hotlever.estimate.procedure.estimate_lever", None)
     with pytest.raises(InputError, match="at 99 V: expected a bias in the measured range, from"):
         calibrate(calibrated.measurement, at_V=99.0)
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.calibration.procedure import calibrate
-from hotlever.estimation import fit
+from hotlever.estimate import fit
+from hotlever.estimate.procedure import calibrate
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, default_priors

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hotlever.calibration.inference import _before
-from hotlever.calibration.procedure import calibrate
-from hotlever.estimation import fit, read_fit
+from hotlever.estimate import fit, read_fit
+from hotlever.estimate.inference import _before
+from hotlever.estimate.procedure import calibrate
 from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import Prior, published_material
 

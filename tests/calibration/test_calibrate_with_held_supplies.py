@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from hotlever import Lever, Probe
-from hotlever.calibration import Calibration, calibrate, read_calibration, read_power_law
-from hotlever.calibration.power_law import EQ12
-from hotlever.calibration.pulses import PulseTiming
-from hotlever.calibration.summary import calibration_text
 from hotlever.errors import InputError
-from hotlever.estimation import Measurement
+from hotlever.estimate import Calibration, Measurement, calibrate, read_calibration, read_power_law
+from hotlever.estimate.calibration_summary import calibration_text
+from hotlever.estimate.power_law import EQ12
+from hotlever.estimate.pulses import PulseTiming
 from hotlever.lever.lever import COARSE
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")

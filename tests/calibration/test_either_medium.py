@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hotlever.calibration.procedure import calibrate
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation import Measurement, fit
-from hotlever.estimation.estimator import in_medium
-from hotlever.estimation.residuals import Residuals
+from hotlever.estimate import Measurement, fit
+from hotlever.estimate.estimator import in_medium
+from hotlever.estimate.procedure import calibrate
+from hotlever.estimate.residuals import Residuals
 from synthetic_curves import measured_curve, measurement_of
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")

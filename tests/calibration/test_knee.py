@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.calibration.knee import (
+from hotlever.errors import InputError
+from hotlever.estimate.knee import (
     GaussianProcess,
     IVCurve,
     KneeOutsideError,
     find_knee,
     scale_to,
 )
-from hotlever.errors import InputError
 from hotlever.probe import Circuit
 from synthetic_curves import current_at, measured_curve
 

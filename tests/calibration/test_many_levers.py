@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hotlever.calibration import calibrate, read_calibration
-from hotlever.calibration.levers import (
+from hotlever.estimate import calibrate, read_calibration
+from hotlever.estimate.levers import (
     Setting,
     calibration_statements,
     calibrations_csv,
     compare_calibrations,
     tips_along,
 )
-from hotlever.calibration.power_law import EQ12
+from hotlever.estimate.power_law import EQ12
 from hotlever.files import json_text
 
 NAMES = ("a", "b", "c")

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from documents import EXAMPLES
-from hotlever.calibration import calibrate, plan_next, read_calibration
-from hotlever.calibration.linearised_lever import LinearisedLever
 from hotlever.errors import InputError
-from hotlever.estimation.experiment import TIP
-from hotlever.estimation.surrogate import Rows
+from hotlever.estimate import calibrate, plan_next, read_calibration
+from hotlever.estimate.experiment import TIP
+from hotlever.estimate.linearised_lever import LinearisedLever
+from hotlever.estimate.surrogate import Rows
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import THERMOMETER

@@ -14,12 +14,12 @@ import pytest
 
 from hotlever import figures
 from hotlever.app import showing
-from hotlever.calibration import inference
-from hotlever.calibration.calibration import Calibration, read_calibration
-from hotlever.calibration.summary import calibration_text
 from hotlever.cli import main
 from hotlever.errors import InputError
-from hotlever.estimation.diagnosis import Diagnosis
+from hotlever.estimate import inference
+from hotlever.estimate.calibration import Calibration, read_calibration
+from hotlever.estimate.calibration_summary import calibration_text
+from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.files import json_text
 from hotlever.lever import Branch
 from hotlever.measurement import Measurement

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.calibration.inference import what_data_lack
-from hotlever.calibration.knee import IVCurve
-from hotlever.calibration.procedure import calibrate
 from hotlever.errors import InputError
-from hotlever.estimation import Measurement
-from hotlever.estimation.diagnosis import Diagnosis, _Curve
+from hotlever.estimate import Measurement
+from hotlever.estimate.diagnosis import Diagnosis, _Curve
+from hotlever.estimate.inference import what_data_lack
+from hotlever.estimate.knee import IVCurve
+from hotlever.estimate.procedure import calibrate
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hotlever.calibration.power_law import EQ12, fit_power_law, law_of_model, read_power_law
 from hotlever.errors import InputError
+from hotlever.estimate.power_law import EQ12, fit_power_law, law_of_model, read_power_law
 
 POWER = np.linspace(0.1, 4.0, 80)
 

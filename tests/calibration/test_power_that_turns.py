@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from hotlever import figures
-from hotlever.calibration.calibration import Calibration, read_calibration
-from hotlever.calibration.knee import IVCurve
-from hotlever.calibration.procedure import calibrate
-from hotlever.calibration.summary import calibration_text
 from hotlever.errors import InputError
+from hotlever.estimate.calibration import Calibration, read_calibration
+from hotlever.estimate.calibration_summary import calibration_text
+from hotlever.estimate.knee import IVCurve
+from hotlever.estimate.procedure import calibrate
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.calibration.table import (
+from hotlever.errors import InputError
+from hotlever.estimate.tip_table import (
     even_rows,
     interpolated,
     table_with_budgets,
     with_steep_rows,
 )
-from hotlever.errors import InputError
 
 NAMES = ("bias_V", "power_mW", "tip_K")
 

@@ -11,7 +11,7 @@ import pytest
 from drawn_in_python import GOLD, pointed, three_leg
 from experiments import on_coarse_meshes
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation import Measurement, fit, read_fit
+from hotlever.estimate import Measurement, fit, read_fit
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.full_space import FullSpace

@@ -224,7 +224,7 @@ def test_several_heaters_and_further_terminals():
 
 @pytest.mark.slow
 def test_a_fit_of_a_drawn_lever_finds_what_that_of_the_parametric_one_does(file):
-    from hotlever.estimation import fit, read_measurement
+    from hotlever.estimate import fit, read_measurement
 
     data = read_measurement("src/hotlever/examples/lever-a.csv")
     found, expected = fit(data, drawn(file)), fit(data, Probe.reference())

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from hotlever.estimation import Measurement
+from hotlever.estimate import Measurement
 from hotlever.lever import Lever
 
 TRUTH = {"c_kappa": 0.66, "delta": 0.69, "n_d": 4.6e17, "p": 2.72, "a0": 9.9e-4, "a1": 1.18e-6}

@@ -9,10 +9,9 @@ import pytest
 
 from documents import EXAMPLES
 from experiments import full_experiment
-from hotlever.calibration import calibrate
 from hotlever.errors import InputError
-from hotlever.estimation import Measurement, fit, read_measurement
-from hotlever.estimation.experiment import ExperimentAtRest
+from hotlever.estimate import Measurement, calibrate, fit, read_measurement
+from hotlever.estimate.experiment import ExperimentAtRest
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient import simulate, spectrum, step
 from hotlever.probe import Circuit, Probe

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hotlever.estimation.posterior import CurvedQuantity
+from hotlever.estimate.posterior import CurvedQuantity
 
 #: Derivatives of the quantity 100 a + 20 b.
 GRADIENT = np.array([100.0, 20.0])

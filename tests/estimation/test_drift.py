@@ -9,8 +9,8 @@ import pytest
 from fit_twins import twin
 
 from experiments import reduced_experiment
-from hotlever.estimation import FitOptions, fit
-from hotlever.estimation.inverse_problem import estimate
+from hotlever.estimate import FitOptions, fit
+from hotlever.estimate.inverse_problem import estimate
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from fit_twins import BIAS, TRUTH, twin
 
 from experiments import on_coarse_meshes
 from hotlever.errors import BranchEndError, ComputationError, InputError
-from hotlever.estimation import Measurement, fit, read_measurement
-from hotlever.estimation.diagnosis import Diagnosis, outlier_notes
-from hotlever.estimation.residuals import Residuals
+from hotlever.estimate import Measurement, fit, read_measurement
+from hotlever.estimate.diagnosis import Diagnosis, outlier_notes
+from hotlever.estimate.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever

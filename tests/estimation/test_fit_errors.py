@@ -9,8 +9,8 @@ import pytest
 from fit_twins import BIAS, TRUTH, twin
 
 from hotlever.errors import InputError
-from hotlever.estimation import fit
-from hotlever.estimation.diagnosis import Diagnosis
+from hotlever.estimate import fit
+from hotlever.estimate.diagnosis import Diagnosis
 
 
 def with_errors(measurement, current=None, reader=None, tip=None):

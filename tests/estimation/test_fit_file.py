@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimation import FitOptions, fit, read_fit
+from hotlever.estimate import FitOptions, fit, read_fit
 from hotlever.measurement import Measurement
 from made_up import GONE, damaged
 

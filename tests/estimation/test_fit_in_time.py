@@ -12,8 +12,8 @@ import pytest
 from experiments import on_coarse_meshes
 from hotlever import read_measurement
 from hotlever.errors import InputError
-from hotlever.estimation import Measurement, fit, read_fit
-from hotlever.estimation.experiment_in_time import ExperimentInTime
+from hotlever.estimate import Measurement, fit, read_fit
+from hotlever.estimate.experiment_in_time import ExperimentInTime
 from hotlever.lever.transient import pulse, simulate, sine, step
 
 TIMES = np.array([0.2, 1.0, 3.0, 6.0, 10.0, 15.0, 20.0])

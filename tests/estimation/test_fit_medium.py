@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from hotlever.estimation import read_measurement
+from hotlever.estimate import read_measurement
 from hotlever.measurement import with_measured_circuit
 from hotlever.probe import Probe
 

@@ -12,11 +12,11 @@ import pytest
 
 from hotlever import figures
 from hotlever.errors import InputError
-from hotlever.estimation import Fit, fit, read_fit
-from hotlever.estimation.estimator import undetermined
-from hotlever.estimation.profile import profile_likelihood
-from hotlever.estimation.sampling import sample_posterior
-from hotlever.estimation.summary import NEAREST, fit_text, parameter_rows
+from hotlever.estimate import Fit, fit, read_fit
+from hotlever.estimate.estimator import undetermined
+from hotlever.estimate.fit_summary import NEAREST, fit_text, parameter_rows
+from hotlever.estimate.profile import profile_likelihood
+from hotlever.estimate.sampling import sample_posterior
 from hotlever.files import json_text
 from hotlever.report.fit_pages import fit_page
 

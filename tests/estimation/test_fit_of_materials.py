@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimation import Fit, FitOptions, Measurement, fit, read_fit
-from hotlever.estimation.profile import profile_likelihood
-from hotlever.estimation.sampling import predictive_band, sample_posterior
-from hotlever.estimation.summary import compare_levers
+from hotlever.estimate import Fit, FitOptions, Measurement, fit, read_fit
+from hotlever.estimate.fit_summary import compare_levers
+from hotlever.estimate.profile import profile_likelihood
+from hotlever.estimate.sampling import predictive_band, sample_posterior
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe

@@ -9,8 +9,8 @@ import pytest
 
 from hotlever import Lever, Probe, fit
 from hotlever.errors import InputError
-from hotlever.estimation import Measurement, read_fit, read_measurement
-from hotlever.estimation.experiment import ExperimentAtRest
+from hotlever.estimate import Measurement, read_fit, read_measurement
+from hotlever.estimate.experiment import ExperimentAtRest
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import given_measurement

@@ -12,14 +12,14 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from hotlever.calibration.tip_temperature import tip_by_bias
 from hotlever.errors import InputError
-from hotlever.estimation import Measurement, estimator, fit, read_fit
-from hotlever.estimation.inverse_problem import estimate
-from hotlever.estimation.noise import CommonError, errors_of_scales
-from hotlever.estimation.options import FitOptions
-from hotlever.estimation.residuals import Residuals
-from hotlever.estimation.summary import fit_text
+from hotlever.estimate import Measurement, estimator, fit, read_fit
+from hotlever.estimate.fit_summary import fit_text
+from hotlever.estimate.inverse_problem import estimate
+from hotlever.estimate.noise import CommonError, errors_of_scales
+from hotlever.estimate.options import FitOptions
+from hotlever.estimate.residuals import Residuals
+from hotlever.estimate.tip_temperature import tip_by_bias
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimation.batch import Batch
-from hotlever.estimation.summary import (
+from hotlever.estimate.batch import Batch
+from hotlever.estimate.fit_summary import (
     INVERSION,
     compare_levers,
     lever_rows,

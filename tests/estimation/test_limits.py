@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hotlever.calibration.tip_temperature import error_of_model
-from hotlever.estimation.objective import Objective, Penalty, Quantity, Subproblem
-from hotlever.estimation.posterior import Posterior
-from hotlever.estimation.prior_density import Coordinates, PriorDensity
-from hotlever.estimation.profile import ErrorProfile, profile_of_tip
-from hotlever.estimation.sampling import SampledTip, sample_tip
+from hotlever.estimate.objective import Objective, Penalty, Quantity, Subproblem
+from hotlever.estimate.posterior import Posterior
+from hotlever.estimate.prior_density import Coordinates, PriorDensity
+from hotlever.estimate.profile import ErrorProfile, profile_of_tip
+from hotlever.estimate.sampling import SampledTip, sample_tip
+from hotlever.estimate.tip_temperature import error_of_model
 from hotlever.probe.priors import Prior
 from hotlever.probe.surroundings import Surroundings
 from hotlever.text import BAND

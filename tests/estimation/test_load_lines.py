@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.estimation.experiment import experiment_of
-from hotlever.estimation.surrogate import Rows
+from hotlever.estimate.experiment import experiment_of
+from hotlever.estimate.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe

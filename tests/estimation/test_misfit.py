@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hotlever.estimation import Measurement
-from hotlever.estimation.diagnosis import lack_of_fit_text, run_of_outliers
-from hotlever.estimation.residuals import Residuals
+from hotlever.estimate import Measurement
+from hotlever.estimate.diagnosis import lack_of_fit_text, run_of_outliers
+from hotlever.estimate.residuals import Residuals
 
 COUNT = 40
 BIAS = np.linspace(0.3, 11.0, COUNT)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.estimation.noise import CommonError, relative_noise
-from hotlever.estimation.residuals import Residuals
+from hotlever.estimate.noise import CommonError, relative_noise
+from hotlever.estimate.residuals import Residuals
 from hotlever.measurement import Measurement
 
 TRUTH = np.linspace(0.05, 1.5, 40)

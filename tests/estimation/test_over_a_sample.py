@@ -10,15 +10,15 @@ import pytest
 
 from experiments import on_coarse_meshes
 from hotlever import Measurement, Probe, fit, read_calibration
-from hotlever.calibration.inference import calibrated_by_estimate
-from hotlever.calibration.summary import calibration_text
 from hotlever.contact.law import INTERFACE
 from hotlever.errors import InputError
-from hotlever.estimation import FitOptions
-from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.experiment import ExperimentAtRest
-from hotlever.estimation.inverse_problem import estimate
-from hotlever.estimation.over_a_sample import with_distances
+from hotlever.estimate import FitOptions
+from hotlever.estimate.calibration_summary import calibration_text
+from hotlever.estimate.diagnosis import Diagnosis
+from hotlever.estimate.experiment import ExperimentAtRest
+from hotlever.estimate.inference import calibrated_by_estimate
+from hotlever.estimate.inverse_problem import estimate
+from hotlever.estimate.over_a_sample import with_distances
 from hotlever.lever import Lever
 from hotlever.lever.contact import out_of_contact, sweep_in_contact
 from hotlever.lever.lever import COARSE

@@ -9,12 +9,12 @@ import pytest
 
 from experiments import reduced_experiment
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimation import Measurement, fit, uncertainty
-from hotlever.estimation.chains import Gaussian, effective_sample_size, sample, split_rhat
-from hotlever.estimation.experiment import experiment_of
-from hotlever.estimation.objective import inverse_or_nan
-from hotlever.estimation.profile import profile_likelihood
-from hotlever.estimation.sampling import SampledLever, predictive_band, sample_posterior
+from hotlever.estimate import Measurement, fit, uncertainty
+from hotlever.estimate.chains import Gaussian, effective_sample_size, sample, split_rhat
+from hotlever.estimate.experiment import experiment_of
+from hotlever.estimate.objective import inverse_or_nan
+from hotlever.estimate.profile import profile_likelihood
+from hotlever.estimate.sampling import SampledLever, predictive_band, sample_posterior
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe

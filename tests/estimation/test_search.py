@@ -13,16 +13,15 @@ import pytest
 
 import hotlever
 from experiments import full_experiment
-from hotlever.calibration import calibrate
 from hotlever.errors import InputError
-from hotlever.estimation import Measurement, fit
-from hotlever.estimation.diagnosis import Diagnosis
-from hotlever.estimation.experiment import ExperimentAtRest, Predictor
-from hotlever.estimation.inverse_problem import estimate
-from hotlever.estimation.objective import Objective
-from hotlever.estimation.optimiser import Optimiser, SearchOptions
-from hotlever.estimation.options import FitOptions
-from hotlever.estimation.residuals import Residuals
+from hotlever.estimate import Measurement, calibrate, fit
+from hotlever.estimate.diagnosis import Diagnosis
+from hotlever.estimate.experiment import ExperimentAtRest, Predictor
+from hotlever.estimate.inverse_problem import estimate
+from hotlever.estimate.objective import Objective
+from hotlever.estimate.optimiser import Optimiser, SearchOptions
+from hotlever.estimate.options import FitOptions
+from hotlever.estimate.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.materials import PARAMETERS

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from experiments import on_coarse_meshes
-from hotlever.calibration import calibrate, read_calibration
 from hotlever.errors import InputError
-from hotlever.estimation import read_fit
+from hotlever.estimate import calibrate, read_calibration, read_fit
 
 FOLDERS = sorted((Path(__file__).parents[1] / "stored").iterdir())
 

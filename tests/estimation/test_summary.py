@@ -7,8 +7,8 @@ import re
 import numpy as np
 import xarray as xr
 
-from hotlever.estimation.summary import lever_rows, statements, table_text
-from hotlever.estimation.uncertainty import Uncertainty
+from hotlever.estimate.fit_summary import lever_rows, statements, table_text
+from hotlever.estimate.uncertainty import Uncertainty
 from made_up import levers
 
 

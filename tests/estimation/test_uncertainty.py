@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 from experiments import reduced_experiment
-from hotlever.estimation import Measurement, fit
-from hotlever.estimation.uncertainty import Uncertainty
+from hotlever.estimate import Measurement, fit
+from hotlever.estimate.uncertainty import Uncertainty
 
 BIAS = np.linspace(2, 11, 8)
 

@@ -13,10 +13,9 @@ from numpy.testing import assert_allclose
 
 import made_up
 from hotlever import figures
-from hotlever.calibration import read_calibration
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.estimation import Measurement
+from hotlever.estimate import Measurement, read_calibration
 from hotlever.figures import save_figure
 from hotlever.files import FIGURE_TYPES
 from hotlever.lever import read_sweep, write_sweep

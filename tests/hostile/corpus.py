@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from experiments import full_experiment
-from hotlever.calibration import calibrate, read_calibration
-from hotlever.calibration.power_law import EQ12, read_power_law
-from hotlever.estimation import fit, read_fit, read_measurement
+from hotlever.estimate import calibrate, fit, read_calibration, read_fit, read_measurement
+from hotlever.estimate.power_law import EQ12, read_power_law
 from hotlever.lever import Lever, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient.waveform import read_waveform

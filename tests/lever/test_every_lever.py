@@ -14,7 +14,7 @@ import pytest
 from taylor import remainder_orders
 
 from hotlever.errors import BranchEndError
-from hotlever.estimation.experiment import ExperimentAtRest
+from hotlever.estimate.experiment import ExperimentAtRest
 from hotlever.lever import Branch, Lever
 from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.equations import BALANCES, balance_columns

@@ -16,8 +16,8 @@ from documents import ROOT, blocks
 from experiments import on_coarse_meshes
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.errors import InputError
-from hotlever.estimation import FitOptions, Measurement, batch, fit, read_fit
-from hotlever.estimation.batch import fit_many
+from hotlever.estimate import FitOptions, Measurement, batch, fit, read_fit
+from hotlever.estimate.batch import fit_many
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.training import cached_reduction

@@ -10,7 +10,7 @@ import pytest
 
 from experiments import reduced_experiment
 from hotlever.cache import CACHE_VARIABLE, store_arrays, stored
-from hotlever.estimation import Measurement, fit
+from hotlever.estimate import Measurement, fit
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.lever import COARSE

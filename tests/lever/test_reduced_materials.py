@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.estimation import FitOptions, Measurement, batch, fit
-from hotlever.estimation.result import FitFile
-from hotlever.estimation.surrogate import Rows
+from hotlever.estimate import FitOptions, Measurement, batch, fit
+from hotlever.estimate.result import FitFile
+from hotlever.estimate.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE

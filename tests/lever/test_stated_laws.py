@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from hotlever.errors import BranchEndError, InputError
-from hotlever.estimation import Measurement, fit, read_fit
+from hotlever.estimate import Measurement, fit, read_fit
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse, simulate

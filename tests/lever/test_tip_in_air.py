@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from hotlever.estimation import Measurement, fit
+from hotlever.estimate import Measurement, fit
 from hotlever.lever import Lever
 from hotlever.lever.air_fields import AirFields
 from hotlever.lever.lever import COARSE

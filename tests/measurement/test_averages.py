@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from experiments import full_experiment
-from hotlever.estimation import Measurement, fit, read_fit
-from hotlever.estimation.residuals import Residuals
+from hotlever.estimate import Measurement, fit, read_fit
+from hotlever.estimate.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.measurement.rows import MANY, averaged
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from test_lab_files import AMPS, B1500, BIAS, CURRENT, FILES, LVM, SEGMENT, lab, rows, write
 
 from hotlever.errors import InputError
-from hotlever.estimation import read_measurement
+from hotlever.estimate import read_measurement
 
 IV = "V_b (V),I_h (mA)\n"
 NUMBERED = {"V_b (V)": "1", "I_h (mA)": "2"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.estimation import read_measurement
+from hotlever.estimate import read_measurement
 
 BIAS = np.arange(1.0, 9.0)
 CURRENT = np.array([0.1434, 0.2849, 0.4233, 0.5577, 0.6874, 0.8120, 0.9306, 1.0415])  # mA

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hotlever.errors import InputError
-from hotlever.estimation import read_measurement
+from hotlever.estimate import read_measurement
 
 PLAIN = "V_b (V),I_h (mA),V_r (mV),T_tip (K),dT_tip (K)\n1,0.1,50,,\n2,0.2,100,300,5\n"
 

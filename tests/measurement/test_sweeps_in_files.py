@@ -9,7 +9,7 @@ import pytest
 from test_lab_files import write
 
 from hotlever.errors import InputError
-from hotlever.estimation import fit, read_measurement
+from hotlever.estimate import fit, read_measurement
 from hotlever.measurement import parse_columns, with_measured_circuit
 from hotlever.measurement.contents import NITROGEN
 from hotlever.measurement.rows import disagreements, sweeps_of

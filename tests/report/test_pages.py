@@ -7,8 +7,8 @@ import pytest
 
 import made_up
 from experiments import full_experiment
-from hotlever.estimation import Measurement, fit
-from hotlever.estimation.uncertainty import examine
+from hotlever.estimate import Measurement, fit
+from hotlever.estimate.uncertainty import examine
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.reproduce import inference
 from hotlever.report.reproduce.findings import Findings

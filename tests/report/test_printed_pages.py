@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import hotlever
-from hotlever.calibration import calibrate
+from hotlever.estimate import calibrate
 from hotlever.report.calibration_pages import budget_page, calibration_page
 
 pytest.importorskip("playwright", reason="the extra test-app is not installed")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from skfem.element import ElementTriP2
 
-from hotlever.calibration.power_law import EQ12
 from hotlever.errors import BranchEndError
+from hotlever.estimate.power_law import EQ12
 from hotlever.lever import Lever
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace

@@ -22,12 +22,11 @@ from hotlever.app.jobs import Task, probe_of, request_of
 from hotlever.app.probe_fields import figure_file, svg
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
-from hotlever.calibration import Calibration, read_calibration
-from hotlever.calibration.levers import calibration_rows, compare_calibrations
-from hotlever.calibration.table import interpolated
 from hotlever.errors import HotleverError, InputError
-from hotlever.estimation import Fit, read_fit
-from hotlever.estimation.summary import parameter_rows
+from hotlever.estimate import Calibration, Fit, read_calibration, read_fit
+from hotlever.estimate.fit_summary import parameter_rows
+from hotlever.estimate.levers import calibration_rows, compare_calibrations
+from hotlever.estimate.tip_table import interpolated
 from hotlever.files import read_json
 from hotlever.lever.transient.waveform import waveform_from_text
 from hotlever.measurement import (

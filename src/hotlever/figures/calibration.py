@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hotlever.calibration.calibration import Calibration
-from hotlever.calibration.levers import tips_along
-from hotlever.calibration.next_measurement import SURE, Plan
-from hotlever.calibration.pulses import PulseCalibration
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
-from hotlever.estimation.diagnosis import USUAL_SCATTER
+from hotlever.estimate.calibration import Calibration
+from hotlever.estimate.diagnosis import USUAL_SCATTER
+from hotlever.estimate.levers import tips_along
+from hotlever.estimate.next_measurement import SURE, Plan
+from hotlever.estimate.pulses import PulseCalibration
 from hotlever.figures.style import (
     LINES,
     MEASURED,
@@ -113,7 +113,7 @@ def calibrated_levers(calibrations: Mapping[str, Calibration], levers: xr.Datase
     calibrations : mapping of str to Calibration
         By lever; those whose data are not described are left out.
     levers : xarray.Dataset
-        From `hotlever.calibration.levers.compare_calibrations`.
+        From `hotlever.estimate.levers.compare_calibrations`.
     """
     along, count = levers.attrs["along"], levers.sizes["lever"]
     tips, many = tips_along(calibrations, along), count > len(LINES)

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
 from hotlever.colours import BLACK, BLUE, ORANGE, SKY, VERMILION
-from hotlever.estimation.diagnosis import USUAL_SCATTER
+from hotlever.estimate.diagnosis import USUAL_SCATTER
 from hotlever.figures.style import (
     MEASURED,
     MOST_NAMES,
@@ -162,7 +162,7 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     Parameters
     ----------
     band : xarray.Dataset
-        `Fit.band`, or from `hotlever.estimation.sampling.predictive_band`.
+        `Fit.band`, or from `hotlever.estimate.sampling.predictive_band`.
     measured : xarray.Dataset, optional
         From `Measurement.dataset`; drawn as points.
     """
@@ -215,7 +215,7 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
     Parameters
     ----------
     profiles : sequence of xarray.Dataset
-        From `hotlever.estimation.profile.profile_likelihood`.
+        From `hotlever.estimate.profile.profile_likelihood`.
     """
     columns = min(3, len(profiles))
     rows = math.ceil(len(profiles) / columns)
@@ -260,7 +260,7 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
     Parameters
     ----------
     posterior : xarray.Dataset
-        From `hotlever.estimation.sampling.sample_posterior`.
+        From `hotlever.estimate.sampling.sample_posterior`.
     optimum : mapping of str to float, optional
         Value of each quantity to mark.
     """
@@ -336,7 +336,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
     Parameters
     ----------
     levers : xarray.Dataset
-        From `hotlever.estimation.summary.compare_levers`; without what was held or does not count.
+        From `hotlever.estimate.fit_summary.compare_levers`; without what was held.
     """
     count = levers.sizes["lever"]
     many = count > MOST_NAMES

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from hotlever.calibration.power_law import EQ12, PowerLaw
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION
+from hotlever.estimate.power_law import EQ12, PowerLaw
 from hotlever.figures.style import (
     COLOURS,
     LINES,

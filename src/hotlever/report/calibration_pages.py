@@ -8,14 +8,14 @@ import numpy as np
 import xarray as xr
 
 from hotlever import figures
-from hotlever.calibration import Calibration
-from hotlever.calibration.levers import calibration_rows, calibration_statements, law_rows
-from hotlever.calibration.summary import calibration_parts, linear_words
-from hotlever.calibration.table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, even_rows
-from hotlever.calibration.uncertainty_budget import TemperatureBudget
 from hotlever.errors import InputError
-from hotlever.estimation.batch import Batch
-from hotlever.estimation.gum import Budget, InputQuantity
+from hotlever.estimate import Calibration
+from hotlever.estimate.batch import Batch
+from hotlever.estimate.calibration_summary import calibration_parts, linear_words
+from hotlever.estimate.gum import Budget, InputQuantity
+from hotlever.estimate.levers import calibration_rows, calibration_statements, law_rows
+from hotlever.estimate.tip_table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, even_rows
+from hotlever.estimate.uncertainty_budget import TemperatureBudget
 from hotlever.materials.parameters import sentence
 from hotlever.quantities import QUANTITIES
 from hotlever.report.fit_pages import add_remarks
@@ -77,7 +77,7 @@ def calibrations_page(batch: Batch[Calibration], levers: xr.Dataset) -> Page:
     ----------
     batch : Batch
     levers : xarray.Dataset
-        From `hotlever.calibration.levers.compare_calibrations`.
+        From `hotlever.estimate.levers.compare_calibrations`.
     """
     page = Page(
         f"Calibrations of {levers.sizes['lever']} levers",

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from hotlever import figures
-from hotlever.estimation.batch import Batch
-from hotlever.estimation.result import Fit
-from hotlever.estimation.summary import (
+from hotlever.estimate.batch import Batch
+from hotlever.estimate.fit_summary import (
     NEAREST,
     compare_levers,
     conclusions,
@@ -18,7 +17,8 @@ from hotlever.estimation.summary import (
     parameter_rows,
     statements,
 )
-from hotlever.estimation.uncertainty import Uncertainty
+from hotlever.estimate.result import Fit
+from hotlever.estimate.uncertainty import Uncertainty
 from hotlever.lever import Lever
 from hotlever.materials.parameters import INVERSION
 from hotlever.report.page import Block, Page

@@ -11,9 +11,9 @@ import numpy as np
 import xarray as xr
 
 from hotlever import figures
-from hotlever.calibration import Calibration, calibrate
-from hotlever.calibration.calibration import rms
-from hotlever.calibration.summary import calibration_parts
+from hotlever.estimate import Calibration, calibrate
+from hotlever.estimate.calibration import rms
+from hotlever.estimate.calibration_summary import calibration_parts
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.report.page import Page

@@ -32,7 +32,7 @@ from scipy.interpolate import CubicSpline
 from hotlever import spieser2017 as paper
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError
-from hotlever.estimation import Fit, Measurement, fit
+from hotlever.estimate import Fit, Measurement, fit
 from hotlever.lever import Branch, Lever, OperatingPoint
 from hotlever.lever.lever import COARSE
 from hotlever.materials.silicon import inversion_temperature

@@ -16,8 +16,8 @@ import numpy as np
 import xarray as xr
 
 from hotlever.datasets import labelled
-from hotlever.estimation import Measurement, fit
-from hotlever.estimation.experiment import ExperimentAtRest
+from hotlever.estimate import Measurement, fit
+from hotlever.estimate.experiment import ExperimentAtRest
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers

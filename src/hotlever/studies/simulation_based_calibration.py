@@ -20,13 +20,13 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from hotlever.calibration.knee import IVCurve, find_knee
-from hotlever.calibration.knee_scaling import curve_of_law, curve_of_model
-from hotlever.calibration.power_law import EQ12
-from hotlever.calibration.procedure import calibrate
 from hotlever.datasets import labelled
 from hotlever.errors import BranchEndError, HotleverError
-from hotlever.estimation import Measurement
+from hotlever.estimate import Measurement
+from hotlever.estimate.knee import IVCurve, find_knee
+from hotlever.estimate.knee_scaling import curve_of_law, curve_of_model
+from hotlever.estimate.power_law import EQ12
+from hotlever.estimate.procedure import calibrate
 from hotlever.lever import Branch, Lever
 from hotlever.materials import LOW_DOPED, Material
 from hotlever.materials.kinds import NSilicon

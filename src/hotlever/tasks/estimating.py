@@ -8,23 +8,20 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hotlever.calibration import Calibration, plan_next, read_calibration
-from hotlever.calibration.levers import (
-    Setting,
-    calibrate_many,
-    calibrations_csv,
-    calibrations_text,
-    compare_calibrations,
-)
-from hotlever.calibration.power_law import read_power_law
-from hotlever.calibration.procedure import calibrate
-from hotlever.calibration.summary import calibration_text
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimation import Fit, FitOptions, fit, read_fit
-from hotlever.estimation.batch import Batch, fit_many
-from hotlever.estimation.experiment import Prediction
-from hotlever.estimation.outcome import Result
-from hotlever.estimation.summary import (
+from hotlever.estimate import (
+    Calibration,
+    Fit,
+    FitOptions,
+    fit,
+    plan_next,
+    read_calibration,
+    read_fit,
+)
+from hotlever.estimate.batch import Batch, fit_many
+from hotlever.estimate.calibration_summary import calibration_text
+from hotlever.estimate.experiment import Prediction
+from hotlever.estimate.fit_summary import (
     compare_levers,
     fit_text,
     lever_rows,
@@ -32,6 +29,16 @@ from hotlever.estimation.summary import (
     statements,
     table_text,
 )
+from hotlever.estimate.levers import (
+    Setting,
+    calibrate_many,
+    calibrations_csv,
+    calibrations_text,
+    compare_calibrations,
+)
+from hotlever.estimate.outcome import Result
+from hotlever.estimate.power_law import read_power_law
+from hotlever.estimate.procedure import calibrate
 from hotlever.files import TABLE, Outputs, write_text
 from hotlever.measurement import Measurement, read_measurement_of
 from hotlever.probe import Probe
@@ -42,7 +49,7 @@ from hotlever.tasks.shared import draw, read_probe
 from hotlever.tasks.texts import parse_priors, parse_setting, parse_timing
 
 if TYPE_CHECKING:
-    from hotlever.estimation.uncertainty import Uncertainty
+    from hotlever.estimate.uncertainty import Uncertainty
     from hotlever.report.page import Page
 
 #: Points of a curve that is shown while a fit goes on.
@@ -121,7 +128,7 @@ def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
 
 def _examine(reporter: Reporter, request: FitRequest, result: Fit) -> Uncertainty:
     """Sample the posterior of a fit, and profile its parameters, as is asked."""
-    from hotlever.estimation.uncertainty import examine  # brings scipy's statistics along
+    from hotlever.estimate.uncertainty import examine  # brings scipy's statistics along
 
     with reporter.progress_bars("profiles", "posterior", "band") as (profiling, sampling, banding):
         return examine(

@@ -31,7 +31,7 @@ from hotlever.tasks.texts import (
 from hotlever.units import setting
 
 if TYPE_CHECKING:
-    from hotlever.estimation import FitOptions
+    from hotlever.estimate import FitOptions
     from hotlever.probe import Probe
 
 
@@ -167,7 +167,7 @@ class FitRequest(DriveRequest, LeversRequest):
 
     def options(self, probe: Probe) -> FitOptions:
         """Return what the fit of a probe is asked."""
-        from hotlever.estimation import FitOptions
+        from hotlever.estimate import FitOptions
         from hotlever.probe.priors import is_of_laws
 
         usual = USUAL in (self.prior or [])
@@ -233,8 +233,8 @@ class CalibrateRequest(PlotRequest, LeversRequest):
 
     def check(self) -> None:
         """Refuse what does not go together, and a medium that does not exist."""
-        from hotlever.calibration.uncertainty_budget import check_budget_of
-        from hotlever.estimation.options import UNKNOWN_MEDIUM
+        from hotlever.estimate.options import UNKNOWN_MEDIUM
+        from hotlever.estimate.uncertainty_budget import check_budget_of
 
         super().check()
         if not self.posterior:
@@ -256,7 +256,7 @@ class CalibrateRequest(PlotRequest, LeversRequest):
 
     def table_options(self) -> dict[str, Any]:
         """Return what the table for an instrument is even in, and its step."""
-        from hotlever.calibration.table import TABLES_BY
+        from hotlever.estimate.tip_table import TABLES_BY
 
         if self.table_by not in TABLES_BY:
             raise unknown_name("quantity", self.table_by, TABLES_BY, "--table-by")

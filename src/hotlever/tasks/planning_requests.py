@@ -203,7 +203,7 @@ class NextRequest(PlotRequest, MeasuredRequest):
 
     def check(self) -> None:
         """Refuse what does not go together."""
-        from hotlever.estimation.options import UNKNOWN_MEDIUM
+        from hotlever.estimate.options import UNKNOWN_MEDIUM
 
         # of a lever that was not measured nothing could tell in which it is
         check_medium(self.medium, *([] if self.data is None else [UNKNOWN_MEDIUM]))
@@ -216,7 +216,7 @@ class NextRequest(PlotRequest, MeasuredRequest):
             self.refuse("column", why="expected a measurement file")
 
     def choices(self) -> dict[str, Any]:
-        """Return what is asked of `hotlever.calibration.next_measurement.plan_next`."""
+        """Return what is asked of `hotlever.estimate.next_measurement.plan_next`."""
         allowed = parse_kinds(self.allow)
         limits = list((allowed or {"": None}).values())
         usual = sum(number or 0 for number in limits) if all(limits) else _USUAL_PROPOSALS

@@ -10,7 +10,7 @@ import xarray as xr
 
 from hotlever import figures
 from hotlever import spieser2017 as paper
-from hotlever.calibration.power_law import EQ12
+from hotlever.estimate.power_law import EQ12
 from hotlever.lever.air_fields import AirFields
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.heat import thermal_conductivity

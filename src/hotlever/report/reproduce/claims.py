@@ -9,7 +9,7 @@ import xarray as xr
 
 from hotlever import figures
 from hotlever import spieser2017 as paper
-from hotlever.estimation import fit
+from hotlever.estimate import fit
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe.priors import default_priors

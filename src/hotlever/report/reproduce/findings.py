@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from hotlever import spieser2017 as paper
-from hotlever.estimation import Fit, Measurement, fit, read_measurement
+from hotlever.estimate import Fit, Measurement, fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.report.page import Page
 from hotlever.types import Progress

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hotlever.estimation import Fit, Measurement, fit
-from hotlever.estimation.summary import parameter_rows
+from hotlever.estimate import Fit, Measurement, fit
+from hotlever.estimate.fit_summary import parameter_rows
 from hotlever.figures import correlation_matrix, judged_calibrations, raman_check, thermometry
 from hotlever.materials import PARAMETERS
 from hotlever.raman import Thermometer, calibrate_from, measure, read_lines, read_spectra

@@ -9,7 +9,7 @@ import xarray as xr
 
 from hotlever import figures
 from hotlever import spieser2017 as paper
-from hotlever.calibration.power_law import EQ12, PowerLaw, fit_power_law
+from hotlever.estimate.power_law import EQ12, PowerLaw, fit_power_law
 from hotlever.lever import Lever
 from hotlever.lever.fields import heater_profile
 from hotlever.materials import PARAMETERS, PUBLISHED

@@ -1,0 +1,321 @@
+"""Estimates of many levers: in parallel, each written as it comes, resumed where they stopped."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Generic
+
+from hotlever import __version__
+from hotlever.errors import HotleverError, InputError
+from hotlever.estimate.estimator import fit
+from hotlever.estimate.options import FitOptions
+from hotlever.estimate.outcome import Result, ResultFile
+from hotlever.estimate.result import Fit, FitFile
+from hotlever.files import Outputs, output_folder, without_nan
+from hotlever.lever.lever import Lever
+from hotlever.lever.reduced.training import cached_reduction, can_be_reduced
+from hotlever.measurement import Measurement, read_measurement_of, with_measured_circuit
+from hotlever.probe import Probe
+from hotlever.processes import PROCESSORS, Executor, guarded, local_executor, run_all
+from hotlever.types import Progress
+
+
+@dataclass(frozen=True)
+class Work(Generic[Result]):
+    """What is done with each of many measurements.
+
+    Attributes
+    ----------
+    kind : str
+        Of what is made: ``fit`` or ``calibration``.
+    estimate : callable
+        Makes it of a measurement, in another process.
+    file : type
+        What its file holds.
+    ending : str
+        Of the names of the files.
+    probe : Probe
+        What the levers are like.
+    options : FitOptions
+        What of a lever is varied.
+    asked : dict of str to JSON values
+        What else the result depends on.
+    """
+
+    kind: str
+    estimate: Callable[[Measurement], Result]
+    file: type[ResultFile[Result]]
+    ending: str
+    probe: Probe
+    options: FitOptions
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass
+class Batch(Generic[Result]):
+    """What became of many data files.
+
+    Attributes
+    ----------
+    results : dict of str to Fit or Calibration
+        By the name of the lever, in the order of the data files.
+    failures : dict of str to HotleverError
+        By data file: why it could not be read, or no result could be made of it.
+    reused : int
+        Results that had been written before from the same data, probe, options and version.
+    """
+
+    results: dict[str, Result] = field(default_factory=dict)
+    failures: dict[str, HotleverError] = field(default_factory=dict)
+    reused: int = 0
+
+    @property
+    def exit_status(self) -> int:
+        """0 if all is done, 2 if an input was at fault, else 1 if a computation failed.
+
+        Data that no such lever shows are none of which the computation could be finished.
+        """
+        statuses = [error.exit_status for error in self.failures.values()]
+        return max(statuses, default=min(len(self.undescribed), 1))
+
+    @property
+    def undescribed(self) -> dict[str, str]:
+        """By lever: that its data are not described, and why."""
+        results = self.results.items()
+        return {name: f"{name}: {result.doubt}" for name, result in results if result.doubt}
+
+    def fail(self, path: str | os.PathLike[str], error: HotleverError) -> None:
+        """Note why nothing could be made of a data file."""
+        path, text = str(path), str(error)
+        self.failures[path] = error if text.startswith(path) else type(error)(f"{path}: {text}")
+
+
+def fit_many(
+    paths: Sequence[str | os.PathLike[str]],
+    folder: str | os.PathLike[str],
+    probe: Probe | None = None,
+    options: FitOptions | None = None,
+    **how: Any,
+) -> Batch[Fit]:
+    """Fit many levers and write a fit file for each as soon as it is done; see `estimate_many`.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Measurement files.
+    folder : path
+        Where the fit files go, named after the data files.
+    probe : Probe, optional
+        The reference probe by default.
+    options : FitOptions, optional
+    **how
+        As `estimate_many` has them.
+    """
+    probe, options = probe or Probe.reference(), options or FitOptions()
+    work = partial(fit, probe=probe, options=options)
+    options.of(probe)  # raises for all levers at once
+    return estimate_many(paths, folder, Work("fit", work, FitFile, ".json", probe, options), **how)
+
+
+def estimate_many(
+    paths: Sequence[str | os.PathLike[str]],
+    folder: str | os.PathLike[str],
+    work: Work[Result],
+    *,
+    processes: int | None = None,
+    scheduler: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    reading: Callable[[Measurement], None] | None = None,
+    reducing: Progress | None = None,
+    progress: Progress | None = None,
+) -> Batch[Result]:
+    """Do the same work on many measurements and write a file of each result as soon as it is done.
+
+    A file that cannot be read, or of which nothing can be made, is reported in the result; the
+    others go on. What is there already, from the same data, probe, options and version, is not
+    made again.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Measurement files.
+    folder : path
+        Where the files go, named after the data files.
+    work : Work
+    processes : int, optional
+        Local worker processes; by default as many as there are processors. They are started by
+        spawn: a script needs ``if __name__ == "__main__"``.
+    scheduler : str, optional
+        Address of a running Dask scheduler to use instead.
+    columns : mapping of str to str, optional
+        Names of the columns in all files, see `read_measurement`.
+    reading : callable, optional
+        Called with each measurement that was read.
+    reducing, progress : callable, optional
+        Called with the steps done and their number: while a geometry is reduced, and with the
+        levers done.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made, a name is no parameter's, or no scheduler answers.
+    ComputationError
+        If the scheduler is lost. What was done by then is written.
+    """
+    if processes is not None and processes < 1:
+        raise InputError(f"found processes = {processes}, expected 1 or more")
+    outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
+    outputs.folder(target)
+    files = {name: target / f"{name}{work.ending}" for name in data}
+    request = {"probe": work.probe.sections(), "options": work.options.values(), **work.settings}
+    request["version"] = __version__
+    if columns:
+        request["columns"] = dict(columns)
+    batch, waiting, requests = Batch[Result](), dict[str, Measurement](), dict[str, Any]()
+
+    def tell() -> None:
+        if progress is not None:
+            progress(len(batch.results) + len(batch.failures), len(files))
+
+    for name, path in data.items():
+        try:
+            measurement = read_measurement_of(work.probe, path, columns)
+            measurement.need_rest(f"a {work.kind} of several levers")
+            if reading is not None:
+                reading(measurement)
+            if target.is_dir():
+                outputs.target(files[name])
+        except InputError as error:
+            batch.fail(path, error)
+            continue
+        # all that a result depends on, for its file: the same again need not be made
+        requests[name] = dict(without_nan({"sha256": measurement.sha256, **request}))
+        # whoever changes the code of a class of materials keeps its name
+        again = not work.probe.classes
+        earlier = _written_before(files[name], work, requests[name]) if again else None
+        if earlier is None:
+            waiting[name] = measurement
+        else:
+            batch.results[name] = earlier
+            batch.reused += 1
+    tell()
+    if waiting:
+        with _executor(scheduler, min(processes or PROCESSORS, len(waiting))) as executor:
+            for name, reason in _not_reduced(work, waiting, reducing).items():
+                batch.fail(waiting.pop(name).path, reason)
+            names = list(waiting)
+            tasks = ((measurement,) for measurement in waiting.values())
+            for number, result in run_all(executor, work.estimate, tasks):
+                name, measurement = names[number], waiting[names[number]]
+                try:
+                    if isinstance(result, HotleverError):
+                        raise result
+                    output_folder(target)
+                    result.write(files[name], requests[name])
+                    batch.results[name] = result
+                except HotleverError as error:
+                    batch.fail(measurement.path, error)
+                tell()
+    batch.results = {name: batch.results[name] for name in files if name in batch.results}
+    return batch
+
+
+def _executor(scheduler: str | None, processes: int) -> AbstractContextManager[Executor]:
+    if scheduler is None:
+        return local_executor(processes)
+    try:
+        from hotlever.cluster import cluster_executor
+    except ImportError:
+        raise InputError(
+            f"--scheduler {scheduler}: Dask is not installed, expected pip install "
+            "'hotlever[cluster]'"
+        ) from None
+    return cluster_executor(scheduler)
+
+
+def lever_names(paths: Sequence[str | os.PathLike[str]]) -> dict[str, Path]:
+    """Name the different data files: by their own names, with folders where these are the same.
+
+    Examples
+    --------
+    >>> list(lever_names(["a/lever-1.csv", "a/lever-2.csv", "a/../a/lever-1.csv"]))
+    ['lever-1', 'lever-2']
+    >>> list(lever_names(["a/lever-1.csv", "b/lever-1.csv"]))
+    ['a_lever-1.csv', 'b_lever-1.csv']
+    """
+    different: dict[object, Path] = {}
+    for path in map(Path, paths):
+        different.setdefault(_identity(path), path)
+    count = Counter(path.stem.casefold() for path in different.values())
+    names: dict[str, Path] = {}
+    for path in different.values():
+        alone = count[path.stem.casefold()] == 1
+        name = path.stem if alone else "_".join(path.relative_to(path.anchor).parts)
+        # a file name need not be text; and not all disks tell a from A
+        name = name.encode(errors="backslashreplace").decode()
+        existing, number, plain = {other.casefold() for other in names}, 2, name
+        while name.casefold() in existing:
+            name, number = f"{plain}-{number}", number + 1
+        names[name] = path
+    return names
+
+
+def _identity(path: Path) -> object:
+    """Return what two names of one file have in common."""
+    try:
+        status = path.stat()
+    except OSError:
+        return os.path.realpath(path)
+    return status.st_dev, status.st_ino
+
+
+def _written_before(file: Path, work: Work[Result], request: dict[str, Any]) -> Result | None:
+    """Return a result of a file that was made from the same; None if there is none."""
+    try:
+        content = work.file.read(file, work.kind)
+    except InputError:
+        return None
+    return content.result() if content.request == request else None
+
+
+def _not_reduced(
+    work: Work[Any], waiting: Mapping[str, Measurement], progress: Progress | None
+) -> dict[str, HotleverError]:
+    """Reduce each geometry once, before the workers need it; return why some levers have none.
+
+    Base temperature and medium are part of a geometry.
+    """
+    results: dict[object, Any] = {}
+    failures: dict[str, HotleverError] = {}
+    for name, measurement in waiting.items():
+        try:
+            probes = [
+                with_measured_circuit(work.probe, measurement, medium)[0]
+                for medium in work.options.media
+            ]
+        except InputError as error:
+            failures[name] = error
+            continue
+        errors = []
+        for measured in probes:
+            geometry = measured.circuit.base_temperature_K, measured.surroundings.medium
+            if geometry not in results:
+                results[geometry] = guarded(_reduce, measured, work.options, progress)
+            errors.append(results[geometry])
+        # of two media one will do
+        if None not in errors:
+            failures[name] = errors[0]
+    return failures
+
+
+def _reduce(probe: Probe, options: FitOptions, progress: Progress | None) -> None:
+    own = options.of(probe)
+    names = {*own.usual, *own.varied}
+    if can_be_reduced(probe, names):
+        cached_reduction(Lever(probe), progress, names)

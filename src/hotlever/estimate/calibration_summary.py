@@ -1,0 +1,232 @@
+"""The summary of a calibration, as lines of text."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hotlever.estimate.calibration import Calibration
+from hotlever.estimate.fit_summary import NEAREST, prior_lines
+from hotlever.estimate.pulses import PulseCalibration
+from hotlever.estimate.tip_table import BUDGETS, budgets_of
+from hotlever.estimate.uncertainty_budget import TemperatureBudget
+from hotlever.text import aligned, significant, value_with_error
+from hotlever.types import Array
+
+#: Caption of the temperatures at a contact.
+_OF_THE_APEX = (
+    "in contact: the apex with its error by source, and the surface of the sample under it"
+)
+#: Tip temperatures (K) at which the error budget is printed.
+_SHOWN, _FEW = (400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0), 4
+#: What each route rests on, in words.
+_BASIS = {
+    "power law": "a given power law",
+    "probe": "a probe like this lever, brought up to date by these data",
+    "fit in vacuum": "a fit of this lever in vacuum, and these data",
+    "fit in air": "a fit of this lever in air, and these data",
+}
+#: What would make the largest error smaller, by its source.
+_ADVICE = {
+    "measurement": "less noise, or tip temperatures at some points, would help",
+    "geometry": "better known dimensions would help (--prior dimensions=±2%)",
+    "material": "a fit of this lever (--fit), or its tip temperatures, would know its material",
+    "laws": "tip temperatures at some points would help; what is known better of a law may be said "
+    "(--prior law.n_i=±5%)",
+    "fit": "more data for the fit would help",
+    "air": "a fit in air would measure the loss to air",
+    "k": "a finer measurement near the knee would help",
+    "constant k": "--medium air would not assume a constant k",
+    "electronics": "better known meters would help",
+    "contact": "melting points, or the current in and out of contact, would help",
+    "base temperature": "a thermometer at the chip would help",
+}
+#: Errors (K) up to which a calibration is called good, and fair.
+_GOOD, _FAIR = 15.0, 40.0
+
+
+class Parts(NamedTuple):
+    """What a calibration says: words, tables with their captions, and words that end it."""
+
+    before: list[str]
+    tables: list[tuple[str, list[list[str]]]]
+    after: list[str]
+
+
+def calibration_parts(calibration: Calibration) -> Parts:
+    """Return what a calibration says in words and tables; of one not described no table."""
+    basis = f"based on {_BASIS[calibration.route]}, used in {calibration.medium}"
+    after, tables = prior_lines(calibration.priors), []
+    if calibration.describes_data:
+        before = [basis, *_knee_lines(calibration), _law_line(calibration)]
+        tables = [("", _budget_rows(calibration))]
+        if BUDGETS[1] in calibration.table:
+            tables.append((_OF_THE_APEX, _apex_rows(calibration)))
+        if calibration.pulse is not None:
+            tables.append((calibration.pulse.timing.text, _pulse_rows(calibration.pulse)))
+        stated = significant(calibration.tip_temperature_uncertainty_K)
+        sure = f"sure to ± {stated} K (standard error, largest in the table)"
+        after.append(f"{sure}: {_verdict(calibration)}")
+        if calibration.gum is not None:
+            after.append(_budget_line(calibration.gum))
+    else:
+        knee = [f"its knee: {_knee_point(calibration)}"] if calibration.knee.measured else []
+        before = [calibration.doubt, f"{NEAREST}; it is {basis}", *knee]
+    if np.isfinite(calibration.measured_rms_K):
+        after.append(
+            f"the measured tip temperatures differ by {calibration.measured_rms_K:.1f} K (rms)"
+        )
+    return Parts(before, tables, after)
+
+
+def calibration_text(calibration: Calibration) -> str:
+    """Return the result of a calibration as lines of text."""
+    parts = calibration_parts(calibration)
+    lines = parts.before
+    for caption, rows in parts.tables:
+        lines += ["", *([f"{caption}:"] if caption else []), *aligned(rows, right=True)]
+    return "\n".join([*lines, *([""] if parts.tables else []), *parts.after])
+
+
+def _budget_line(stated: TemperatureBudget) -> str:
+    """Return what the uncertainty budget comes to."""
+    away = significant(stated.budget.expanded())
+    linear = linear_words(stated)
+    return (
+        f"uncertainty budget, {stated.measurand}: {stated.estimate_K:.0f} K ± "
+        f"{away} K (95 %, k = {stated.budget.coverage_factor():.2f})" + (linear and f"; {linear}")
+    )
+
+
+def linear_words(stated: TemperatureBudget) -> str:
+    """Say whether the linear budget holds; nothing of a file that does not tell."""
+    interval = stated.monte_carlo
+    if interval is None:
+        return ""
+    if np.isnan(interval.low):
+        return (
+            "not linear: levers within its errors melt at this bias, or are hotter than those that "
+            "were solved, so that the Monte Carlo method (JCGM 101) fails"
+        )
+    trials = (
+        f"95 % of {interval.trials} Monte Carlo trials lie from {interval.low:.0f} to "
+        f"{interval.high:.0f} K (JCGM 101, within {stated.budget.tolerance:g} K)"
+    )
+    if stated.linear:
+        return f"linear: {trials}"
+    low, high = stated.limits_K
+    return (
+        f"not linear: {trials}, the table's limits are {low:.0f} and {high:.0f} K; the widest of "
+        "these and the budget's hold"
+    )
+
+
+def _law_line(calibration: Calibration) -> str:
+    law = calibration.power_law
+    if law is None:
+        return "no power law: " + (
+            "the power falls while the tip gets hotter; the bias tells how hot it is"
+            if calibration.probe.circuit.starts_cold
+            else "with held supplies the tip does not follow from the power of one"
+        )
+    text = (
+        f"power law in vacuum: a {law.linear_K_per_mW:.1f} K/mW, b {law.nonlinear_K:.2f} K, "
+        f"m {law.exponent:.3f}, c {law.hot_K_per_mW:.1f} K/mW; jump {law.jump_K:+.0f} K"
+    )
+    residual = calibration.law_residual_K
+    return f"{text}, within {residual:.0f} K of the model" if residual else text
+
+
+def _knee_lines(calibration: Calibration) -> list[str]:
+    """Return the knee of a lever that shows its data, and the factor k."""
+    knee, law = calibration.knee, calibration.power_law
+    if np.isnan(knee.power_mW):
+        return ["no knee as far as the lever can be heated"]
+    if not knee.measured:
+        power = value_with_error(knee.power_mW, knee.power_mW_stderr)
+        lines = [f"knee (estimated): {power} mW, tip {calibration.knee_tip_K:.0f} K"]
+    elif calibration.knee_measured:
+        lines = [f"knee: {_knee_point(calibration)}"]
+    else:
+        lines = [f"knee, beyond the measured range: about {_knee_point(calibration)}"]
+    if law is not None:
+        k = value_with_error(calibration.k, calibration.k_stderr)
+        lines.append(f"k = {k} times the power of the knee in vacuum, {law.threshold_mW:.3f} mW")
+    return lines
+
+
+def _knee_point(calibration: Calibration) -> str:
+    """Return the values at a knee, with their errors where these are known."""
+    knee = calibration.knee
+    return (
+        f"{value_with_error(knee.lever_V, knee.lever_V_stderr)} V, "
+        f"{value_with_error(knee.current_mA, knee.current_mA_stderr)} mA, "
+        f"{value_with_error(knee.power_mW, knee.power_mW_stderr)} mW at a bias of "
+        f"{value_with_error(knee.bias_V, knee.bias_V_stderr)} V, "
+        f"tip {calibration.knee_tip_K:.0f} K"
+    )
+
+
+def _budget_rows(calibration: Calibration) -> list[list[str]]:
+    """Return the standard error by source at some temperatures, and the power there.
+
+    Without a power law the bias tells more.
+    """
+    table, tip = calibration.heating, calibration.heating.tip_K.values
+    tells = ("V_b (V)", "bias_V") if calibration.power_law is None else ("P_l (mW)", "power_mW")
+    temperatures = np.array([kelvins for kelvins in _SHOWN if tip[0] <= kelvins <= tip[-1]])
+    if temperatures.size < _FEW:  # a cold lever, or a short range
+        temperatures = np.linspace(tip[0], tip[-1], _FEW + 1)[1:].round(1)
+    columns = [("T_tip (K)", "tip_K", 0), (*tells, 3), ("± (K)", "tip_stderr_K", 1)]
+    return _rows(table, columns, temperatures)
+
+
+def _apex_rows(calibration: Calibration) -> list[list[str]]:
+    """Return temperatures at the contact for some of the tip, with the apex's error by source."""
+    temperatures = [float(row[0]) for row in _budget_rows(calibration)[1:]]
+    columns = [("T_tip (K)", "tip_K", 0), ("apex (K)", "apex_K", 0), ("± (K)", "apex_stderr_K", 1)]
+    columns += [("surface (K)", "surface_K", 0), ("± (K)", "surface_stderr_K", 1)]
+    return _rows(calibration.heating, columns, np.array(temperatures), BUDGETS[1])
+
+
+def _pulse_rows(pulse: PulseCalibration) -> list[list[str]]:
+    """Return heights of the pulse for some peak temperatures, with the error by source."""
+    first, last = pulse.table.peak_K.values[[0, -1]]
+    peak = np.linspace(first, last, _FEW + 2)[1:].round(0 if last - first > 50 else 1)
+    columns = [("peak (K)", "peak_K", 0), ("height (V)", "height_V", 3)]
+    columns += [("± (K)", "peak_stderr_K", 1)]
+    columns += [(f"{moment} (K)", f"{moment}_K", 0) for moment in ("end", "mean")]
+    return _rows(pulse.table, columns, np.minimum(peak, last))
+
+
+def _rows(
+    table: xr.Dataset, columns: list[tuple[str, str, int]], at: Array, budget: str = BUDGETS[0]
+) -> list[list[str]]:
+    """Return columns of a table as cells where the first has some values, then a budget.
+
+    Of a column are given its head, its name in the table, and the digits behind the point.
+    """
+    along = table[columns[0][1]].values
+    numbers = [(head, table[name].values, digits) for head, name, digits in columns]
+    numbers += [(source, error, 1) for source, error in budgets_of(table)[budget].items()]
+    cells = [
+        [head, *(f"{number:.{digits}f}" for number in np.interp(at, along, values))]
+        for head, values, digits in numbers
+    ]
+    return [list(row) for row in zip(*cells, strict=True)]
+
+
+def _verdict(calibration: Calibration) -> str:
+    stated = calibration.tip_temperature_uncertainty_K
+    word = "good" if stated <= _GOOD else "fair" if stated <= _FAIR else "rough"
+    budget = budgets_of(calibration.table)[BUDGETS[0]]
+    largest = max(budget, key=lambda source: np.fmax.reduce(budget[source]))
+    text = f"{word}; mostly from {largest}"
+    by_law = calibration.route == "power law"
+    if largest in _ADVICE and not (by_law and largest == "constant k"):
+        return f"{text}: {_ADVICE[largest]}"
+    if by_law:
+        return f"{text}; a probe (--probe) or a fit (--fit) would know more than a power law"
+    return text

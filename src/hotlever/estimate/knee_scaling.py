@@ -1,0 +1,283 @@
+"""Knee scaling: one factor k from the knee of a measured I-V curve (the paper's Section V).
+
+In another medium, or on another lever of the same kind, the tip temperature is the same function
+of the power but for one factor, T(P) = T_ref(P / k), and the knee of the I-V curve tells the
+factor. What T_ref is decides how good that is: a power law, the model of a probe, or a model fitted
+to the lever itself. The error comes from the knee, from the meters, and from how much levers of
+other dimensions and materials differ from the one whose temperatures are taken over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hotlever.errors import ComputationError, InputError
+from hotlever.estimate.calibration import Calibration, rms
+from hotlever.estimate.knee import (
+    IVCurve,
+    Knee,
+    KneeOutsideError,
+    SmoothCurves,
+    find_knee,
+    scale_to,
+)
+from hotlever.estimate.power_law import PowerLaw, law_of_model, power_turns
+from hotlever.estimate.tip_table import BUDGETS, table_by_bias
+from hotlever.lever import Branch, OperatingPoint
+from hotlever.lever.branch import Reach, shifted
+from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.similar import SimilarLevers
+from hotlever.measurement import Measurement
+from hotlever.piecewise import spline_through
+from hotlever.probe import Probe
+from hotlever.probe.parameters import RESISTANCE
+from hotlever.probe.priors import METERS, default_priors
+from hotlever.text import value_with_error
+from hotlever.types import Array
+
+#: A vacuum model that needs this factor is told that its lever is probably in air.
+_LOOKS_LIKE_AIR = 1.08
+#: Knees are within this factor of the power of each other: large levers have 20 mW where small ones
+#: have 2, and a wrong unit is a thousand.
+_ALIKE = 100.0
+#: Largest relative error of a knee estimated from the points below it, to go on with.
+_WORST_ESTIMATE = 0.3
+#: How far (standard deviations) a parameter is moved for a derivative.
+_ASIDE = 0.1
+#: Rows of a smooth table, and powers that they are read from.
+_ROWS, _POWERS = 101, 2000
+#: Highest bias (V) to which a lever is followed.
+_HIGHEST_V = 1e3
+
+
+@dataclass(frozen=True)
+class TemperatureCurve:
+    """Tip temperature against power of a reference, and the power of its knee.
+
+    Attributes
+    ----------
+    tip : callable
+        Temperature (K) of powers (mW); NaN where nothing is known.
+    knee_mW : float
+    """
+
+    tip: Callable[[Array], Array]
+    knee_mW: float
+
+    def at(self, power_mW: Array, knee_mW: float) -> Array:
+        """Return the temperature (K) of a lever whose knee is at `knee_mW`."""
+        return self.tip(np.asarray(power_mW, dtype=float) * (self.knee_mW / knee_mW))
+
+
+def curve_of_law(law: PowerLaw, base_temperature_K: float) -> TemperatureCurve:
+    """Return a power law as a reference; its threshold stands for the knee, as in the paper."""
+    return TemperatureCurve(
+        lambda power: law.tip_temperature(power, base_temperature_K), law.threshold_mW
+    )
+
+
+def curve_of_model(model: Branch) -> TemperatureCurve:
+    """Return the model of a lever, in the medium it is to be calibrated in, as reference.
+
+    Raises
+    ------
+    ComputationError
+        If it has no knee.
+    """
+    return TemperatureCurve(model.tip_temperature, knee_of(model).power_mW)
+
+
+def knee_of(model: Branch) -> OperatingPoint:
+    """Return the knee of a model.
+
+    Raises
+    ------
+    ComputationError
+        If it has none.
+    """
+    if model.knee is None:
+        raise ComputationError(
+            f"the model has no knee below {model.hottest_K:.0f} K; calibrate a lever whose model "
+            "has one"
+        )
+    return model.knee
+
+
+def calibrated_by_knee(
+    measured: Measurement, probe: Probe, law: PowerLaw | None, route: str
+) -> Calibration:
+    """Return the calibration of a lever by its knee: the temperatures of a reference at k times P.
+
+    Parameters
+    ----------
+    measured : Measurement
+    probe : Probe
+        Resembles the lever; in vacuum, in the circuit of the measurement.
+    law : PowerLaw, optional
+        The reference; the probe's model in vacuum by default.
+    route : str
+        See `hotlever.estimate.calibration.Calibration`.
+
+    Raises
+    ------
+    InputError
+        If the points neither show the knee nor tell its power to 30 %, it is far from that of the
+        reference, or the power of the probe turns.
+    ComputationError
+        If the probe has no knee.
+    """
+    lever = Lever(probe)
+    vacuum, circuit = lever.branch(), probe.circuit
+    if turns := power_turns(vacuum, "vacuum"):
+        raise InputError(f"the paper's rule: {turns}; expected a lever of which it is")
+    model, similar = curve_of_model(vacuum), _similar_branches(probe, vacuum)
+    reference = model if law is None else curve_of_law(law, circuit.base_temperature_K)
+    current = measured.current(circuit)
+    curve = IVCurve.of(measured.bias_V, current, circuit)
+    notes = []
+    try:
+        knee = find_knee(curve, vacuum)
+    except KneeOutsideError as outside:
+        knee = _estimated_knee(curve, vacuum, reference, similar, str(outside))
+        notes.append(
+            f"{outside}; until then the power of the knee is estimated from the points below it, "
+            f"as {value_with_error(knee.power_mW, knee.power_mW_stderr)} mW"
+        )
+    knee_mW, like_mW = knee.power_mW, reference.knee_mW
+    if not 1.0 / _ALIKE < knee_mW / like_mW < _ALIKE:
+        raise InputError(
+            f"the knee is at {knee_mW:.3g} mW, that of the lever it is compared with at "
+            f"{like_mW:.3g} mW, expected within a factor of {_ALIKE:g}; are bias and current in "
+            "their units?"
+        )
+    rows = smooth_rows(curve, knee_mW, vacuum)
+    power = rows.power_mW
+    tip, of_model = reference.at(power, knee_mW), model.at(power, knee_mW)
+    parts = {
+        "k": np.abs(reference.at(power, knee_mW + knee.power_mW_stderr) - tip),
+        "electronics": _error_of_meters(reference, knee_mW, rows),
+        "other levers": _error_of_other_levers(similar, power / knee_mW),
+    }
+    if law is not None:
+        parts["power law"] = np.abs(of_model - tip)
+    if law is None or knee_mW > _LOOKS_LIKE_AIR * like_mW:
+        in_air = curve_of_model(lever.in_medium("air").branch())
+        parts["constant k"] = np.abs(in_air.at(power, knee_mW) - of_model)
+    used, residual = (law, 0.0) if law is not None else law_of_model(vacuum, model.knee_mW)
+    k = knee_mW / used.threshold_mW
+    if k > _LOOKS_LIKE_AIR and measured.medium != "vacuum":
+        better = "--medium air is" if law is None else "a probe with --medium air would be"
+        notes.append(
+            f"the lever needs {k:.2f} times the power of the model in vacuum: it seems to be "
+            f"in air, where {better} more accurate"
+        )
+    if beyond := int(np.isnan(tip).sum()):
+        notes.append(
+            f"{beyond} rows of the table are hotter than the models go, and have no temperature"
+        )
+    own = reference.at(circuit.power(measured.bias_V, current), knee_mW)
+    return Calibration(
+        table=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, {BUDGETS[0]: parts}),
+        route=route,
+        medium="vacuum",
+        power_law=used,
+        law_residual_K=residual,
+        k=k,
+        k_stderr=knee.power_mW_stderr / used.threshold_mW,
+        knee=knee,
+        knee_tip_K=float(reference.at(np.array(knee_mW), knee_mW)),
+        measured_rms_K=rms(measured.tip_K - own),
+        probe=probe,
+        measurement=measured,
+        notes=notes,
+    )
+
+
+def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> IVCurve:
+    """Return points over the measured range, evenly spaced in bias and also in power, smoothed.
+
+    At the knee, where the bias hardly tells temperatures apart, the power does.
+
+    The power of the knee may be measured or estimated; for `like` see `find_knee`.
+    """
+    smooth = SmoothCurves(curve, knee_mW, like)
+    measured = smooth.points
+    power = np.linspace(measured.power_mW[0], measured.power_mW[-1], _POWERS)
+    fine = smooth.likeliest(power)
+    bias = np.maximum.accumulate(fine.bias_V)
+    low, high = max(measured.bias_V[0], bias[0]), min(measured.bias_V.max(), bias[-1])
+    by_power = np.interp(np.linspace(power[0], power[-1], _ROWS), power, bias)
+    rows = np.unique(np.concatenate([np.linspace(low, high, _ROWS), np.clip(by_power, low, high)]))
+    return IVCurve(rows, np.interp(rows, bias, fine.current_mA), curve.circuit)
+
+
+def _estimated_knee(
+    curve: IVCurve, like: Branch, reference: TemperatureCurve, similar: list[Branch], text: str
+) -> Knee:
+    """Estimate the knee from how the resistance rises below it, with its error.
+
+    Levers of other materials have other knees for the same rise.
+    """
+    scale = scale_to(curve, like)
+    model, *others = (knee_of(branch).power_mW for branch in similar)
+    spread = np.linalg.norm(np.array(others) / model - 1.0) / _ASIDE
+    error = float(np.hypot(scale.power_stderr, spread))
+    if error > _WORST_ESTIMATE:
+        raise InputError(
+            f"{text}. The points below it give its power to ± {error:.0%} only, which is too "
+            "little to calibrate with"
+        )
+    # the knee of a fitted measurement stands above or below the model's
+    power = scale.power * reference.knee_mW
+    return Knee(power_mW=power, power_mW_stderr=error * power)
+
+
+def _error_of_meters(reference: TemperatureCurve, knee_mW: float, rows: IVCurve) -> Array:
+    """Return the standard error (K) at smooth rows by R_s and the scales of both meters.
+
+    The knee moves as the highest lever voltage of the rows does.
+    """
+    changes = []
+    for series, voltage, current in 1.0 + np.diag([RESISTANCE, METERS, METERS]):
+        ohm = float(series * rows.circuit.series_resistance_ohm)
+        misread = IVCurve(
+            voltage * rows.bias_V,
+            current * rows.current_mA,
+            rows.circuit.with_(series_resistance_ohm=ohm),
+        )
+        moved_mW = knee_mW * misread.vertex.power_mW / rows.vertex.power_mW
+        changes.append(reference.at(misread.power_mW, moved_mW))
+    return np.linalg.norm(np.array(changes) - reference.at(rows.power_mW, knee_mW), axis=0)
+
+
+# --- levers of other dimensions and materials ---------------------------------------------------
+
+
+def _similar_branches(probe: Probe, like: Branch) -> list[Branch]:
+    """Return a coarse model of a probe, and the same with each parameter moved within its prior."""
+    priors = default_priors(probe)
+    # the circuit is the measured one, whatever the lever
+    names = tuple(name for name in priors if name != "series_resistance_ohm")
+    past = float(like.bias(like.hottest_K, probe.circuit))
+    reach = Reach(probe.circuit, min(past, _HIGHEST_V))
+    solved = SimilarLevers(Lever(probe, COARSE)).linearised(probe, reach, None, names)
+    model = solved.branch
+    changes = solved.output_slopes * np.array([_ASIDE * priors[name].absolute for name in names])
+    slopes = spline_through(model.u, changes)(model.u, 1)
+    perturbations = zip(np.moveaxis(changes, 2, 0), np.moveaxis(slopes, 2, 0), strict=True)
+    return [model, *(shifted(model, *change) for change in perturbations)]
+
+
+def _error_of_other_levers(similar: list[Branch], ratio: Array) -> Array:
+    """Return the standard deviation (K) of the tip at powers over that of the knee, (n,)."""
+    knees = [knee_of(branch).power_mW for branch in similar]
+    ends = [branch.by_power.highest_mW for branch in similar]
+    # where one of them has melted they differ as they do before
+    power = np.outer(knees, np.minimum(ratio, np.min(np.divide(ends, knees))))
+    tip, *perturbed_tips = (
+        branch.tip_temperature(row) for branch, row in zip(similar, power, strict=True)
+    )
+    return np.linalg.norm(np.array(perturbed_tips) - tip, axis=0) / _ASIDE

@@ -1,0 +1,330 @@
+"""The least-squares problem of an estimate: Gauss-Newton steps, robust weights, confirmation.
+
+A lever is solved with its exact derivatives. Near it, voltages at a given tip temperature are
+nearly powers of the parameters; the optimum among such neighbours, within a region that grows and
+shrinks with how well they tell, is solved next. A search ends where the gradient does: where
+Gauss and Newton's step would lower the sum of squares by next to nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hotlever.errors import HotleverError, InputError
+from hotlever.estimate.diagnosis import lack_of_fit_text
+from hotlever.estimate.experiment import Prediction, Predictor
+from hotlever.estimate.objective import Objective, Subproblem
+from hotlever.estimate.residuals import Residuals
+from hotlever.probe import Probe
+from hotlever.text import with_unit
+from hotlever.types import Array
+
+#: A region beyond which only rounding errors are left, in units of `Coordinates.room`.
+_SMALLEST_REGION = 1e-6
+#: The share of the predicted gain from which on the region grows, and below which it shrinks.
+_TRUSTED, _DOUBTED = 0.7, 0.25
+#: Sum of squares that Gauss and Newton's step may still take away at an optimum where no longer
+#: step than the region gains anything, since values are not smooth there, as near a fold that moves
+#: past a row: a third of a standard error.
+_DECREMENT_WHERE_ROUGH, _ROUGH_REGION = 0.1, 1e-3
+#: The same in units of the noise, where weights count no standard deviations: a thirtieth of a
+#: standard error.
+_RELATIVE_DECREMENT = 1e-3
+#: The same as a share of the sum of squares; the second where that is so many times what noise
+#: explains that no such lever shows the data.
+_NEGLIGIBLE, _NEGLIGIBLE_OF_MISFIT, _MISFIT = 1e-6, 1e-3, 10.0
+#: Differences, as shares of the largest value of an observable, of which only rounding errors are
+#: left.
+_PRECISION = 1e-7
+#: Most reweightings by Huber's weights, with which there is one optimum; then by those that forget
+#: outliers.
+_GENTLE_ROUNDS, _ROBUST_ROUNDS = 6, 14
+#: A confirmation by the full lever that moves no parameter by more than these shares of its
+#: standard error and of its value ends the fit: the confirmed model is exact to first order. Most
+#: confirmations.
+_SETTLED, _SETTLED_RELATIVE, _CONFIRMATIONS = 0.5, 0.03, 5
+#: By how much a model is off that describes the data, a share of an observable's largest value,
+#: where something was known of the lever beforehand (model discrepancy: Kennedy and O'Hagan,
+#: J. R. Stat. Soc. B 63, 425 (2001)).
+DISCREPANCY = 5e-4
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """What steers a search.
+
+    Attributes
+    ----------
+    most_branches : int
+        Levers solved for one choice of weights, after which it ends where it is. Good data take 6
+        to 15; those of levers of which little is known up to 30.
+    most_in_all : int
+        Levers solved for all choices of weights together, in one search with priors, after which it
+        ends where it is.
+    most_in_estimate : int
+        Levers solved for one estimate, in all of its searches. With priors it is never reached. A
+        robust one without priors, which begins anew with each choice of weights, takes twice as
+        many.
+    first_region, largest_region : float
+        How far a step goes, in units of `Coordinates.room`: logarithms, where parameters are
+        positive. Beyond a factor of two neighbours say little.
+    decrement : float
+        Sum of squares that Gauss and Newton's step would still take away at an optimum, where
+        squares count standard deviations (with priors): a tenth of a standard error.
+    scatter_rounds : int
+        Rounds in which an observable without measurement errors finds its scatter.
+    """
+
+    most_branches: int = 25
+    most_in_all: int = 40
+    most_in_estimate: int = 120
+    first_region: float = 0.5
+    largest_region: float = 0.7
+    decrement: float = 1e-2
+    scatter_rounds: int = 3
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where a search ended.
+
+    Attributes
+    ----------
+    optimiser : Optimiser
+        As the search left it.
+    prediction : Prediction
+    decrement : float
+        By how much Gauss and Newton's step would still lower the sum of squares.
+    converged : bool
+        Whether that is next to nothing.
+    covariance : ndarray, shape (p, p)
+        If all weighted data had the same noise: the paper's assumption. NaN if it could not be
+        estimated.
+    """
+
+    optimiser: Optimiser
+    prediction: Prediction
+    decrement: float
+    converged: bool
+    covariance: Array
+
+    @property
+    def probe(self) -> Probe:
+        """The lever."""
+        return self.prediction.probe
+
+    @property
+    def objective(self) -> Objective:
+        """What is least for it."""
+        return self.optimiser.objective
+
+    @property
+    def predictor(self) -> Predictor:
+        """What predicts levers like it, by the experiment that was confirmed last."""
+        return self.optimiser.predictor
+
+    @property
+    def residuals(self) -> Residuals:
+        """The data that it is compared with, with their weights."""
+        return self.objective.residuals
+
+    @property
+    def stderr(self) -> Array:
+        """Standard errors from the covariance, (p,); infinite where there are none."""
+        variance = np.diag(self.covariance)
+        return np.sqrt(np.where(variance > 0, variance, np.inf))
+
+    @property
+    def describes_data(self) -> bool:
+        """Whether the search converged to a lever that describes the data."""
+        return self.converged and not lack_of_fit_text(self.residuals, self.prediction.values)
+
+    @property
+    def misfit(self) -> float:
+        """The mean square of differences, as shares of the largest of each observable."""
+        share = self.residuals.difference(self.prediction.values) / self.residuals.largest
+        return float(np.nanmean((self.residuals.errors.down * share) ** 2))
+
+
+class Optimiser:
+    """Finds the parameters whose prediction is nearest to a measurement.
+
+    Parameters
+    ----------
+    objective : Objective
+    predictor : Predictor
+    options : SearchOptions, optional
+
+    Attributes
+    ----------
+    steps : int
+        Levers that led nearer to the optimum.
+    """
+
+    def __init__(
+        self,
+        objective: Objective,
+        predictor: Predictor,
+        options: SearchOptions | None = None,
+    ) -> None:
+        self.objective, self.residuals, self.predictor = objective, objective.residuals, predictor
+        self._options, self.steps = options or SearchOptions(), 0
+        self._most = self._options.most_in_estimate
+        if objective.informed:
+            self._most = min(self._most, predictor.evaluations + self._options.most_in_all)
+        #: What was wrong with the latest lever that could not be drawn or solved.
+        self.refused = ""
+
+    def solve_and_confirm(self, start: Probe, robust: bool) -> Optimum:
+        """Find the optimum, make the model exact there, and go on until that matters no more.
+
+        A robust search lessens the weight of outliers.
+
+        Raises
+        ------
+        ComputationError
+            If the lever cannot be solved at the start, or confirmations do not settle.
+        """
+        if robust and not self.objective.informed:
+            self._most = 2 * self._options.most_in_estimate
+        optimum = self.solve(start)
+        unknown = self.residuals.errors.without.any() and not self.objective.informed
+        for _ in range(self._options.scatter_rounds if unknown else 0):
+            self.residuals.take_scatter(optimum.prediction.values)
+            optimum = self.solve(optimum.probe)
+        if robust:
+            optimum = self._reweighted(start, optimum)
+        for _ in range(_CONFIRMATIONS):
+            if not self.predictor.confirm(optimum.prediction):
+                return optimum
+            previous, optimum = optimum, self.solve(optimum.probe)
+            if not optimum.converged or self._settled(previous, optimum):
+                return optimum
+        return replace(optimum, converged=False)
+
+    def _reweighted(self, start: Probe, optimum: Optimum) -> Optimum:
+        """Lessen the weight of outliers until nothing changes: gently at first.
+
+        With priors outliers stand out at once, since these hold a fit that others would pull along;
+        without any there is nothing to do.
+        """
+        errors, informed = self.residuals.errors, self.objective.informed
+        difference = self.residuals.own_difference(optimum.prediction.values)
+        if informed and not errors.has_outliers(difference):
+            return optimum
+        for gently, most in ((True, _GENTLE_ROUNDS), (False, _ROBUST_ROUNDS)):
+            for _ in range(most):
+                errors.lessen(self.residuals.own_difference(optimum.prediction.values), gently)
+                # outliers can drive the first fit onto a bound, where it would stay without priors
+                origin = start if gently and not informed else optimum.probe
+                previous, optimum = optimum, self.solve(origin)
+                if not optimum.converged or self._settled(previous, optimum):
+                    break
+        return optimum
+
+    def _settled(self, previous: Optimum, optimum: Optimum) -> bool:
+        """Whether the parameters have moved too little for another confirmation to matter."""
+        objective = self.objective
+        now = optimum.probe.values(objective.varied)
+        size = np.maximum(np.abs(now), objective.coordinates.scale)
+        least = np.minimum(_SETTLED * optimum.stderr, _SETTLED_RELATIVE * size)
+        return bool(np.all(np.abs(now - previous.probe.values(objective.varied)) <= least))
+
+    def solve(self, start: Probe) -> Optimum:
+        """Find the optimum of the present model and weights.
+
+        Raises
+        ------
+        InputError
+            If a parameter starts outside its bounds.
+        ComputationError
+            If the lever cannot be solved at the start.
+        """
+        objective, options = self.objective, self._options
+        self._check_start(start)
+        most = min(self.predictor.evaluations + options.most_branches, self._most)
+        # the noise of some observables may be found with the optimum
+        unknown = bool(self.residuals.errors.without.any())
+        takes_scatter = unknown and objective.informed and options.scatter_rounds > 0
+        at, region = self.predictor.predict(start), options.first_region
+        while True:
+            # without priors residuals have no size that says what is near
+            others = self.predictor.others(at) if objective.informed else []
+            near = Subproblem(objective, at, others)
+            room = objective.coordinates.room(near.origin)
+            target, least = near.minimum(region=region * room)
+            if takes_scatter:
+                target, least = self._with_scatter(target, region * room, near)
+            squares, step = objective.squares(at), target - near.origin
+            inner = bool(np.all(np.abs(step) < 0.99 * region * room))
+            left, enough = objective.decrement(at), self._tolerance(at)
+            # a step within the region that gains nothing is as good as none
+            if left <= enough or (inner and squares - least <= enough):
+                return self._optimum(at, left, converged=True)
+            if region < _SMALLEST_REGION or self.predictor.evaluations >= most:
+                # only rounding errors are left, if so little is promised
+                precise = left <= _NEGLIGIBLE_OF_MISFIT * squares
+                precise = precise and region < _SMALLEST_REGION
+                return self._optimum(at, left, converged=precise or self._is_near(left))
+            if region < _ROUGH_REGION and self._is_near(left):
+                return self._optimum(at, left, converged=True)
+            length = float(np.max(np.abs(step) / room))
+            trial = self._trial(at, target)
+            better = np.inf if trial is None else objective.squares(trial)
+            gain = (squares - better) / max(squares - least, 1e-300)
+            if gain < _DOUBTED:
+                region = 0.3 * length
+            elif gain > _TRUSTED:
+                region = min(max(region, 2.0 * length), options.largest_region)
+            if trial is not None and better < squares:
+                self.steps += 1
+                at = trial
+
+    def _check_start(self, start: Probe) -> None:
+        values = start.values(self.objective.varied).tolist()
+        for parameter, value in zip(self.objective.coordinates.parameters, values, strict=True):
+            if not parameter.lower <= value <= parameter.upper:
+                raise InputError(
+                    f"{parameter.name} = {value:g} to start from, expected a value between "
+                    f"{parameter.lower:g} and {with_unit(f'{parameter.upper:g}', parameter.unit)}"
+                )
+
+    def _is_near(self, left: float) -> bool:
+        """Whether an optimum is so near that its errors hold, if values are not smooth there."""
+        return self.objective.informed and left <= _DECREMENT_WHERE_ROUGH
+
+    def _tolerance(self, at: Prediction) -> float:
+        """Return by how much the sum of squares may still fall where a search ends."""
+        objective, residuals = self.objective, self.residuals
+        squares, difference = objective.squares(at), residuals.difference(at.values)
+        noise = 1.0 if objective.informed else residuals.errors.noise_squares(difference)
+        # so far above what noise explains that no lever is near
+        hopeless = squares > _MISFIT * residuals.size * noise
+        least = (_NEGLIGIBLE_OF_MISFIT if hopeless else _NEGLIGIBLE) * squares
+        if objective.informed:
+            return float(max(self._options.decrement, least))
+        precise = residuals.size * (_PRECISION * residuals.errors.unit_weight) ** 2
+        return float(max(_RELATIVE_DECREMENT * noise, least, precise))
+
+    def _optimum(self, at: Prediction, left: float, *, converged: bool) -> Optimum:
+        return Optimum(self, at, left, converged, self.objective.common_noise_covariance(at))
+
+    def _trial(self, at: Prediction, point: Array) -> Prediction | None:
+        """Solve the lever of a point; None if it cannot be drawn or solved."""
+        try:
+            return self.predictor.predict(self.objective.at(at.probe, point))
+        except HotleverError as error:
+            self.refused = str(error)
+            return None
+
+    def _with_scatter(self, point: Array, region: Array, near: Subproblem) -> tuple[Array, float]:
+        """Take scatter and optimum in turns, among parameters near those of a prediction."""
+        least = np.inf
+        for _ in range(self._options.scatter_rounds):
+            values, slopes = near.predict(point)
+            leverage = self.objective.leverage(slopes, point)
+            self.residuals.take_scatter(values, leverage, DISCREPANCY)
+            point, least = near.minimum(point, region)
+        return point, least

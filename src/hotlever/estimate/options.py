@@ -1,0 +1,136 @@
+"""What users ask of a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal, cast, get_args
+
+from hotlever.errors import InputError, unknown_name
+from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
+from hotlever.probe.parameters import heat_capacities, of_materials, parameter_of, usual_parameters
+from hotlever.probe.priors import SCALES, Prior
+from hotlever.probe.surroundings import Medium
+from hotlever.quantities import FITTED
+
+Weights = Literal["maximum", "errors"]
+#: What the medium is called if nobody knows it: either is tried.
+UNKNOWN_MEDIUM = "unknown"
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """What a fit is asked.
+
+    Attributes
+    ----------
+    observables : sequence of {"current", "reader", "tip", "bridge"}, optional
+        Option I of the paper is ``["current"]``, option II ``["current", "reader"]``, option
+        III adds the tip. All that the measurement has, by default.
+    fixed : mapping of str to float or None
+        Parameters to hold, at a value or (None) at the probe's.
+    robust : bool
+        Lessen the weight of points far from the others' fit: from 3.5 standard deviations on, as
+        the median absolute residual tells them, down to nothing beyond 6. With priors this is done
+        wherever there are enough data to tell.
+    weights : {"maximum", "errors"}
+        Divide every observable by its largest measured value, as in the paper, or every datum by
+        its measurement error; an observable without errors then takes its scatter about the fit.
+    medium : {"vacuum", "air", "unknown"}, optional
+        What the lever was measured in; wins over measurement and probe. If it is unknown both are
+        tried (`hotlever.estimate.estimator`).
+    priors : mapping of str to Prior or str
+        What is known before, of parameters of the material, dimensions, the circuit or the scales
+        of meters, also as text (`hotlever.probe.priors`); all that have a prior are varied.
+    usual_priors : bool
+        Whether what is usually known beforehand counts where no prior is stated, as it does in a
+        calibration (`hotlever.probe.priors.default_priors`).
+    free : sequence of str
+        What else is varied, beside what usually is.
+    usual : sequence of str
+        What usually is: by default the six parameters of the paper's lever. A fit takes what its
+        probe is made of (`hotlever.probe.parameters.usual_parameters`), and one of what was
+        measured in time the scales of the heat capacities.
+
+    Raises
+    ------
+    InputError
+        If a name does not exist, with the nearest that does.
+    """
+
+    observables: Sequence[str] | None = None
+    fixed: Mapping[str, float | None] = field(default_factory=dict)
+    robust: bool = False
+    weights: Weights = "maximum"
+    medium: Medium | Literal["unknown"] | None = None
+    priors: Mapping[str, Prior | str] = field(default_factory=dict)
+    usual_priors: bool = False
+    free: Sequence[str] = ()
+    usual: Sequence[str] = tuple(PARAMETERS)
+
+    def __post_init__(self) -> None:
+        for name in self.fixed:
+            for others, what in ((self.priors, "has a prior"), (self.free, "is free")):
+                if name in others:
+                    raise InputError(f"{name} is fixed and {what}, expected one of them")
+        for kind, names, existing in (
+            ("weights", [self.weights], get_args(Weights)),
+            ("observable", self.observables or (), tuple(FITTED)),
+            (
+                "medium",
+                [] if self.medium is None else [self.medium],
+                (*get_args(Medium), UNKNOWN_MEDIUM),
+            ),
+        ):
+            for name in names:
+                if name not in existing:
+                    raise unknown_name(kind, str(name), existing)
+        if self.observables is None:
+            return
+        if not self.observables:
+            raise InputError(f"no observables; expected some of {', '.join(FITTED)}")
+        chosen = tuple(name for name in FITTED if name in self.observables)
+        object.__setattr__(self, "observables", chosen)
+
+    @property
+    def varied(self) -> list[str]:
+        """All parameters to find."""
+        named = dict.fromkeys([*self.usual, *self.priors, *self.free])
+        return [name for name in named if name not in {*self.fixed, *SCALES}]
+
+    def of(self, probe: Probe, *, in_time: bool = False) -> FitOptions:
+        """Return the options for a probe: what usually varies is what it is made of.
+
+        Raises
+        ------
+        InputError
+            If it has no such parameter as is fixed or free, with the nearest that it has; or if
+            all are fixed.
+        """
+        existing = of_materials(probe, in_time=in_time)
+        for name in self.fixed:
+            if name not in existing:
+                raise unknown_name("parameter", name, existing)
+        for name in self.free:
+            parameter_of(probe, name, in_time=in_time)
+        usual = heat_capacities(probe) if in_time else usual_parameters(probe)
+        own = replace(self, usual=usual)
+        if not own.varied:
+            raise InputError("all parameters are fixed; nothing is left to fit")
+        return own
+
+    @property
+    def media(self) -> tuple[Medium | None, ...]:
+        """What is to be tried: None is what measurement and probe say."""
+        medium = self.medium
+        return get_args(Medium) if medium == UNKNOWN_MEDIUM else (cast("Medium | None", medium),)
+
+    def values(self) -> dict[str, Any]:
+        """Return the options as plain values."""
+        values = asdict(self) | {"fixed": dict(self.fixed), "free": list(self.free)}
+        if not values["usual_priors"]:
+            del values["usual_priors"]
+        if tuple(values.pop("usual")) != tuple(PARAMETERS):
+            values["usual"] = list(self.usual)
+        return values

@@ -1,0 +1,283 @@
+"""The posterior: what data and priors leave of a lever's parameters, and of any quantity of it.
+
+Linearised at the optimum (Laplace's approximation) it is a covariance and what adds up to it;
+sampled, it is a density (`hotlever.estimate.chains`). The profile of a quantity is
+`hotlever.estimate.profile`.
+
+A quantity is curved beyond first order in the errors of data and priors. Errors that move an
+estimate by δ, if everything is linear, move it to the x at which the residuals r have changed by as
+much as δ would change them along all directions that parameters can take:
+(JᵀJ)⁻¹ Jᵀ (r(x) − r(0)) = δ. To second order x = δ − ½ (JᵀJ)⁻¹ Jᵀ r″[δ, δ], and the quantity
+changes by g x + ½ xᵀ H x. Along the axis where that bends most it is solved instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+from scipy import optimize
+from scipy.interpolate import PchipInterpolator
+
+from hotlever.estimate.experiment import Prediction
+from hotlever.estimate.objective import Objective, Quantity, Subproblem, inverse_or_nan
+from hotlever.estimate.surrogate import Surrogate
+from hotlever.probe.priors import PriorShift
+from hotlever.types import Array
+
+#: A datum that alone decides a parameter says nothing of its own noise.
+_LEAST_FREE = 0.05
+#: Standard errors on either side over which derivatives are compared.
+_STEP = 0.5
+#: Standard errors at which the most bent axis is solved, and how bent it must be: its second
+#: derivative as a share of the quantity's standard error.
+_SOLVED_AT, _BENT = (1.25, 2.5), 0.1
+
+
+def standard_errors(slopes: Array, covariance: Array) -> Array:
+    """Return standard errors of quantities with derivatives (..., p), by a covariance (p, p)."""
+    return np.sqrt(np.einsum("...p,pq,...q->...", slopes, covariance, slopes))
+
+
+class Posterior:
+    """What is known of the varied parameters, (p,), after the data.
+
+    Parameters
+    ----------
+    objective : Objective
+    at : Prediction
+        The optimum.
+    """
+
+    def __init__(self, objective: Objective, at: Prediction) -> None:
+        self.objective, self.at = objective, at
+        self._point = objective.point(at.probe)
+        self._rates = objective.coordinates.rates(self._point)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the varied parameters in their own units, (p, p); NaN if singular.
+
+        With priors it is Laplace's. Without, noise differs between observables and along each of
+        them by more than the weights know, so every datum's variance is taken from its own
+        residual, enlarged by its leverage h (MacKinnon and White's HC3, J. Econometrics 29, 305
+        (1985)): C = A⁻¹ Jᵀ V J A⁻¹ with A = JᵀJ and V = r² / (1 − h)².
+        """
+        if self.objective.informed:
+            laplace = self.objective.laplace(self.at.slopes, self._point)
+            return laplace * np.outer(self._rates, self._rates)
+        return np.asarray(self._by_residuals @ self._by_residuals.T)
+
+    @property
+    def _by_residuals(self) -> Array:
+        """How far each datum's own residual, enlarged by its leverage, moves parameters, (p, N)."""
+        objective = self.objective
+        residual = objective.residuals.weighted(self.at.values)
+        jacobian = objective.of_data(self.at.slopes, self._point)
+        inverse = inverse_or_nan(jacobian.T @ jacobian)
+        if residual.size <= self._point.size:
+            return np.full_like(jacobian.T, np.nan)
+        leverage = np.einsum("ij,jk,ik->i", jacobian, inverse, jacobian)
+        influence = inverse @ jacobian.T * (residual / np.maximum(1.0 - leverage, _LEAST_FREE))
+        return np.asarray(self._rates[:, None] * influence)
+
+    @cached_property
+    def influences(self) -> dict[str, Array]:
+        """How far independent errors of one standard deviation move the parameters, (p, m) each.
+
+        By the observable of data with noise, the scale of a meter or thermometer, and the source
+        of a prior: the estimate is, to first order, a weighted sum of all of them, each with an
+        error of its own.
+        """
+        objective, prior = self.objective, self.objective.prior
+        if not objective.informed:
+            by_data = objective.residuals.of_errors(self._by_residuals.T)
+            return {name: rows.T for name, rows in by_data.items()}
+        influence = self._rates[:, None] * objective.laplace(self.at.slopes, self._point)
+        jacobian = objective.of_data(self.at.slopes, self._point)
+        by_data = objective.residuals.of_errors(jacobian)
+        influences = {name: influence @ rows.T for name, rows in by_data.items()}
+        by_prior, sources = objective.of_priors(self._point), np.array(prior.sources)
+        for source in dict.fromkeys(prior.sources):
+            influences[source] = influence @ by_prior[sources == source].T
+        return influences
+
+    @cached_property
+    def shares(self) -> dict[str, Array]:
+        """What adds up to the covariance, (p, p) each, independent of each other.
+
+        By the source of each prior, and of the data as ``measurement``.
+        """
+        shares: dict[str, Array] = {}
+        for name, columns in self.influences.items():
+            source = name if name in self.objective.prior.sources else "measurement"
+            shares[source] = shares.get(source, 0.0) + columns @ columns.T
+        return shares
+
+    @cached_property
+    def shifts(self) -> dict[str, PriorShift]:
+        """How far the data moved parameters and scales from their own priors, by name.
+
+        They are those of the optimum of the linearised problem. What data hardly tell is moved by
+        little, and a search may end further from the optimum than that.
+        """
+        objective, prior = self.objective, self.objective.prior
+        point, residual, jacobian = objective.linearised(self.at)
+        laplace = objective.laplace(self.at.slopes, point)
+        step = -laplace @ (jacobian.T @ residual) if objective.informed else np.zeros(point.size)
+        values = self.at.values + self.slopes @ (self._rates * step)
+        scales = objective.residuals.in_common(values, self.slopes, self.covariance)
+        by = objective.of_priors(point)
+        away = objective.from_priors(point) + by @ step
+        left = standard_errors(by, laplace).tolist()
+        rows = zip(prior.sources, away.tolist(), left, strict=True)
+        return {name: PriorShift(size, rest) for name, size, rest in rows if name != "fit"} | scales
+
+    @property
+    def slopes(self) -> Array:
+        """Derivatives of what is predicted by the varied parameters, (m, n, p)."""
+        return self.at.slopes[:, :, self.objective.columns]
+
+    def principal_steps(self, least: float = 0.0) -> list[dict[str, float]]:
+        """Return changes of the parameters by one standard error, independent of each other.
+
+        They are along the axes of the correlation, those left out whose variance is less than
+        some share of a parameter's.
+        """
+        scale = np.sqrt(np.diag(self.covariance))
+        variances, axes = np.linalg.eigh(self.covariance / np.outer(scale, scale))
+        steps = (axes * np.sqrt(np.maximum(variances, 0.0)) * scale[:, None]).T
+        names = self.objective.varied
+        return [dict(zip(names, step.tolist(), strict=True)) for step in steps[variances >= least]]
+
+    def changes(self, function: Callable[[Array], Array]) -> Array:
+        """Return how values (m,) change by one standard error along each axis, (p, m).
+
+        Their squares add up to the variances. The function is of the parameters `names` of the
+        objective, (k,); differences are central, half a standard error either way.
+        """
+        names = self.objective.names
+        origin, rows = self.at.probe.values(names), []
+        for step in self.principal_steps():
+            half = 0.5 * np.array([step.get(name, 0.0) for name in names])
+            rows.append(function(origin + half) - function(origin - half))
+        return np.array(rows)
+
+    def of(self, quantity: Quantity) -> tuple[float, float]:
+        """Return a quantity and its standard error, linearised."""
+        value = quantity.value(self.at.values, self.at.probe.values(self.objective.varied))
+        return value, float(standard_errors(quantity.gradient(self.slopes), self.covariance))
+
+    @property
+    def deviance(self) -> float:
+        """Minus twice the logarithm of the probability at the optimum, up to a constant.
+
+        With it estimates of a lever from the same data are compared, in one medium and another.
+        """
+        residuals = self.objective.residuals
+        if not self.objective.informed:
+            # the noise is unknown and in common
+            weighted = residuals.weighted(self.at.values)
+            return residuals.size * float(np.log(weighted @ weighted))
+        return float(self.objective.squares(self.at) + residuals.errors.normalisation)
+
+
+class CurvedQuantity:
+    """How a predicted quantity changes with the errors of an estimate.
+
+    Levers are taken from the surrogates of the optimum. Errors are counted along axes, (p,), in
+    which those that the posterior leaves are independent and of unit variance.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    surrogate : Surrogate
+        Of the estimated lever, in one row.
+    observable : int
+        Place of the quantity among its values.
+
+    Raises
+    ------
+    ComputationError
+        If a lever half a standard error away has no such states.
+    """
+
+    def __init__(self, posterior: Posterior, surrogate: Surrogate, observable: int) -> None:
+        objective = posterior.objective
+        self._near, self._surrogate = Subproblem(objective, posterior.at), surrogate
+        self._parameters = posterior.at.probe.values(objective.names)
+        self._observable = observable
+        self._axes = np.linalg.cholesky(posterior.covariance)
+        self._steps = self._axes / objective.coordinates.rates(self._near.origin)[:, None]
+        jacobian, self._gradient = self._derivatives(self._near.origin)
+        self._inverse = np.linalg.pinv(jacobian)
+        self._curvature = self._second_derivatives()
+        bent, axes = np.linalg.eigh(self._curvature)
+        self._bent_axis = axes[:, np.argmax(np.abs(bent))]
+        self._along: PchipInterpolator | None = None
+        if np.abs(bent).max() > _BENT * np.linalg.norm(self._gradient):
+            self._along = self._solved_along(self._bent_axis)
+
+    def axes_of(self, influences: Array) -> Array:
+        """Return how far influences on the parameters, (p, m), move an estimate along the axes."""
+        return np.asarray(np.linalg.solve(self._axes, influences))
+
+    def changes(self, errors: Array) -> Array:
+        """Return by how much errors (n, p) change the quantity, (n,)."""
+        changes = self._to_second_order(errors)
+        if self._along is None:
+            return changes
+        far = errors @ self._bent_axis
+        within = np.clip(far, self._along.x[0], self._along.x[-1])
+        solved = self._along(within) + self._along(within, 1) * (far - within)
+        # the axis is one of the curvature's own, so that it has no part in the others
+        return changes + solved - self._to_second_order(np.outer(far, self._bent_axis))
+
+    def _to_second_order(self, errors: Array) -> Array:
+        bent = np.einsum("ni,ni->n", errors @ self._curvature, errors)
+        return np.asarray(errors @ self._gradient + 0.5 * bent)
+
+    def _derivatives(self, point: Array) -> tuple[Array, Array]:
+        """Return those of the residuals, (N, p), and of the quantity, (p,), along the axes."""
+        objective = self._near.objective
+        _, slopes = self._surrogate.predict(objective.among(self._parameters, point))
+        gradient = slopes[self._observable, 0, objective.columns]
+        gradient = gradient * objective.coordinates.rates(point)
+        return self._near.jacobian(point) @ self._steps, gradient @ self._steps
+
+    def _second_derivatives(self) -> Array:
+        """Return those of the quantity by errors, (p, p)."""
+        by_residuals, rows = self._gradient @ self._inverse, []
+        for step in _STEP * self._steps.T:
+            (after, risen), (before, fallen) = (
+                self._derivatives(self._near.origin + way * step) for way in (1.0, -1.0)
+            )
+            rows.append((risen - fallen - by_residuals @ (after - before)) / (2.0 * _STEP))
+        return 0.5 * (np.array(rows) + np.transpose(rows))
+
+    def _solved_along(self, axis: Array) -> PchipInterpolator:
+        """Return how the quantity changes along an axis, as far as levers were solved for."""
+        near, objective = self._near, self._near.objective
+        low, high = objective.bounds
+        at_rest, changes = near.residual(near.origin), {0.0: 0.0}
+        value = self._value(near.origin)
+        for way in (-1.0, 1.0):
+            point = near.origin
+            for size in _SOLVED_AT:
+                target = way * size * axis
+                point = optimize.least_squares(
+                    lambda point, to=target: self._inverse @ (near.residual(point) - at_rest) - to,
+                    point,
+                    lambda point: self._inverse @ near.jacobian(point),
+                    (low, high),
+                    x_scale="jac",
+                    ftol=1e-6,
+                    max_nfev=50,
+                ).x
+                changes[way * size] = self._value(point) - value
+        return PchipInterpolator(*np.transpose(sorted(changes.items())))
+
+    def _value(self, point: Array) -> float:
+        parameters = self._near.objective.among(self._parameters, point)
+        return float(self._surrogate.values_at(parameters)[self._observable, 0])

@@ -1,0 +1,310 @@
+"""Profile likelihoods: how much worse a fit gets as a quantity is moved off its optimum.
+
+A quantity is moved by a further datum (`hotlever.estimate.objective.Penalty`), and all parameters
+are estimated anew; the rise ΔS of the sum of squares says how many standard errors away it is. A
+calibration asks so for the tip temperature, a fit for each of its parameters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from hotlever.datasets import labelled
+from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.estimate.experiment import TIP, Experiment, Prediction, Predictor, experiment_of
+from hotlever.estimate.objective import Objective, Penalty, Quantity, Subproblem
+from hotlever.estimate.optimiser import Optimiser
+from hotlever.estimate.over_a_sample import with_distances
+from hotlever.estimate.posterior import Posterior
+from hotlever.estimate.result import Fit
+from hotlever.probe.parameters import parameter_of, usual_parameters
+from hotlever.text import BAND
+from hotlever.types import Array, Index
+
+#: Biases, in the hotter half, at which the tip temperature is moved away, and by how many
+#: standard errors.
+_ROWS, _AWAY = 3, 2.0
+#: Levers that are solved on each side at most; one is near enough if the moved estimate is no
+#: further from it than this share of the way from the optimum: where levers were solved on until
+#: the sum of squares was known within 0.4, the standard error changed by 3 % at most.
+_MOST_SOLVED, _NEAR = 3, 0.3
+#: A rise of the sum of squares below which a side is open.
+_LEAST_RISE = 0.25
+#: No side is narrower than this share of the linearised error. Near a fold the search for a moved
+#: lever may end short of the nearest one, and its sum of squares rises by too much: one of 200
+#: levers of which little is known was eleven of its errors off, on a side of a seventh.
+_NARROWEST = 0.6
+#: A linearised error that is right within this factor holds.
+_ALIKE = 1.25
+#: Confidence levels whose intervals are read off the profile of a parameter.
+LEVELS = (0.68, 0.95)
+#: Standard errors that the first points of that span on each side, and the share of a step within
+#: which a parameter is held.
+_REACH, _HELD = 2.5, 1e-3
+#: Longer and longer steps that are added on a side until the interval closes.
+_MORE_STEPS = 6
+
+
+# --- the tip temperature ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ErrorProfile:
+    """Standard errors of the tip temperature on either side, as multiples of the linearised one.
+
+    Attributes
+    ----------
+    tip_K : ndarray, shape (k,)
+        Rising.
+    below, above : ndarray, shape (k,)
+    """
+
+    tip_K: Array
+    below: Array
+    above: Array
+
+    @property
+    def linear(self) -> bool:
+        """Whether the linearised error holds everywhere."""
+        return bool(np.abs(np.log([self.below, self.above])).max() < np.log(_ALIKE))
+
+    def credible_interval(
+        self, tip_K: Array, stderr_K: Array, other_K: Array
+    ) -> tuple[Array, Array]:
+        """Return what 95 % of the tip temperatures lie between (K).
+
+        The profile is that of the linearised error `stderr_K`; an `other_K` is the same either way.
+        """
+        below, above = (np.interp(tip_K, self.tip_K, side) for side in (self.below, self.above))
+        low, high = (BAND * np.hypot(side * stderr_K, other_K) for side in (below, above))
+        return tip_K - low, tip_K + high
+
+
+def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile:
+    """Move the tip temperature of an estimate with priors away from its optimum.
+
+    On either side the lever is solved whose tip is moved away where it is hottest; what is near it
+    serves the other biases. What the optimum tells of levers so far away does not hold where
+    parameters make up for each other along a bent valley. Where no such lever is found the
+    linearised error is kept, and where nothing that is unknown moves the tip there is none.
+    """
+    objective, at, rows = posterior.objective, posterior.at, hotter_rows(posterior.at)
+    least = objective.squares(at)
+    tips = {number: Quantity("tip", int(row)) for number, row in enumerate(rows)}
+    moving = {number: tip for number, tip in tips.items() if posterior.of(tip)[1] > 0.0}
+    sides = np.ones((2, rows.size))
+    for side, way in enumerate((-1.0, 1.0) if moving else ()):
+        penalised = [objective.penalised(_penalty(posterior, tip, way)) for tip in moving.values()]
+        near = _solved_near(penalised[-1], posterior, experiment)
+        if near is None:
+            continue
+        for pulled, (number, tip) in zip(penalised, moving.items(), strict=True):
+            there, _ = near.of(pulled).minimum()
+            value, stderr = posterior.of(tip)
+            away = abs(tip.value(near.values_at(there), there) - value)
+            rise = max(near.squares(there) - least, _LEAST_RISE)
+            sides[side, number] = max(away / (stderr * np.sqrt(rise)), _NARROWEST)
+    return ErrorProfile(at.values[TIP, rows], *sides)
+
+
+def _solved_near(
+    penalised: Objective, posterior: Posterior, experiment: Experiment
+) -> Subproblem | None:
+    """Solve the lever that a pulled objective leads to, and return what is near it.
+
+    It is moved again from there until that moves it little; None if that does not end. No trial is
+    rejected, as a search would: what is near a lever that lies too far off knows the way back.
+    """
+    objective, at = posterior.objective, posterior.at
+    optimum = objective.point(at.probe)
+    # lengths in standard errors of the parameters
+    errors = np.sqrt(np.diag(posterior.covariance)) / objective.coordinates.rates(optimum)
+    near = Subproblem(objective, at)
+    for count in range(_MOST_SOLVED + 1):
+        there, _ = near.of(penalised).minimum()
+        step_length = np.linalg.norm((there - near.origin) / errors)
+        if count and step_length < _NEAR * np.linalg.norm((near.origin - optimum) / errors):
+            return near
+        if count < _MOST_SOLVED:
+            try:
+                solved = experiment.predict(objective.at(near.at.probe, there), near.at)
+            except HotleverError:  # it melts below the highest bias, or cannot be drawn
+                return None
+            near = Subproblem(objective, solved)
+    return None
+
+
+def _penalty(posterior: Posterior, tip: Quantity, way: float) -> Penalty:
+    """Return a datum that moves an estimate to `_AWAY` standard errors, if everything is linear.
+
+    It is twice as far away, with the error that the tip is known by: the estimate moves half way.
+    """
+    value, stderr = posterior.of(tip)
+    return Penalty(tip, value + 2.0 * way * _AWAY * stderr, stderr)
+
+
+def hotter_rows(at: Prediction) -> Index:
+    """Return the rows of the data at which limits are looked for, the hottest last."""
+    order = np.argsort(at.values[TIP])
+    return order[np.linspace(order.size / 2, order.size - 1, _ROWS).astype(int)]
+
+
+# --- the parameters of a fit --------------------------------------------------------------------
+
+
+def profile_likelihood(
+    result: Fit,
+    name: str,
+    *,
+    points: int = 11,
+) -> xr.Dataset:
+    """Hold one parameter at values around its optimum and fit the others again.
+
+    Parameters
+    ----------
+    result : Fit
+    name : str
+        A parameter that was varied.
+    points : int
+        Odd; values from 2.5 standard errors below to as many above the optimum, within the
+        parameter's bounds. More are added on a side where the 95 % interval stays open.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimension ``point``: ``value``, ``delta_chi_square`` (in units of the fit's own
+        noise variance; what priors add is included), ``parabola`` (what the standard error alone
+        says; NaN without one), and ``refitted`` (parameter, point). On (level, side):
+        ``interval``, NaN where it is open. ``notes`` says in words which sides are open and why.
+
+    Raises
+    ------
+    InputError
+        If the parameter does not exist or was fixed, it is the only one varied, `points` is too
+        small or even, or the data have no scatter or are not described.
+    ComputationError
+        If the lever cannot be solved at the optimum.
+    """
+    result.measurement.need_rest("a profile")
+    result.need_described("a profile")
+    parameter = parameter_of(result.probe, name)
+    if name not in result.names or len(result.names) < 2:
+        raise InputError(
+            f"no profile of {name}: expected one of several parameters that the fit varied "
+            f"({', '.join(result.names)})"
+        )
+    if points < 5 or points % 2 == 0:
+        raise InputError(f"found points = {points}, expected an odd number of 5 or more")
+    if not result.sum_of_squares > 0:
+        raise InputError("the fit meets its data exactly: without scatter nothing tells how sure")
+    quantity = Quantity("parameter", result.names.index(name))
+    names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
+    objective = result.objective(names)
+    residuals = objective.residuals
+    # exact to first order at the optimum, and used as it is from there
+    experiment = experiment_of(result.probe, residuals.bias, names=names, reduce=True)
+    experiment = with_distances(experiment, result.probe, residuals.distance_um)
+    experiment, at_optimum = experiment.exact_at(result.probe)
+    # with priors, residuals are in standard deviations
+    variance = 1.0 if objective.informed else _noise_variance(result, name, residuals.size)
+    least = objective.squares(at_optimum) if objective.informed else result.sum_of_squares
+    value, stderr = result.parameters[name].value, result.parameters[name].stderr
+    # without a standard error, a tenth of the bounds' distance is a step as good as any
+    step = (stderr or 0.1 * (parameter.upper - parameter.lower)) * _REACH / (points // 2)
+    rows = {value: (0.0, result.probe.values(result.names))}
+    reasons: dict[str, str] = {}
+    for side, sign, way, bound in (
+        ("lower", -1.0, "down", parameter.lower),
+        ("upper", 1.0, "up", parameter.upper),
+    ):
+        distance = 0.0
+        near: Prediction = at_optimum
+        for count in range(1, points // 2 + _MORE_STEPS + 1):
+            distance += step * 2.0 ** max(0, count - points // 2)
+            target = value + sign * distance
+            if sign * (target - bound) >= 0:
+                reasons[side] = f"{way} to its bound {bound:g}"
+                break
+            penalised = objective.penalised(Penalty(quantity, target, _HELD * step))
+            try:
+                start = near.probe.replace({name: target})
+                predictor = Predictor(experiment, near=near)
+                near = Optimiser(penalised, predictor).solve(start).prediction
+            except ComputationError:
+                reasons[side] = f"as far as the lever can be solved ({target:.4g} cannot)"
+                break
+            delta = (objective.squares(near) - least) / variance
+            rows[target] = delta, near.probe.values(result.names)
+            if count >= points // 2 and delta > chdtri(1, 1.0 - LEVELS[-1]):
+                break
+        else:
+            reasons[side] = f"as far as it was followed ({target:.4g})"
+    return _dataset(result, name, dict(sorted(rows.items())), reasons)
+
+
+def _noise_variance(result: Fit, name: str, size: int) -> float:
+    """Return what the sum of squares knows of the noise, corrected by the standard error."""
+    variance = result.sum_of_squares / max(size - len(result.names), 1)
+    number, stderr = result.names.index(name), result.parameters[name].stderr
+    common = result.common_noise_covariance[number, number]
+    return variance * (1.0 if stderr is None else float(stderr**2 / common))
+
+
+def _dataset(
+    result: Fit, name: str, rows: dict[float, tuple[float, Array]], reasons: dict[str, str]
+) -> xr.Dataset:
+    optimum = result.parameters[name]
+    values = np.array(list(rows))
+    delta = np.array([delta for delta, _ in rows.values()])
+    interval = np.array([_interval(values, delta, optimum.value, level) for level in LEVELS])
+    sides = ["lower", "upper"]
+    notes = [
+        f"{name}: the {100 * level:.0f} % interval is open on the {side} side: the data do not "
+        f"exclude values {reasons[side]}"
+        for level, ends in zip(LEVELS, interval, strict=True)
+        for side, end in zip(sides, ends, strict=True)
+        if np.isnan(end)
+    ]
+    stderr = np.nan if optimum.stderr is None else optimum.stderr
+    refitted = np.transpose([parameters for _, parameters in rows.values()])
+    others = [number for number, other in enumerate(result.names) if other != name]
+    return labelled(
+        {
+            "delta_chi_square": delta,
+            "parabola": ((values - optimum.value) / stderr) ** 2,
+            "refitted": (("parameter", "point"), refitted[others]),
+            "interval": (("level", "side"), interval),
+        },
+        "point",
+        {
+            "value": ("point", values),
+            "parameter": [result.names[number] for number in others],
+            "level": list(LEVELS),
+            "side": sides,
+        },
+        quantity=name,
+        lever=result.probe.title,
+        optimum=optimum.value,
+        notes="\n".join(notes),
+    )
+
+
+def _interval(values: Array, delta: Array, optimum: float, level: float) -> tuple[float, float]:
+    """Read an interval off a profile; NaN for a side where it does not close."""
+    # the root of a parabola is a straight line, on which interpolation is exact
+    height, limit = np.sqrt(np.maximum(delta, 0.0)), np.sqrt(chdtri(1, 1.0 - level))
+
+    def crossing(side: NDArray[np.bool_], outwards: int) -> float:
+        x, y = values[side][::outwards], height[side][::outwards]
+        beyond = np.flatnonzero(y >= limit)
+        if not beyond.size:
+            return float("nan")
+        after = beyond[0]
+        return float(np.interp(limit, y[after - 1 : after + 1], x[after - 1 : after + 1]))
+
+    return crossing(values <= optimum, -1), crossing(values >= optimum, 1)

@@ -1,0 +1,341 @@
+"""What a calibrated lever does in a pulse: temperatures by the pulse's height, with their errors.
+
+The lever that the calibration has estimated is followed in time at some heights. What the estimate
+is uncertain in is the same as at rest, but a pulse depends on it otherwise: levers that are moved
+along the main directions of the estimate's covariance are followed too. The heat capacity is one
+more uncertain parameter. A lever that holds more heat does the same more slowly, so that its pulse
+is that of a shorter one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import ArrayLike
+from pydantic import ValidationInfo, model_validator
+from scipy.integrate import simpson
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from hotlever.datasets import frame_text
+from hotlever.errors import ComputationError, InputError, unknown_name
+from hotlever.estimate.inverse_problem import Estimate
+from hotlever.estimate.outcome import Columns, Section, Vector
+from hotlever.estimate.tip_table import (
+    BUDGETS,
+    budgets_of,
+    check_rows,
+    even_rows,
+    interpolated,
+    stored_table,
+    table_with_budgets,
+    total_error,
+)
+from hotlever.estimate.tip_temperature import error_of_model, errors_by_source, measured_range
+from hotlever.lever import Lever
+from hotlever.lever.equations import BASE
+from hotlever.lever.lever import COARSE, State
+from hotlever.lever.similar import SimilarLevers
+from hotlever.lever.transient import pulse, simulate
+from hotlever.lever.transient.cyclic import cyclic_steady_state
+from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
+from hotlever.materials.heat import heat_capacity
+from hotlever.probe import Probe
+from hotlever.text import BAND
+from hotlever.types import Array, Index, Progress
+
+#: Standard deviation of the heat capacity: tables of pure silicon differ by 1 to 2 %, and doping,
+#: oxides and metal on a lever are not in them.
+HEAT_CAPACITY_SPREAD = 0.03
+#: The same of what air takes up, by the properties of cold air: 7 % too much at a rise of 600 K.
+_HEAT_IN_AIR_SPREAD = 0.1
+#: What is told of a pulse: its highest tip temperature, that at its end, and the mean during it.
+MOMENTS = ("peak", "end", "mean")
+_KINDS = ("_K", "_stderr_K", "_low_K", "_high_K")
+#: Columns of the table.
+PULSE_COLUMNS = ("height_V", *(f"{moment}{kind}" for moment in MOMENTS for kind in _KINDS))
+#: Heights that are followed with the coarse mesh, and which of them with the fine one and for
+#: moved levers.
+_HEIGHTS, _SOME = 13, (12, 9, 6, 3)
+#: Points of a history for each step, and how far directions are followed (standard errors).
+_PER_STEP, _ASIDE = 8, 0.5
+#: Directions of the covariance that matter: share of the variance of a parameter that they have,
+#: and of that of the highest pulse that may be left out at others.
+_LEAST_VARIANCE, _LEFT_OUT = 1e-3, 2e-3
+#: How often a single pulse is followed for longer to find its peak.
+_LONGER = 8
+
+
+@dataclass(frozen=True)
+class PulseTiming:
+    """Length of a rectangular pulse and the period of its repetition (µs), if it is repeated."""
+
+    length_us: float
+    period_us: float | None = None
+
+    def __post_init__(self) -> None:
+        pulse(1.0, self.length_us, self.period_us)
+
+    @property
+    def text(self) -> str:
+        """What it is, in words."""
+        each = "" if self.period_us is None else f" each {self.period_us:g} µs"
+        return f"a pulse of {self.length_us:g} µs{each}"
+
+
+@dataclass(frozen=True)
+class PulseCalibration:
+    """Tip temperatures of a calibrated lever in a pulse.
+
+    Attributes
+    ----------
+    timing : PulseTiming
+        A repeated pulse is one in the cyclic steady state of its train.
+    table : xarray.Dataset
+        `PULSE_COLUMNS` on the dimension ``height``, over the heights of the calibrated range; and
+        ``budget_K``, the standard error of the peak by ``source``.
+    """
+
+    timing: PulseTiming
+    table: xr.Dataset
+
+    def tip_temperature(self, height_V: ArrayLike, moment: str = "peak") -> Array:
+        """Return the tip temperature (K) by the height of the pulse (V); NaN out of range.
+
+        Parameters
+        ----------
+        height_V : array_like
+        moment : {"peak", "end", "mean"}
+        """
+        return interpolated(self.table, height_V, "height_V", _column(moment), tip="peak_K")
+
+    def height_for(self, tip_K: ArrayLike, moment: str = "peak") -> Array:
+        """Return the height (V) of the pulse for a tip temperature (K); NaN out of range.
+
+        Parameters
+        ----------
+        tip_K : array_like
+        moment : {"peak", "end", "mean"}
+        """
+        return interpolated(self.table, tip_K, _column(moment), "height_V", tip="peak_K")
+
+    def section(self) -> PulseSection:
+        """Return the section of the calibration file."""
+        table = {name: self.table[name].values for name in PULSE_COLUMNS}
+        return PulseSection.holding(self.timing, table=table, **budgets_of(self.table))
+
+    def table_csv(self, by: str = "temperature", step: float | None = None) -> str:
+        """Return the table as CSV, to load into an instrument; see `Calibration.table_csv`.
+
+        Raises
+        ------
+        InputError
+            If there is none by power, which a pulse has no single one of, or the rows are too many.
+        """
+        along = {"temperature": "peak_K", "bias": "height_V"}.get(by)
+        if along is None:
+            raise InputError(f"a table of pulses by {by}: expected by temperature or bias")
+        rows = even_rows(self.table, PULSE_COLUMNS, along, step, tip="peak_K")
+        return frame_text(pd.DataFrame(rows), index=False, float_format="%.6g")
+
+
+class PulseSection(Section):
+    """What a calibration file holds of a pulse."""
+
+    length_us: float
+    period_us: float | None = None
+    table: Columns
+    budget_K: dict[str, Vector]
+
+    @model_validator(mode="after")
+    def _belongs_together(self, info: ValidationInfo) -> Self:
+        where = f"{info.context}: pulse"
+        check_rows(self.table, {BUDGETS[0]: self.budget_K}, "height", "peak_K", where)
+        try:
+            PulseTiming(self.length_us, self.period_us)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        return self
+
+    def calibration(self) -> PulseCalibration:
+        """Return what was written."""
+        budgets = {BUDGETS[0]: self.budget_K}
+        table = stored_table(self.table, budgets, PULSE_COLUMNS, "height")
+        return PulseCalibration(PulseTiming(self.length_us, self.period_us), table)
+
+
+def pulse_calibration(
+    estimate: Estimate, timing: PulseTiming, progress: Progress | None = None
+) -> PulseCalibration:
+    """Return what an estimated lever does in a pulse, over the heights of its measured range.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    timing : PulseTiming
+    progress : callable, optional
+        Called with the pulses followed and how many there are, about.
+
+    Raises
+    ------
+    ComputationError
+        If the lever cannot be followed in time.
+    """
+    bias = measured_range(estimate)
+    pulses = _Pulses(estimate, bias, timing, progress)
+    directions = estimate.posterior.principal_steps(_LEAST_VARIANCE)
+    axes: Index = np.arange(len(directions))
+    corrections, changes = [], []
+    for row in _SOME:
+        change = np.zeros((len(directions) + 1, len(MOMENTS)))
+        for axis in axes:
+            change[axis] = pulses.along(row, directions[axis])
+        change[-1] = pulses.change(row, pulses.coarse, slower=1.0 + HEAT_CAPACITY_SPREAD)
+        corrections.append(pulses.change(row, pulses.fine))
+        changes.append(change)
+        if row == _SOME[0]:
+            # the directions that hold nearly all of the variance
+            shares = (change[:-1] ** 2 / (change[:-1] ** 2).sum(axis=0)).max(axis=1)
+            order = np.argsort(shares)
+            axes = np.sort(order[np.cumsum(shares[order]) > _LEFT_OUT])
+    heights = pulses.heights
+    # over V² they hardly change when cold
+    by_square = CubicSpline(heights, np.log(pulses.rises / heights[:, None] ** 2))
+    rise = bias[:, None] ** 2 * np.exp(by_square(bias))
+    rise *= 1.0 + _through(heights[list(_SOME)], corrections, bias)
+    slopes = rise[:, None] * _through(heights[list(_SOME)], changes, bias)
+    # with the base the whole lever gets warmer
+    slopes[:, :-1] += np.array([[direction.get(BASE, 0.0)] for direction in directions])
+    return _with_errors(estimate, bias, timing, rise, slopes, directions)
+
+
+class _Pulses:
+    """Rises of the tip (K) in pulses of an estimated lever, and of others like it.
+
+    Rises are those of `MOMENTS`, shape (3,); those of other levers are relative to it.
+    """
+
+    def __init__(
+        self, estimate: Estimate, bias: Array, timing: PulseTiming, progress: Progress | None
+    ) -> None:
+        self._probe, self._timing, self._progress = estimate.probe, timing, progress
+        self._done, self._all = 0, 2 * (_HEIGHTS + len(estimate.options.varied))
+        self.heights = np.linspace(float(bias[0]), float(bias[-1]), _HEIGHTS)
+        self.coarse, self.fine = Lever(estimate.probe, COARSE), Lever(estimate.probe)
+        self._similar = SimilarLevers(self.coarse)
+        # a train settles sooner from where one that is a little lower has
+        states: list[State | None] = [None]
+        rises = []
+        for height in self.heights:
+            rise, state = self._follow(self.coarse, height, states[-1])
+            rises.append(rise)
+            states.append(state)
+        self.rises, self._states = np.array(rises), states[1:]
+
+    def change(self, row: int, lever: Lever, slower: float = 1.0) -> Array:
+        """Return how the rises of a lever differ that holds `slower` times the heat."""
+        near = None if lever is self.fine else self._states[row]
+        return self._follow(lever, self.heights[row], near, slower)[0] / self.rises[row] - 1.0
+
+    def along(self, row: int, direction: dict[str, float]) -> Array:
+        """Return how those of a lever differ one standard error along a direction, linearised.
+
+        The other way if it melts this way, or its mesh turns over.
+        """
+        try:
+            return self._aside(row, direction, -_ASIDE)
+        except ComputationError:
+            return self._aside(row, direction, _ASIDE)
+
+    def _aside(self, row: int, direction: dict[str, float], way: float) -> Array:
+        values = self._probe.values(list(direction)) + way * np.array(list(direction.values()))
+        probe = self._probe.replace(dict(zip(direction, values.tolist(), strict=True)))
+        return self.change(row, self._similar.lever(probe)) / way
+
+    def _follow(
+        self, lever: Lever, height: float, near: State | None, slower: float = 1.0
+    ) -> tuple[Array, State | None]:
+        """Return the rises, and the state in which a period of the cyclic steady state begins.
+
+        A lever that holds more heat does the same more slowly: its pulse is that of a shorter one.
+        """
+        length, period = self._timing.length_us / slower, self._timing.period_us
+        wave, state = pulse(float(height), length), None
+        if period is None:
+            for longer in range(1, _LONGER + 1):
+                history = simulate(lever, wave, length * 2.0**longer, per_step=_PER_STEP)
+                if int(history.tip_K.values.argmax()) < history.sizes["time"] - 1:
+                    break
+        else:
+            history, state = cyclic_steady_state(
+                lever, wave, period / slower, start=near, per_step=_PER_STEP
+            )
+        self._done += 1
+        if self._progress is not None:
+            self._progress(self._done, max(self._all, self._done + 1))
+        time, tip = history.time.values, history.tip_K.values
+        during = time <= length
+        mean = simpson(tip[during], x=time[during]) / np.ptp(time[during])
+        moments = np.array([tip.max(), tip[during][-1], mean])
+        return moments - lever.circuit.base_temperature_K, state
+
+
+def _through(heights: Array, values: list[Array], at: Array) -> Array:
+    """Return values at falling heights at others; below the lowest they stay."""
+    curve = PchipInterpolator(heights[::-1], values[::-1])
+    return np.asarray(curve(np.maximum(at, heights.min())))
+
+
+def _with_errors(
+    estimate: Estimate,
+    bias: Array,
+    timing: PulseTiming,
+    rise: Array,
+    slopes: Array,
+    directions: list[dict[str, float]],
+) -> PulseCalibration:
+    """Return rises (n, moments) with errors, by their changes (n, directions + 1, moments)."""
+    probe, varied = estimate.probe, estimate.options.varied
+    # changes by directions to changes by parameters, of which units differ by many orders
+    steps = np.array([[direction[name] for name in varied] for direction in directions])
+    scale = np.abs(steps).max(axis=0)
+    inverse = np.linalg.pinv(steps / scale) / scale[:, None]
+    by_parameter = np.einsum("pd,ndm->nmp", inverse, slopes[:, :-1])
+    parts = errors_by_source(estimate.posterior, by_parameter)
+    parts["heat capacity"] = np.abs(slopes[:, -1])
+    around = probe.surroundings
+    if around.medium == "air":
+        share = _share_of_air(probe, timing.length_us) / HEAT_CAPACITY_SPREAD
+        parts["heat in air"] = parts["heat capacity"] * _HEAT_IN_AIR_SPREAD * share
+    of_model = [error_of_model(around, bias, column) for column in rise.T]
+    parts["model"] = np.stack(of_model, axis=1)
+    tip = probe.circuit.base_temperature_K + rise
+    stderr = total_error(parts)
+    kinds = np.stack([tip, stderr, tip - BAND * stderr, tip + BAND * stderr], axis=2)
+    rows = np.column_stack([bias, kinds.reshape(len(kinds), -1)])
+    columns = dict(zip(PULSE_COLUMNS, rows.T, strict=True))
+    peak = MOMENTS.index("peak")
+    budget = {source: part[:, peak] for source, part in parts.items()}
+    return PulseCalibration(timing, table_with_budgets(columns, {BUDGETS[0]: budget}, "height"))
+
+
+def _share_of_air(probe: Probe, time_us: float) -> float:
+    """Return the heat that air takes up from a plate by that in the plate, as they get warm.
+
+    Of a half space on either side whose surface warms evenly in time (Carslaw and Jaeger,
+    Conduction of Heat in Solids, 2.5), cold: when it is hot, the air is thinner.
+    """
+    T = probe.circuit.base_temperature_K
+    kappa = probe.surroundings.gas_conductivity * float(thermal_conductivity_of_air(T)[0])
+    capacity = float(heat_capacity_of_air(T, probe.surroundings.pressure_mbar)[0])
+    per_area = 2.0 * 4.0 / 3.0 * np.sqrt(kappa * capacity * 1e-6 * time_us / np.pi)
+    return float(per_area / (1e-4 * probe.layout().thickness_um * heat_capacity(T)[0]))
+
+
+def _column(moment: str) -> str:
+    if moment not in MOMENTS:
+        raise unknown_name("moment", moment, MOMENTS)
+    return f"{moment}_K"

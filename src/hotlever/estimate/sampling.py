@@ -1,0 +1,376 @@
+"""Posterior samples of a fit's parameters or a calibration's tip, and what follows from them.
+
+Sampled with emcee from the density of `hotlever.estimate.posterior`; levers are taken from a
+surrogate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+
+import emcee
+import numpy as np
+import xarray as xr
+
+from hotlever.datasets import labelled
+from hotlever.errors import InputError
+from hotlever.estimate.chains import (
+    FEWEST_EFFECTIVE,
+    HIGHEST_RHAT,
+    Chains,
+    Noise,
+    PosteriorDensity,
+    sample,
+    worth,
+)
+from hotlever.estimate.experiment import TIP, ExperimentAtRest, Predictor, experiment_of, named
+from hotlever.estimate.objective import Quantity, Subproblem
+from hotlever.estimate.over_a_sample import with_distances
+from hotlever.estimate.posterior import Posterior
+from hotlever.estimate.profile import ErrorProfile, hotter_rows
+from hotlever.estimate.result import Fit
+from hotlever.estimate.surrogate import ReducedSurrogate
+from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.materials import full_name
+from hotlever.materials.parameters import INVERSION
+from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of, usual_parameters
+from hotlever.steps import each
+from hotlever.text import BAND
+from hotlever.types import Array, Progress
+
+#: Quantiles (%) of a predictive band: median, 68 % and 95 %.
+BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
+#: Standard deviations from which on a solved lever tells of those that samples reach.
+_TELLING = 1.0
+
+
+class SampledLever:
+    """A lever near a fit's optimum, for samples: exact at a probe, cheap for others.
+
+    Parameters
+    ----------
+    experiment : ExperimentAtRest
+        Of a lever like it, reduced if it can be.
+    probe : Probe
+
+    Attributes
+    ----------
+    at : PredictionAtRest
+        Of the probe, with the surrogate that is sampled.
+
+    Raises
+    ------
+    ComputationError
+        If the lever cannot be solved.
+    """
+
+    def __init__(self, experiment: ExperimentAtRest, probe: Probe) -> None:
+        self._experiment, self.at = experiment.exact_at(probe)
+        if isinstance(experiment.fast, ReducedLever):
+            local, linearised = self.at.surrogate, self.at.linearised
+            surrogate = ReducedSurrogate(local, experiment.fast, linearised)
+            self.at = replace(self.at, surrogate=surrogate)
+
+    @classmethod
+    def of_fit(
+        cls, fit: Fit, probe: Probe, bias: Array, distance_um: Array | None = None
+    ) -> SampledLever:
+        """Return a lever that was fitted, at some biases (V) and distances, exact at a probe."""
+        experiment = experiment_of(probe, bias, names=tuple(fit.names), reduce=True)
+        return cls(with_distances(experiment, probe, distance_um), probe)
+
+    def error_K(self, probe: Probe) -> float:
+        """Return by how much the tip temperature of a similar probe may be off.
+
+        By the lever that is solved there; of a reduced one by what the full one's residual says.
+        """
+        solved = self._experiment.predict(probe, self.at)
+        surrogate = self.at.surrogate.values_at(probe.values(self._experiment.names))
+        error = float(np.abs(surrogate - solved.values)[TIP].max())
+        return error + self._experiment.fast.tip_error_K(probe, solved.linearised.branch)
+
+
+# --- the tip of a calibration -------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SampledTip:
+    """What posterior samples say of the tip temperature.
+
+    Attributes
+    ----------
+    profile : ErrorProfile
+        From the quantiles of 2.5 and 97.5 %.
+    effective_samples, rhat : float
+        Of the tip temperature where it is hottest.
+    """
+
+    profile: ErrorProfile
+    effective_samples: float
+    rhat: float
+
+    @property
+    def enough(self) -> bool:
+        """Whether the quantiles can be trusted."""
+        return self.rhat < HIGHEST_RHAT and self.effective_samples >= FEWEST_EFFECTIVE
+
+    @property
+    def note(self) -> str:
+        """What the limits are from, or why not from these samples."""
+        worth = f"{self.effective_samples:.0f} effective ones, R̂ {self.rhat:.3f}"
+        if self.enough:
+            return (
+                f"95 % of the tip temperatures lie between quantiles of posterior samples ({worth})"
+            )
+        return (
+            f"too few posterior samples: {worth}, where {FEWEST_EFFECTIVE} and less than "
+            f"{HIGHEST_RHAT:g} are expected; the limits are those without samples, take more"
+        )
+
+
+def sample_tip(
+    posterior: Posterior,
+    predictor: Predictor,
+    *,
+    samples: int,
+    progress: Progress | None = None,
+) -> SampledTip:
+    """Sample the parameters of an estimate, and their tip temperatures.
+
+    Levers that the predictor has solved far enough from the optimum say how values bend. What is
+    sampled costs too little for processes of its own.
+    """
+    objective, at = posterior.objective, posterior.at
+    near = Subproblem(objective, at, predictor.others(at), least=_TELLING)
+    density = PosteriorDensity(objective, at, near.values_at)
+    chains = sample(
+        density.log_probability, density.approximation, samples=samples, progress=progress
+    )
+    points, rows = chains.points.reshape(-1, near.origin.size), hotter_rows(at)
+    # a walker stands still where a proposal is refused
+    different, index = np.unique(points, axis=0, return_inverse=True)
+    tips = np.array([near.values_at(point)[TIP, rows] for point in different])[index]
+    middle, stderr = np.transpose([posterior.of(Quantity("tip", int(row))) for row in rows])
+    low, high = np.percentile(tips, (2.5, 97.5), axis=0)
+    hottest = tips[:, -1].reshape(chains.points.shape[:3])
+    return SampledTip(
+        ErrorProfile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),
+        *worth(hottest),
+    )
+
+
+# --- the parameters of a fit --------------------------------------------------------------------
+
+
+def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity, SampledLever]:
+    """Return the density of a fit's parameters, approximated about a probe, and levers near it."""
+    objective = fit.objective(fit.names)
+    residuals = objective.residuals
+    lever = SampledLever.of_fit(fit, probe, residuals.bias, residuals.distance_um)
+    near = Subproblem(objective, lever.at)
+    return PosteriorDensity(objective, lever.at, near.values_at, noise), lever
+
+
+def sample_posterior(
+    fit: Fit,
+    *,
+    samples: int = 10_000,
+    walkers: int | None = None,
+    processes: int = 2,
+    seed: int = 0,
+    noise: Noise = "each",
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Sample the posterior of the parameters that a fit varied, with the priors that it had.
+
+    Parameters
+    ----------
+    fit : Fit
+    samples : int
+        Kept, at least; rounded up to a whole number of steps of all walkers.
+    walkers : int, optional
+        Of each of four independent ensembles; by default 24, or three for each parameter.
+    processes : int
+        Started by spawn: a script that calls this with more than one needs
+        ``if __name__ == "__main__"``. The samples do not depend on their number.
+    seed : int
+    noise : {"each", "common"}
+        One unknown noise scale for each observable (they differ by a factor of ten in real
+        data), or one for all scaled residuals, which is what the fit's standard errors assume.
+    progress : callable, optional
+        Called with the steps done and their number.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimensions ``chain`` and ``draw``: the varied parameters,
+        ``inversion_temperature`` and ``log_probability``; on ``quantity`` (all of these but the
+        last): ``effective_sample_size``, ``rhat``; ``acceptance_fraction``; the coordinate
+        ``ensemble`` of each chain. Attributes give the fixed parameters, the seed, the noise, and
+        by how much the surrogate may be wrong at the outermost samples (``surrogate_error_K``).
+
+    Raises
+    ------
+    InputError
+        If a number is too small or `noise` unknown, or the fit does not describe its data.
+    ComputationError
+        If no start is found or a worker process dies.
+    """
+    if noise not in ("each", "common"):
+        raise InputError(f"found noise = {noise!r}, expected 'each' or 'common'")
+    fit.need_described("a posterior")
+    at_optimum, _ = _density_at(fit, fit.probe, noise)
+    # with other weights than the fit's, the posterior lies beside the optimum
+    middle = at_optimum.objective.at(fit.probe, at_optimum.approximation.mean)
+    density, lever = _density_at(fit, middle, noise)
+    chains = sample(
+        density.log_probability,
+        density.approximation,
+        samples=samples,
+        walkers=walkers,
+        processes=processes,
+        seed=seed,
+        progress=progress,
+    )
+    objective = density.objective
+    data = _dataset(fit, chains, objective.coordinates.values)
+    points = chains.points.reshape(-1, density.optimum.size)
+    errors = list[float]()
+    for row in _outermost(points):
+        with suppress(InputError):  # no such lever can be drawn
+            errors.append(lever.error_K(objective.at(middle, points[row])))
+    error = max(errors, default=np.nan)
+    data.attrs |= {"seed": seed, "noise": noise, "surrogate_error_K": error}
+    return data
+
+
+def _outermost(points: Array) -> list[int]:
+    """Return the samples with the smallest and largest value along the widest axis."""
+    away = (points - points.mean(axis=0)) / np.maximum(points.std(axis=0), 1e-300)
+    along = away @ np.linalg.eigh(away.T @ away)[1][:, -1]
+    return [int(np.argmin(along)), int(np.argmax(along))]
+
+
+def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> xr.Dataset:
+    ensembles, walkers, draws, _ = chains.points.shape
+    values = values_of(chains.points)
+    columns = {name: values[..., number] for number, name in enumerate(fit.names)}
+    silicon, material = fit.probe.heater_silicon, fit.probe.layout().heater.material
+    if silicon is not None:
+        owned = {full_name(material, own): own for own in ("n_d", "p")}
+        sampled = {owned[name]: column for name, column in columns.items() if name in owned}
+        if sampled:  # else it is what it was
+            columns[INVERSION] = silicon.model_copy(update=sampled).inversion_temperature()
+    sizes, rhat = zip(*map(worth, columns.values()), strict=True)
+    chained = {
+        name: column.reshape(ensembles * walkers, draws)
+        for name, column in (columns | {"log_probability": chains.log_probability}).items()
+    }
+    held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
+    at_rest = zip(held, fit.probe.values(held).tolist(), strict=True)
+    data = labelled(
+        {
+            **chained,
+            "rhat": ("quantity", list(rhat)),
+            "effective_sample_size": ("quantity", list(sizes)),
+            "acceptance_fraction": ((), chains.accepted),
+        },
+        ("chain", "draw"),
+        {
+            "quantity": list(columns),
+            "ensemble": ("chain", np.repeat(np.arange(ensembles), walkers)),
+        },
+        fixed=", ".join(f"{name} = {value:g}" for name, value in at_rest),
+        observables=", ".join(fit.observables),
+        sampler=f"emcee {emcee.__version__}",
+        lever=fit.probe.title,
+    )
+    for name, parameter in parameters_of(fit.probe).items():
+        if name in fit.names:
+            data[name].attrs = {"units": parameter.unit, "long_name": parameter.meaning}
+    return data
+
+
+# --- the band of tip temperature ----------------------------------------------------------------
+
+
+def predictive_band(
+    fit: Fit,
+    posterior: xr.Dataset,
+    *,
+    bias: Sequence[float] | Array | None = None,
+    samples: int = 300,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Predict the tip temperature, with quantiles, from posterior samples.
+
+    It is the band of the true temperature, given the model; measured ones scatter about it by
+    their noise as well.
+
+    Parameters
+    ----------
+    fit : Fit
+    posterior : xarray.Dataset
+        From `sample_posterior`.
+    bias : sequence of float, optional
+        V; by default 81 from zero to the highest measured one.
+    samples : int
+        Taken evenly from the posterior.
+    progress : callable, optional
+        Called with the samples done and their number.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``tip_K`` (quantile, bias) and ``tip_at_power_K`` (quantile, power), with the coordinates
+        ``quantile`` (%), ``bias_V`` and ``power_mW``. The powers reach to the highest that all
+        samples reach; they are NaN where a power does not tell the temperature.
+
+    Raises
+    ------
+    InputError
+        If a bias or the number of samples is impossible.
+    ComputationError
+        If the lever cannot be solved at a bias.
+    """
+    if samples < 2:
+        raise InputError(f"found samples = {samples}, expected 2 or more")
+    measured = fit.measurement.bias_V
+    grid = (
+        np.linspace(min(float(measured.min()), 0.0), float(measured.max()), 81)
+        if bias is None
+        else np.unique(np.asarray(bias, float))
+    )
+    surrogate = SampledLever.of_fit(fit, fit.probe, grid).at.surrogate
+    flat = np.stack([posterior[name].values.ravel() for name in fit.names], axis=1)
+    chosen = flat[np.linspace(0, len(flat) - 1, min(samples, len(flat))).round().astype(int)]
+    tips, powers = [], []
+    for row in each(list(chosen), progress):
+        columns = named(surrogate.values_at(row))
+        tips.append(columns["tip_K"])
+        powers.append(surrogate.circuit(row).power(grid, columns["current_mA"]))
+    power = np.linspace(np.min(powers, axis=1).max(), np.max(powers, axis=1).min(), grid.size)
+    if np.diff(powers, axis=1).min() < 0:
+        # with held supplies there may be several temperatures at one power
+        power = np.full(grid.size, np.nan)
+    at_power = [_against(power, x, tip) for x, tip in zip(powers, tips, strict=True)]
+    quantiles = partial(np.percentile, q=BAND_QUANTILES, axis=0)
+    return labelled(
+        {
+            "tip_K": (("quantile", "bias"), quantiles(tips)),
+            "tip_at_power_K": (("quantile", "power_mW"), quantiles(at_power)),
+        },
+        coordinates={"quantile": list(BAND_QUANTILES), "bias": grid, "power_mW": power},
+        samples=len(chosen),
+        lever=fit.probe.title,
+    )
+
+
+def _against(power: Array, powers: Array, tip: Array) -> Array:
+    """Interpolate a tip temperature, which rises with the power, at given powers."""
+    order = np.argsort(powers)
+    return np.interp(power, powers[order], tip[order])

@@ -1,0 +1,213 @@
+"""Tables of tip temperatures with an error budget: by bias, or by the height of a pulse."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from hotlever.datasets import labelled
+from hotlever.errors import InputError
+from hotlever.estimate.outcome import array
+from hotlever.probe import Circuit
+from hotlever.quantities import QUANTITIES
+from hotlever.text import BAND
+from hotlever.types import Array, Mask
+
+#: Columns of a calibration's table; the last say how sure it is.
+STATED = ("tip_stderr_K", "tip_low_K", "tip_high_K")
+TABLE_COLUMNS = ("bias_V", "lever_V", "current_mA", "power_mW", "tip_K", *STATED)
+#: One more with held supplies: the power of all of them together.
+TOTAL_POWER = "total_power_mW"
+#: More of a tip in contact: its apex and the sample's surface under it, and their standard errors.
+OF_THE_CONTACT = ("apex_K", "apex_stderr_K", "surface_K", "surface_stderr_K")
+#: The standard errors of the tip and, in contact, the apex by source; both have the same sources.
+BUDGETS = ("budget_K", "apex_budget_K")
+Budgets = Mapping[str, Mapping[str, Array]]
+#: A table has more rows where the tip rises by more than this (K) from one to the next.
+STEEP_K = 10.0
+#: Between rows further apart (K), and by so many times further than those beside them, a lever
+#: jumps.
+_FAR_K, _FURTHER = 2.5 * STEEP_K, 2.4
+#: Rows of a table for an instrument.
+MOST_ROWS = 10_000
+#: What rows may be even in, by the word for it: their column and its unit.
+TABLES_BY = {"temperature": ("tip_K", "K"), "power": ("power_mW", "mW"), "bias": ("bias_V", "V")}
+
+
+def table_with_budgets(
+    columns: Mapping[str, Array], budgets: Budgets, along: str = "bias"
+) -> xr.Dataset:
+    """Return columns on a dimension, rising in ``{along}_V``, and `BUDGETS` by ``source``."""
+    sources = list(budgets[BUDGETS[0]])
+    errors = {
+        name: (("source", along), np.array([parts[source] for source in sources]))
+        for name, parts in budgets.items()
+    }
+    coordinates = {along: columns[f"{along}_V"], "source": sources}
+    return labelled({**columns, **errors}, along, coordinates)
+
+
+def budgets_of(table: xr.Dataset) -> dict[str, dict[str, Array]]:
+    """Return the standard errors (K) of a table by source, independent of each other."""
+    return {
+        name: dict(zip(table.source.values.tolist(), table[name].values, strict=True))
+        for name in BUDGETS
+        if name in table
+    }
+
+
+def total_error(parts: Mapping[str, Array]) -> Array:
+    """Return the standard error of which independent ones are the parts."""
+    return np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))
+
+
+def interpolated(
+    table: xr.Dataset, values: ArrayLike, along: str, column: str, tip: str = "tip_K"
+) -> Array:
+    """Return a column of a table at values of another one that rises; NaN outside and in a jump."""
+    at, rising = np.asarray(values, dtype=float), table[along].values
+    line = np.interp(at, rising, table[column].values)
+    return np.where(_no_jump(table, along, at, tip), line, np.nan)
+
+
+def _no_jump(table: xr.Dataset, along: str, at: Array, tip: str) -> Mask:
+    """Return whether values of a column are those of a row, or lie between two near each other."""
+    rising, steps = table[along].values, np.abs(np.diff(table[tip].values))
+    # tables of 0.1 have no more rows where the tip is steep: neighbours are as far apart there
+    beside = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))
+    smooth = np.concatenate([[False], steps <= np.maximum(_FAR_K, _FURTHER * beside), [False]])
+    return np.asarray(smooth[np.searchsorted(rising, at, side="right")] | np.isin(at, rising))
+
+
+def with_steep_rows(even: Array, bias: Array, tip: Array) -> Array:
+    """Return biases (V), and more between them where the tip rises by more than `STEEP_K`.
+
+    Where a ramp of the bias jumps there are none: no bias leads to what lies between.
+
+    Parameters
+    ----------
+    even : ndarray
+        Rising biases (V).
+    bias, tip : ndarray, shape (n,)
+        Rising biases (V) over the same range, many more of them, and the tip temperature there (K).
+    """
+    rows = [even]
+    for low, high in pairwise(even):
+        inside = (bias >= low) & (bias <= high)
+        here, rises = tip[inside], np.diff(tip[inside])
+        if rises.sum() > STEEP_K and np.all((rises > 0.0) & (rises < STEEP_K)):
+            between = np.linspace(here[0], here[-1], int(np.ceil(rises.sum() / STEEP_K)) + 1)
+            rows.append(np.interp(between[1:-1], here, bias[inside]))
+    return np.unique(np.concatenate(rows))
+
+
+def even_rows(
+    table: xr.Dataset,
+    names: Sequence[str],
+    along: str,
+    step: float | None = None,
+    tip: str = "tip_K",
+    fewest: int = 50,
+) -> dict[str, Array]:
+    """Return columns of a table at even values of one of them, and at its ends.
+
+    Between rows whose tip temperatures are far apart, as a ramp of the bias jumps over some, there
+    are none.
+
+    Parameters
+    ----------
+    table : xarray.Dataset
+        From `table_with_budgets`, from the coldest row on.
+    names : sequence of str
+    along : str
+        The column that the rows are even in.
+    step : float, optional
+        In its unit; by default the largest of 1, 2 and 5 times a power of ten that gives enough.
+    tip : str
+        The column of tip temperatures.
+    fewest : int
+        So many rows are enough.
+
+    Raises
+    ------
+    InputError
+        If the column does not rise, or there would be more than `MOST_ROWS`.
+    """
+    values, unit, meaning = table[along].values, QUANTITIES[along].unit, QUANTITIES[along].meaning
+    if not np.all(np.diff(values) > 0.0):
+        raise InputError(f"a table by {meaning}: it does not rise all along, expected by bias")
+    if step is None:
+        largest = np.ptp(values) / fewest
+        power = 10.0 ** np.floor(np.log10(largest))
+        step = float(power * max(digit for digit in (1, 2, 5) if digit * power <= largest))
+    if np.ptp(values) > MOST_ROWS * step:
+        raise InputError(
+            f"a table by {meaning}: found a step of {step:g} {unit} over {np.ptp(values):.4g} "
+            f"{unit}, expected at most {MOST_ROWS} rows"
+        )
+    even = step * np.arange(np.floor(values[0] / step) + 1.0, np.ceil(values[-1] / step))
+    # steps such as 0.1 are no binary numbers
+    even = even[(even > values[0]) & (even < values[-1])]
+    even = even[_no_jump(table, along, even, tip)]
+    at = np.concatenate([values[:1], even, values[-1:]])
+    return {name: np.interp(at, values, table[name].values) for name in names}
+
+
+def table_by_bias(
+    circuit: Circuit,
+    bias: Array,
+    current: Array,
+    tip: Array,
+    budgets: Budgets,
+    limits: tuple[Array, Array] | None = None,
+    more: Mapping[str, Array] | None = None,
+) -> xr.Dataset:
+    """Return the table of bias (V), current (mA) and tip temperature (K), with its errors.
+
+    95 % lie between the limits, or as far away as the errors say. There may be `more` columns.
+    """
+    stderr, lever = total_error(budgets[BUDGETS[0]]), circuit.lever_voltage(bias, current)
+    low, high = limits or (tip - BAND * stderr, tip + BAND * stderr)
+    values = (bias, lever, current, lever * current, tip, stderr, low, high)
+    columns = dict(zip(TABLE_COLUMNS, values, strict=True))
+    return table_with_budgets({**columns, **(more or {})}, budgets)
+
+
+# --- in files -----------------------------------------------------------------------------------
+
+
+def check_rows(
+    columns: Mapping[str, Array], budgets: Budgets, along: str, tip: str, where: str
+) -> None:
+    """Refuse what a file holds in place of a table with its budgets; `where` names the file.
+
+    Raises
+    ------
+    InputError
+        If its rows do not rise or have no tip temperature, or a budget is not one of them.
+    """
+    rising, sources = columns.get(f"{along}_V", np.array([])), budgets[BUDGETS[0]].keys()
+    if not rising.size or not sources or not np.all(np.diff(rising) > 0):
+        raise InputError(
+            f"{where}: table: expected rows of rising {along}, and a budget of their errors"
+        )
+    if not np.isfinite(columns.get(tip, np.nan)).any():
+        raise InputError(f"{where}: table: expected a tip temperature ({tip}) in some rows")
+    for name, parts in budgets.items():
+        if parts.keys() != sources:
+            raise InputError(f"{where}: {name}: expected the sources {', '.join(sources)}")
+        for source, errors in parts.items():
+            array(errors, rising.shape, f"{where}: {name}: {source}")
+
+
+def stored_table(
+    columns: Mapping[str, Array], budgets: Budgets, names: Sequence[str], along: str = "bias"
+) -> xr.Dataset:
+    """Return the table that a file holds; columns are NaN that an older file has not."""
+    unknown = np.full_like(columns[f"{along}_V"], np.nan)
+    own = {name: columns.get(name, unknown) for name in names}
+    return table_with_budgets(own, budgets, along)

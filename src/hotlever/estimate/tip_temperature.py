@@ -1,0 +1,341 @@
+"""The tip temperature of an estimated lever by bias, and how sure it is.
+
+Its error adds up by source: what data and priors leave of the lever, what the model leaves out, and
+where a ramp of the bias jumps between two measured rows. A ramp that passes a fold leaves the cold
+part of a branch for the hot one; the rows tell between which biases that was, and there the tip may
+still be cold, or hot already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hotlever.datasets import quantity
+from hotlever.errors import InputError
+from hotlever.estimate.experiment import TIP, PredictionAtRest
+from hotlever.estimate.inverse_problem import Estimate
+from hotlever.estimate.posterior import Posterior, standard_errors
+from hotlever.estimate.profile import profile_of_tip
+from hotlever.estimate.tip_table import (
+    BUDGETS,
+    TOTAL_POWER,
+    table_by_bias,
+    total_error,
+    with_steep_rows,
+)
+from hotlever.lever import Branch
+from hotlever.materials.departures import departure_of
+from hotlever.materials.parameters import is_of_material, own_name
+from hotlever.measurement import Measurement
+from hotlever.piecewise import spline_through
+from hotlever.probe import Circuit, Probe
+from hotlever.probe.chip import CHIP
+from hotlever.probe.surroundings import Surroundings
+from hotlever.quantities import FITTED, OF_A_CONTACT
+from hotlever.text import BAND
+from hotlever.types import Array, Progress
+
+#: Even rows of the table, and biases by which it is found where the tip is steep.
+_ROWS, _FINE = 101, 10_001
+#: By which source of error a parameter counts that is not the lever's own.
+OF_THE_MEASUREMENT = {
+    **dict.fromkeys(
+        ("series_resistance_ohm", "bridge_upper_ohm", "bridge_lower_ohm", "bridge_offset_V"),
+        "electronics",
+    ),
+    "gas_conductivity": "air",
+    "surface_gap_um": "air",
+    "base_temperature_K": "base temperature",
+    CHIP: "base temperature",
+    "interface_K_per_mW": "contact",
+}
+#: Share of the rise by which the flat lever, or air as panels, differ from full 3-D where the tip
+#: is no steeper in bias than that of a lever of constant properties (benchmarks/air.py).
+_MODEL = {"vacuum": 3e-4, "air": 7e-4}
+#: The same by the jump of the air's temperature at surfaces, where no accommodation is stated: with
+#: one of 0.9 air takes up 6 % less, more where the lever is narrow, and an estimate without it is
+#: off by so much (rms of six simulated levers from number 1000 on, of both shapes, linearised).
+_JUMP = 7e-3
+#: Share by which the resistances of tip and sample differ from full 3-D (benchmarks/contact.py).
+_CONTACT = 0.022
+#: Rows that are on another part of the branch than a ramp takes by more than so many kelvins, so
+#: many of them, show no such lever: one or two beside a jump may.
+_ASIDE_K, _ROWS_ASIDE = 20.0, 3
+#: How far above a fold the state after the jump is read, as a share of the bias.
+_BEYOND = 1e-6
+
+
+class TipByBias(NamedTuple):
+    """The tip temperature over the measured range.
+
+    Attributes
+    ----------
+    table : xarray.Dataset
+        At even biases, and more where the tip is steep, see `hotlever.estimate.tip_table`; the
+        limits are as far away as the errors say, unless these do not hold.
+    jumps : list of Jump
+        Between measured rows.
+    asymmetry : str
+        Where the limits are from, if not from the errors.
+    """
+
+    table: xr.Dataset
+    jumps: list[Jump]
+    asymmetry: str
+
+
+def tip_by_bias(
+    estimate: Estimate,
+    samples: int = 0,
+    at_V: float | None = None,
+    progress: Progress | None = None,
+) -> TipByBias:
+    """Return the tip temperature of an estimated lever with its error, by bias.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    samples : int
+        Of the posterior, from which the credible interval is then taken; none by default.
+    at_V : float, optional
+        A bias that has a row.
+    progress : callable, optional
+
+    Raises
+    ------
+    InputError
+        If samples are asked for of an estimate without priors, or the bias is not in the measured
+        range.
+    """
+    probe, circuit, bias = estimate.probe, estimate.probe.circuit, _rows(estimate, at_V)
+    predicted = estimate.predicted(bias)
+    tip, slopes = predicted.values[TIP], predicted.slopes[TIP][:, estimate.objective.columns]
+    parts = errors_by_source(estimate.posterior, slopes)
+    stderr = total_error(parts)
+    rise = tip - circuit.base_temperature_K
+    parts["model"] = error_of_model(probe.surroundings, bias, rise)
+    low, high, asymmetry = _credible_interval(
+        estimate, tip, stderr, parts["model"], samples, progress
+    )
+    jumps = jumps_of(estimate.branch, circuit, *tips_in_contact(estimate))
+    for jump in jumps:
+        here = jump.unknown(bias)
+        low = np.where(here, np.minimum(low, jump.cold_K), low)
+        high = np.where(here, np.maximum(high, jump.hot_K), high)
+        either = here * (jump.hot_K - jump.cold_K) / (2.0 * BAND)
+        parts["jump"] = np.hypot(parts.get("jump", 0.0), either)
+    more, budgets = dict[str, Array](), {BUDGETS[0]: parts}
+    if probe.contact is not None:
+        more, budgets[BUDGETS[1]] = _at_the_contact(estimate, predicted, parts)
+    table = table_by_bias(circuit, bias, predicted.values[0], tip, budgets, (low, high), more)
+    if not circuit.starts_cold:
+        # the held supplies' part is within a coarse mesh's error
+        branch = estimate.branch
+        swept = branch.x[-1] * branch.equations.observed(branch.x)[1]
+        held = spline_through(branch.u, branch.equations.power(branch.x) - swept)
+        total = table.power_mW.values + held(branch.read(circuit, bias).u)
+        table[TOTAL_POWER] = quantity(TOTAL_POWER, "bias", total)
+    return TipByBias(table, jumps, asymmetry)
+
+
+def tips_in_contact(estimate: Estimate) -> tuple[Array, Array]:
+    """Return biases (V) and tip temperatures (K) of the rows in contact, or all without a sample.
+
+    They are those that lie on the branch of the lever.
+    """
+    residuals, tip = estimate.residuals, estimate.prediction.values[TIP]
+    touching = np.ones(tip.size, dtype=bool)
+    if residuals.distance_um is not None and estimate.probe.contact is not None:
+        touching = residuals.distance_um <= 0.0
+    return residuals.bias[touching], tip[touching]
+
+
+def _at_the_contact(
+    estimate: Estimate, predicted: PredictionAtRest, of_tip: Mapping[str, Array]
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return columns of apex and surface, and the errors of the apex by source.
+
+    What is left out of the model of the lever, and where it jumps, are those of the tip as far as
+    the apex follows it.
+    """
+    columns: dict[str, Array] = {}
+    of_apex: dict[str, Array] = {}
+    base_K = estimate.probe.circuit.base_temperature_K
+    rise = predicted.values[TIP] - base_K
+    for name, of in OF_A_CONTACT.items():
+        row = list(FITTED).index(name)
+        slopes = predicted.slopes[row][:, estimate.objective.columns]
+        parts = errors_by_source(estimate.posterior, slopes)
+        risen = predicted.values[row] - base_K
+        share = np.divide(risen, rise, out=np.zeros_like(rise), where=rise != 0.0)
+        parts |= {source: share * error for source, error in of_tip.items() if source not in parts}
+        parts["model"] = np.hypot(parts["model"], _CONTACT * share * (1.0 - share) * rise)
+        columns |= {of.name: base_K + risen, of.name.replace("_K", "_stderr_K"): total_error(parts)}
+        of_apex = of_apex or parts
+    return columns, of_apex
+
+
+def measured_range(estimate: Estimate) -> Array:
+    """Return even biases (V) over the measured range, as far as the lever has states."""
+    lowest, highest = limits_of_range(estimate.measurement, estimate.probe)
+    return np.linspace(lowest, min(highest, highest_bias(estimate)), _ROWS)
+
+
+def limits_of_range(measured: Measurement, probe: Probe) -> tuple[float, float]:
+    """Return the lowest and the highest bias (V) at which a heated lever was measured."""
+    # without a bias nothing is known of a lever that is cold then
+    heated = measured.bias_V > probe.lowest_bias_V
+    present = measured.bias_V[np.isfinite(measured.current(probe.circuit)) & heated]
+    return float(present.min()), float(present.max())
+
+
+def check_in_range(at_V: float | None, lowest_V: float, highest_V: float) -> None:
+    """Refuse a bias of the uncertainty budget out of a range."""
+    if at_V is not None and not lowest_V <= at_V <= highest_V:
+        raise InputError(
+            f"an uncertainty budget at {at_V:.4g} V: expected a bias in the measured range, from "
+            f"{lowest_V:.4g} to {highest_V:.4g} V"
+        )
+
+
+def _rows(estimate: Estimate, at_V: float | None) -> Array:
+    """Return the biases (V) of the table: even ones, more where the tip rises steeply, and one."""
+    even, branch = measured_range(estimate), estimate.branch
+    fine = np.linspace(even[0], even[-1], _FINE)
+    tip = branch.tip_K(branch.read(estimate.probe.circuit, fine).u)
+    rows = with_steep_rows(even, fine, tip)
+    check_in_range(at_V, *even[[0, -1]])
+    return rows if at_V is None else np.union1d(rows, at_V)
+
+
+def highest_bias(estimate: Estimate) -> float:
+    """Return the highest bias (V) up to the highest measured one at which the lever has a state."""
+    measured = float(estimate.residuals.bias.max())
+    return estimate.branch.highest_bias(estimate.probe.circuit, measured)
+
+
+# --- how sure it is -----------------------------------------------------------------------------
+
+
+def errors_by_source(posterior: Posterior, slopes: Array) -> dict[str, Array]:
+    """Return standard errors by source, by derivatives by the varied parameters (..., p).
+
+    Independent of each other, they add up to what the posterior says.
+    """
+    errors: dict[str, Array] = {}
+    for name, share in posterior.shares.items():
+        own = "material" if is_of_material(name) else "geometry"
+        own = own if departure_of(own_name(name)) is None else "laws"
+        source = name if name in ("measurement", "fit") else OF_THE_MEASUREMENT.get(name, own)
+        errors[source] = np.hypot(errors.get(source, 0.0), standard_errors(slopes, share))
+    return errors
+
+
+def error_of_model(around: Surroundings, bias: Array, rise: Array) -> Array:
+    """Return by how much the tip may be off since the model is (K); most where the tip is steep."""
+    # a rise that grows as the square of the bias is that of a lever of constant properties
+    square, size = np.abs(0.5 * bias * np.gradient(rise, bias)), np.abs(rise)
+    error = _MODEL[around.medium] * np.maximum(size, square)
+    if around.medium == "air" and around.accommodation is None:
+        error = np.hypot(error, _JUMP * size)
+    return np.asarray(error)
+
+
+def _credible_interval(
+    estimate: Estimate,
+    tip: Array,
+    stderr: Array,
+    of_model: Array,
+    samples: int,
+    progress: Progress | None,
+) -> tuple[Array, Array, str]:
+    """Return what 95 % of the tip temperatures lie between (K), and words on where that is from."""
+    posterior, informed, too_few = estimate.posterior, estimate.objective.informed, ""
+    if samples:
+        if not informed:
+            raise InputError("posterior: expected priors, without which it is not that of a fit")
+        # what samples takes a second to load, for which few calibrations have to wait
+        from hotlever.estimate.sampling import sample_tip
+
+        sampled = sample_tip(posterior, estimate.predictor, samples=samples, progress=progress)
+        if sampled.enough:
+            return *sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
+        too_few = sampled.note
+    profile = profile_of_tip(posterior, estimate.predictor.experiment) if informed else None
+    if profile is None or profile.linear:
+        away = BAND * np.hypot(stderr, of_model)
+        return tip - away, tip + away, too_few
+    low, high = profile.credible_interval(tip, stderr, of_model)
+    note = (
+        "the tip temperature is not a linear function of what is unknown, so that its limits come "
+        f"from estimates of hotter and colder levers: at {tip[-1]:.0f} K 95 % lie from "
+        f"{low[-1]:.0f} to {high[-1]:.0f} K"
+    )
+    return low, high, "; ".join(filter(None, (too_few, note)))
+
+
+# --- where a lever jumps ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A jump of a slow ramp of the bias.
+
+    Attributes
+    ----------
+    from_V, to_V : float
+        The measured biases between which it was.
+    cold_K, hot_K : float
+        Tip temperatures before and after it.
+    """
+
+    from_V: float
+    to_V: float
+    cold_K: float
+    hot_K: float
+
+    @property
+    def note(self) -> str:
+        """What a user should know of it."""
+        return (
+            f"between biases of {self.from_V:.4g} and {self.to_V:.4g} V the lever jumps from a tip "
+            f"at {self.cold_K:.0f} K to {self.hot_K:.0f} K; the data do not say where"
+        )
+
+    def unknown(self, bias: Array) -> Array:
+        """Return at which biases (V), (n,), the tip may be on either side."""
+        return np.asarray((bias > self.from_V) & (bias < self.to_V))
+
+
+def jumps_of(branch: Branch, circuit: Circuit, bias: Array, tip_K: Array) -> list[Jump]:
+    """Return the jumps of a lever between measured rows, by their bias (V) and tip (K), (n,)."""
+    if not bias.size or not circuit.starts_cold:
+        return []
+    jumps = []
+    reading = branch.read(circuit, np.array([float(bias.max())]))
+    for fold_V, cold_K in reading.jumps:
+        beyond = branch.read(circuit, np.array([fold_V * (1.0 + _BEYOND)]))
+        hot_K = float(branch.tip_K(beyond.u[0]))
+        if not np.isfinite(hot_K):
+            continue
+        hot = tip_K > 0.5 * (cold_K + hot_K)
+        from_V = float(bias[~hot].max(initial=0.0))
+        to_V = float(bias[hot].min(initial=float(bias.max())))
+        jumps.append(Jump(min(from_V, fold_V), max(to_V, fold_V), cold_K, hot_K))
+    return jumps
+
+
+def not_of_a_ramp(branch: Branch, circuit: Circuit, bias: Array, tip_K: Array) -> str:
+    """Say that rows lie where a slow ramp of the bias does not come; empty if they do not."""
+    aside = np.abs(branch.tip_K(branch.read(circuit, bias).u) - tip_K) > _ASIDE_K
+    if aside.sum() < _ROWS_ASIDE:
+        return ""
+    return (
+        f"the lever that comes nearest jumps, and its rows from {bias[aside].min():.3g} to "
+        f"{bias[aside].max():.3g} V lie on another part of its branch than a ramp takes"
+    )

@@ -1,0 +1,381 @@
+"""The uncertainty budget of a temperature at one bias, after the GUM (JCGM 100:2008).
+
+Its rows are what the standard errors by source of a table sum up, one by one: noise of each
+observable, scales, priors, and what the model leaves out. They are independent of each other, but
+for the parameters that a fit to other data has left. Whether a linear budget holds is told by the
+Monte Carlo method (JCGM 101:2008).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Annotated, Any, Literal, Self, get_args
+
+import numpy as np
+import xarray as xr
+from pydantic import PlainSerializer, ValidationInfo, model_validator
+
+from hotlever.errors import ComputationError, InputError
+from hotlever.estimate.experiment import TIP
+from hotlever.estimate.gum import Budget, CoverageInterval, InputQuantity, propagate
+from hotlever.estimate.inverse_problem import Estimate
+from hotlever.estimate.outcome import IF_ANY, Correlations, Section
+from hotlever.estimate.posterior import CurvedQuantity
+from hotlever.estimate.prior_density import PriorDensity
+from hotlever.estimate.surrogate import Rows
+from hotlever.estimate.tip_table import BUDGETS, budgets_of
+from hotlever.materials.departures import DEPARTURES, departure_of
+from hotlever.materials.parameters import own_name
+from hotlever.probe.parameters import parameters_of
+from hotlever.probe.priors import SCALES, PriorUse
+from hotlever.quantities import FITTED, OBSERVABLES
+from hotlever.records import Number
+from hotlever.text import BAND
+from hotlever.types import Array
+
+#: Of what there are budgets: a tip, or its apex that touches a sample.
+BudgetOf = Literal["tip", "apex"]
+#: Where the density of priors comes from an earlier estimate.
+_FIT = "fit"
+#: Where the Monte Carlo method fails.
+_NO_INTERVAL = CoverageInterval(0, np.nan, np.nan)
+
+
+def correction(quantity: str, u: float) -> InputQuantity:
+    """Return the row of a correction of a temperature (K) that is zero with an error."""
+    return InputQuantity(quantity, 0.0, "K", u, "B", "normal", 1.0)
+
+
+@dataclass(frozen=True)
+class TemperatureBudget:
+    """The uncertainty budget of a temperature, and whether it may be linear.
+
+    Attributes
+    ----------
+    budget : Budget
+        In K.
+    bias_V : float
+    estimate_K : float
+    limits_K : (float, float)
+        What 95 % of the temperatures lie between as the table says: the errors say no more, where
+        levers that are hotter and colder, or samples of the posterior, do not tell otherwise.
+    of : {"tip", "apex"}
+    monte_carlo : CoverageInterval, optional
+        Of 95 %, in K; NaN if levers so near by have no states, or none as hot as its upper end or
+        that of the budget was solved. None in files without one.
+    """
+
+    budget: Budget
+    bias_V: float
+    estimate_K: float
+    limits_K: tuple[float, float]
+    of: BudgetOf = "tip"
+    monte_carlo: CoverageInterval | None = None
+
+    @property
+    def measurand(self) -> str:
+        """What it is of, in words."""
+        kind = "apex temperature in contact" if self.of == "apex" else "tip temperature"
+        return f"{kind} at a bias of {self.bias_V:.4g} V"
+
+    @property
+    def linear(self) -> bool | None:
+        """Whether the linear budget holds (JCGM 101, 8.1); None if that is not known.
+
+        Both the Monte Carlo method and the limits must be where it says within half a unit of the
+        first significant digit of u.
+        """
+        if self.monte_carlo is None:
+            return None
+        tolerance = self.budget.tolerance
+        of_table = CoverageInterval(0, *self.limits_K)
+        linearised = self._about(BAND * self.budget.u)
+        return self.monte_carlo.agrees(self.interval_K, tolerance) and of_table.agrees(
+            linearised, tolerance
+        )
+
+    @property
+    def interval_K(self) -> tuple[float, float]:
+        """Estimate minus and plus the expanded uncertainty for 95 %."""
+        return self._about(self.budget.expanded())
+
+    def _about(self, away_K: float) -> tuple[float, float]:
+        return self.estimate_K - away_K, self.estimate_K + away_K
+
+    def in_either(
+        self, other: TemperatureBudget, choice_K: float, limits_K: tuple[float, float]
+    ) -> TemperatureBudget:
+        """Return the budget of a lever that may be in another medium as well.
+
+        The choice adds an error, and the limits hold both.
+        """
+        inputs = (*self.budget.inputs, correction("medium", choice_K))
+        correlation = self.budget.correlation
+        if correlation is not None:
+            correlation = np.pad(correlation, (0, 1))
+            correlation[-1, -1] = 1.0
+        own, others = self.monte_carlo, other.monte_carlo
+        united = None if own is None or others is None else own.united(others)
+        return replace(
+            self, budget=Budget(inputs, correlation), limits_K=limits_K, monte_carlo=united
+        )
+
+
+def check_budget_of(of: str, in_contact: bool = True) -> None:
+    """Raise an error if there is no uncertainty budget of a quantity."""
+    expected = get_args(BudgetOf)
+    if of not in expected:
+        raise InputError(
+            f"an uncertainty budget of '{of}': expected {' or '.join(expected)}, of which it is at "
+            "rest (the errors of a pulse by source are in its table)"
+        )
+    if of == "apex" and not in_contact:
+        raise InputError(
+            "an uncertainty budget of the apex: expected a probe in contact with a sample "
+            "([contact] in the probe file)"
+        )
+
+
+def limits_of(row: xr.Dataset, of: BudgetOf) -> tuple[float, float]:
+    """Return what 95 % of a temperature lie between (K), by a row of a table.
+
+    Those of an apex are as much further away on one side than its errors say as the tip's.
+    """
+    limits = row.tip_low_K.item(), row.tip_high_K.item()
+    if of == "tip":
+        return limits
+    value, share = row.apex_K.item(), (row.apex_stderr_K / row.tip_stderr_K).item()
+    low, high = (value + share * (limit - row.tip_K.item()) for limit in limits)
+    return low, high
+
+
+def budget_of_estimate(
+    estimate: Estimate,
+    priors: Mapping[str, PriorUse],
+    row: xr.Dataset,
+    of: BudgetOf,
+) -> TemperatureBudget:
+    """Return the budget of a temperature in a row of the table of an estimate.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    priors : mapping of str to PriorUse
+        Of the parameters and the scales.
+    row : xarray.Dataset
+        With the standard errors beside those of the parameters.
+    of : {"tip", "apex"}
+    """
+    bias_V, errors_K = row.bias_V.item(), budgets_of(row)[BUDGETS[of == "apex"]]
+    model = {name: errors_K[name].item() for name in ("model", "jump") if name in errors_K}
+    residuals, objective = estimate.residuals, estimate.objective
+    predicted = estimate.predicted(np.array([bias_V]))
+    observable = list(FITTED).index(of)
+    # a ramp of levers like it may not have jumped yet, where it is known that this one has
+    surrogate = predicted.surrogate.reading(Rows(predicted.surrogate.rows.bias_V, predicted.values))
+    slopes = predicted.slopes[observable, 0, objective.columns]
+    contributions = {name: slopes @ by for name, by in estimate.posterior.influences.items()}
+    u = residuals.noise(estimate.prediction.values).tolist()
+    leverage = objective.leverage(estimate.prediction.slopes, objective.point(estimate.probe))
+    dof = residuals.errors.degrees_of_freedom(leverage).tolist()
+    rows = []
+    for name, size, free in zip(residuals.observables, u, dof, strict=True):
+        sensitivity = float(np.linalg.norm(contributions.pop(name))) / size
+        kind: Literal["A", "B"] = "A" if np.isfinite(free) else "B"
+        noise, unit = f"noise of {name}", FITTED[name].unit
+        rows.append(InputQuantity(noise, 0.0, unit, size, kind, "normal", sensitivity, free))
+    units = {name: each.unit for name, each in parameters_of(estimate.probe, anywhere=True).items()}
+    units |= dict.fromkeys(SCALES, "1")
+    by_fit = contributions.pop(_FIT, None)
+    for law, parts in _by_law(contributions).items():
+        # a row for a law, whatever its coefficients are called
+        spread = DEPARTURES[own_name(law)].spread_hot * priors[next(iter(parts))].spread
+        sensitivity = float(np.linalg.norm([*parts.values()])) / spread
+        rows.append(InputQuantity(f"law.{law}", 0.0, "1", spread, "B", "normal", sensitivity))
+    for name, by in contributions.items():
+        use = priors[name]
+        sensitivity = by.item() / use.spread
+        rows.append(
+            InputQuantity(
+                name, use.value, units[name], use.spread, "B", use.distribution, sensitivity
+            )
+        )
+    rows += [correction(name, error) for name, error in model.items()]
+    correlation = None
+    if by_fit is not None:
+        of_fit, among = _rows_of_fit(objective.prior, by_fit, units)
+        correlation = np.eye(len(rows) + len(of_fit))
+        correlation[len(rows) :, len(rows) :] = among
+        rows += of_fit
+    budget = Budget(tuple(rows), correlation)
+    value, other = float(predicted.values[observable, 0]), float(np.linalg.norm([*model.values()]))
+    temperature_budget = TemperatureBudget(budget, bias_V, value, limits_of(row, of), of)
+    if not budget.u > 0.0:
+        return temperature_budget
+    free = dict(zip(residuals.observables, dof, strict=True))
+    try:
+        curved = CurvedQuantity(estimate.posterior, surrogate, observable)
+    except (ComputationError, np.linalg.LinAlgError):
+        return replace(temperature_budget, monte_carlo=_NO_INTERVAL)
+    errors = _Errors(curved, estimate.posterior.influences, free)
+
+    def draw(count: int) -> Array:
+        return value + curved.changes(errors.draw(count)) + other * errors.random.normal(size=count)
+
+    interval = propagate(draw, budget.tolerance)
+    # of what is hotter no lever was solved, and it may melt
+    ended = predicted.values[: len(OBSERVABLES)].copy()
+    ended[TIP] = surrogate.branch.hottest_K
+    hottest = surrogate.contact.added(ended, estimate.probe.values(objective.names))[observable, 0]
+    beyond = max(interval.high, temperature_budget.interval_K[1]) > hottest
+    return replace(temperature_budget, monte_carlo=_NO_INTERVAL if beyond else interval)
+
+
+def _by_law(contributions: dict[str, Array]) -> dict[str, dict[str, float]]:
+    """Take out the contributions of coefficients, and return them by law and coefficient.
+
+    A law of a named material has the material's name before its own.
+    """
+    laws: dict[str, dict[str, float]] = {}
+    for name in list(contributions):
+        if (departing := departure_of(own_name(name))) is not None:
+            law = name.removesuffix(own_name(name)) + departing[0].law
+            laws.setdefault(law, {})[name] = contributions.pop(name).item()
+    return laws
+
+
+def _rows_of_fit(
+    prior: PriorDensity, by_fit: Array, units: Mapping[str, str]
+) -> tuple[list[InputQuantity], Array]:
+    """Return the parameters that a fit to other data has left as rows, and their correlation.
+
+    By how uncorrelated deviations of that fit move the temperature, (m,).
+    """
+    numbers = [number for number, source in enumerate(prior.sources) if source == _FIT]
+    whitening = prior.whitening[np.ix_(numbers, numbers)]
+    relative, values = prior.relative[numbers], prior.values[numbers]
+    unit = np.where(relative, values, 1.0)
+    covariance = np.linalg.inv(whitening.T @ whitening)
+    spread = np.sqrt(np.diag(covariance))
+    names = [prior.names[number] for number in numbers]
+    distributions = np.where(relative, "log-normal", "normal").tolist()
+    errors, sensitivities = (spread * unit).tolist(), (by_fit @ whitening / unit).tolist()
+    columns = zip(names, values.tolist(), errors, distributions, sensitivities, strict=True)
+    rows = [
+        InputQuantity(f"{name} of the fit", value, units[name], u, "B", distribution, sensitivity)
+        for name, value, u, distribution, sensitivity in columns
+    ]
+    return rows, covariance / np.outer(spread, spread)
+
+
+class _Errors:
+    """Errors of an estimate along the axes of a quantity, drawn from the distributions of a budget.
+
+    What is of Type A has the tails of a Student's t of its degrees of freedom (JCGM 101, 6.4.9):
+    all data of an observable share their scatter.
+    """
+
+    def __init__(
+        self, curved: CurvedQuantity, influences: Mapping[str, Array], dof: Mapping[str, float]
+    ) -> None:
+        self.random = np.random.default_rng(0)
+        projections = {
+            name: curved.axes_of(influences[name]) for name in dof if np.isfinite(dof[name])
+        }
+        shares = [
+            (projection @ projection.T, dof[name]) for name, projection in projections.items()
+        ]
+        axes = np.eye(len(next(iter(influences.values()))))
+        rest = axes - sum(share for share, _ in shares)
+        self._roots = [(_root(share), free) for share, free in [*shares, (rest, np.inf)]]
+
+    def draw(self, count: int) -> Array:
+        """Return errors along the axes, (count, p)."""
+        errors = np.zeros((count, len(self._roots[0][0])))
+        for root, free in self._roots:
+            normal = self.random.normal(size=errors.shape) @ root
+            if np.isfinite(free):
+                normal *= np.sqrt(free / self.random.chisquare(free, size=(count, 1)))
+            errors += normal
+        return errors
+
+
+def _root(covariance: Array) -> Array:
+    """Return the symmetric root of a covariance, of which rounding may have left less than none."""
+    variances, axes = np.linalg.eigh(covariance)
+    return np.asarray((axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T)
+
+
+# A row as calibration files hold it.
+_Row = Annotated[
+    InputQuantity, PlainSerializer(lambda row: asdict(row) | {"contribution_K": row.contribution})
+]
+
+
+class IntervalSection(Section):
+    """What the Monte Carlo method says, as calibration files hold it; no ends where it failed."""
+
+    trials: int
+    low_K: Number
+    high_K: Number
+    tolerance_K: Number
+
+
+class BudgetFields(Section):
+    """An uncertainty budget as calibration files hold it, with what follows from it for 95 %."""
+
+    gum: list[_Row] | None = IF_ANY
+    gum_correlation: Correlations | None = IF_ANY
+    gum_bias_V: float | None = IF_ANY
+    gum_of: BudgetOf | None = IF_ANY
+    effective_dof: Number | None = IF_ANY
+    coverage_factor: float | None = IF_ANY
+    expanded_uncertainty_K: float | None = IF_ANY
+    gum_monte_carlo: IntervalSection | None = IF_ANY
+    gum_linear: bool | None = IF_ANY
+
+    @staticmethod
+    def fields_of(stated: TemperatureBudget) -> dict[str, Any]:
+        """Return the values of a budget by field."""
+        budget, interval, section = stated.budget, stated.monte_carlo, None
+        if interval is not None:
+            ends = {"low_K": interval.low, "high_K": interval.high}
+            section = IntervalSection.holding(interval, **ends, tolerance_K=budget.tolerance)
+        return {
+            "gum": list(budget.inputs),
+            "gum_correlation": budget.correlation,
+            "gum_bias_V": stated.bias_V,
+            "gum_of": stated.of,
+            "effective_dof": budget.dof,
+            "coverage_factor": budget.coverage_factor(),
+            "expanded_uncertainty_K": budget.expanded(),
+            "gum_monte_carlo": section,
+            "gum_linear": stated.linear,
+        }
+
+    @model_validator(mode="after")
+    def _correlation_is_of_the_rows(self, info: ValidationInfo) -> Self:
+        size, correlation = len(self.gum or []), self.gum_correlation
+        if size and correlation is not None and correlation.shape != (size, size):
+            raise InputError(
+                f"{info.context}: gum_correlation: expected numbers in {size} × {size} places"
+            )
+        return self
+
+    def temperature_budget(self, table: xr.Dataset) -> TemperatureBudget | None:
+        """Return the budget of a row of a table, if there is one."""
+        if self.gum is None:
+            return None
+        row, monte_carlo, of = (
+            table.sel(bias=self.gum_bias_V),
+            self.gum_monte_carlo,
+            self.gum_of or "tip",
+        )
+        interval = (
+            None
+            if monte_carlo is None
+            else CoverageInterval(monte_carlo.trials, monte_carlo.low_K, monte_carlo.high_K)
+        )
+        budget, value = Budget(tuple(self.gum), self.gum_correlation), row[f"{of}_K"].item()
+        return TemperatureBudget(budget, row.bias_V.item(), value, limits_of(row, of), of, interval)
