@@ -16,7 +16,8 @@ import pytest
 from hotlever import files
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import (
-    Outputs,
+    FOLDER,
+    check_outputs,
     json_text,
     output_folder,
     read_bytes,
@@ -205,7 +206,7 @@ def test_folders_are_refused_as_files_and_files_as_folders(tmp_path):
     with pytest.raises(InputError, match="cannot be made a folder"):
         output_folder(tmp_path / "a")
     with pytest.raises(InputError, match=r"b: cannot be made a folder \(.*a is a file\)"):
-        Outputs().folder(tmp_path / "a" / "b")
+        check_outputs([(tmp_path / "a" / "b", FOLDER)])
 
 
 def test_a_link_is_followed_and_permissions_are_kept(tmp_path):
@@ -224,29 +225,6 @@ def test_a_link_is_followed_and_permissions_are_kept(tmp_path):
     assert (tmp_path / "fresh").stat().st_mode & 0o777 == 0o666 & ~umask
 
 
-def test_several_files_are_written_all_or_none(tmp_path):
-    first, second = tmp_path / "first", tmp_path / "made" / "second"
-    first.write_text("old")
-    outputs = Outputs()
-    outputs.file(first)
-    outputs.folder(second.parent)
-
-    def write(last):
-        with outputs.together():
-            write_text(first, "new")
-            assert first.read_text() == "old"
-            write_text(output_folder(second.parent) / "second", "new")
-            write_text(last, "new")
-
-    with pytest.raises(InputError, match="is a folder"):
-        write(tmp_path)
-    assert first.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [first]
-    write(tmp_path / "last")
-    assert first.read_text() == second.read_text() == (tmp_path / "last").read_text() == "new"
-    assert len(list(tmp_path.iterdir())) == 3
-
-
 @pytest.mark.parametrize("link", [os.link, os.symlink, None])
 def test_an_input_is_no_output_by_whatever_name(tmp_path, link):
     data = tmp_path / "data.csv"
@@ -255,37 +233,25 @@ def test_an_input_is_no_output_by_whatever_name(tmp_path, link):
     if link is not None:
         name = tmp_path / "other.csv"
         link(data, name)
-    outputs = Outputs(data, None)
     with pytest.raises(InputError, match="is an input of this command"):
-        outputs.file(name)
-
-    def write():
-        with outputs.together():
-            write_text(name, "x")
-
-    with pytest.raises(InputError, match="is an input of this command"):
-        write()
+        check_outputs([(name, (name.suffix,))], [data])
     assert data.read_text() == "measured"
 
 
 def test_two_outputs_have_two_names(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    outputs = Outputs()
-    outputs.file("a.csv", ".csv")
-    with pytest.raises(InputError, match="two outputs of this name"):
-        outputs.file(tmp_path / "a.csv")
-    with pytest.raises(InputError, match="two outputs of this name"):
-        outputs.folder("./a.csv")
+    table = "a.csv", (".csv",)
+    for other in ((tmp_path / "a.csv", (".csv",)), ("./a.csv", FOLDER)):
+        with pytest.raises(InputError, match="two outputs of this name"):
+            check_outputs([table, other])
 
 
 def test_what_cannot_be_an_output_is_known_before(tmp_path):
-    outputs = Outputs()
     with pytest.raises(InputError, match=r"unknown file type '.xls', expected .csv or .nc"):
-        outputs.file(tmp_path / "a.xls", ".csv", ".nc")
+        check_outputs([(tmp_path / "a.xls", (".csv", ".nc"))])
     with pytest.raises(InputError, match=r"the folder .*none does not exist"):
-        outputs.file(tmp_path / "none" / "a.csv")
+        check_outputs([(tmp_path / "none" / "a.csv", (".csv",))])
     with pytest.raises(InputError, match=r"cannot be written \(File name too long\)"):
-        outputs.file(tmp_path / ("a" * 300))
-    outputs.file(None)
-    outputs.folder(None)
+        check_outputs([(tmp_path / ("a" * 300 + ".csv"), (".csv",))])
+    check_outputs([(None, (".csv",)), (None, FOLDER)])
     assert list(tmp_path.iterdir()) == []

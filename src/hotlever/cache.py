@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from hotlever import __version__
 from hotlever.errors import HotleverError, InputError
-from hotlever.files import Outputs, output_folder, whole_file
+from hotlever.files import output_folder, whole_file
 
 #: Environment variable that moves the cache; empty switches it off.
 CACHE_VARIABLE = "HOTLEVER_CACHE"
@@ -116,8 +116,7 @@ def store_arrays(path: Path | None, arrays: Mapping[str, NDArray[Any]]) -> None:
     if path is None:
         return
     most = largest_size()
-    # whatever else is being written, this file is not part of it
-    with suppress(HotleverError, OSError), Outputs().together():
+    with suppress(HotleverError, OSError):
         output_folder(path.parent)
         with whole_file(path) as temporary:
             np.savez(temporary, **dict[str, Any](arrays))

@@ -1,7 +1,4 @@
-"""Files in and out: read with limits, written whole or not at all.
-
-`Outputs` are the files of one command, which are written all or none.
-"""
+"""Files in and out: read with limits, each written whole or not at all."""
 
 from __future__ import annotations
 
@@ -11,9 +8,8 @@ import os
 import secrets
 import select
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
-from contextvars import ContextVar
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +19,8 @@ Name = str | os.PathLike[str]
 
 #: What a figure can be written as, and a film.
 FIGURE_TYPES, FILM_TYPES = (".png", ".svg", ".pdf"), (".gif",)
+#: How the name of what is written ends if that is a folder.
+FOLDER: tuple[str, ...] = ()
 #: What names of files end in that are made of a measurement: its calibration, and the table.
 CALIBRATION, TABLE = ".calibration.json", ".table.csv"
 #: Bytes that a text file may have, unless its reader says otherwise.
@@ -140,125 +138,76 @@ def without_nan(value: Any) -> Any:
 # --- writing ------------------------------------------------------------------------------------
 
 
-class Outputs:
-    """The files a command writes: checked before its work, put in place together after it.
+def check_outputs(
+    outputs: Iterable[tuple[Name | None, tuple[str, ...]]], inputs: Iterable[Name] = ()
+) -> None:
+    """Check before some work that its outputs can be written.
 
     Parameters
     ----------
-    *inputs : path or None
-        Files that the command reads, none of which it may write.
+    outputs : iterable of (path or None, tuple of str)
+        What is written, and how the name of a file may end; of a `FOLDER` nothing.
+    inputs : iterable of path
+        Files that the work reads, none of which it may write.
 
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     outputs = Outputs()
-    ...     outputs.file(f"{folder}/a.csv", ".csv", ".nc")
-    ...     with outputs.together():
-    ...         write_text(f"{folder}/a.csv", "bias_V")
-    ...         os.listdir(folder) == ["a.csv"]
-    ...     os.listdir(folder)
-    False
-    ['a.csv']
+    Raises
+    ------
+    InputError
+        If a file is of another type, no regular file, an input or another output too, or its
+        folder does not exist or cannot be written; if a folder is a file or cannot be made.
     """
-
-    def __init__(self, *inputs: Name | None) -> None:
-        self._inputs = [Path(path) for path in inputs if path is not None]
-        self._targets: set[Path] = set()
-        self._written: dict[Path, Path] = {}
-        self._new_folders: list[Path] = []
-
-    def file(self, path: Name | None, *suffixes: str) -> None:
-        """Check that a file can be written, and is of one of some types.
-
-        Raises
-        ------
-        InputError
-            If it is of another type, no regular file, an input or another output too, or its
-            folder does not exist or cannot be written.
-        """
+    inputs, targets = list(inputs), set[Path]()
+    for path, types in outputs:
         if path is None:
-            return
-        target, suffix = self.target(path), Path(path).suffix
-        if suffixes and suffix.lower() not in suffixes:
-            raise InputError(
-                f"{path}: unknown file type '{suffix}', expected {' or '.join(suffixes)}"
-            )
-        self._ask(path, target)
-
-    def folder(self, path: Name | None) -> None:
-        """Check like `file` that a folder is there or can be made, and files written to it."""
-        if path is None:
-            return
-        folder = Path(os.path.realpath(path))
-        above = next(path for path in (folder, *folder.parents) if os.path.lexists(path))
-        if not above.is_dir():
-            raise InputError(f"{path}: cannot be made a folder ({above} is a file)")
-        if not os.access(above, os.W_OK | os.X_OK):
-            raise InputError(f"{path}: cannot be written (Permission denied)")
-        self._ask(path, folder)
-
-    def _ask(self, path: Name, target: Path) -> None:
-        if target in self._targets:
+            continue
+        if types == FOLDER:
+            target = _output_folder(path)
+        else:
+            target, suffix = output_file(path, inputs), Path(path).suffix
+            if suffix.lower() not in types:
+                raise InputError(
+                    f"{path}: unknown file type '{suffix}', expected {' or '.join(types)}"
+                )
+        if target in targets:
             raise InputError(f"{path}: two outputs of this name, expected different ones")
-        self._targets.add(target)
-
-    def target(self, path: Name) -> Path:
-        """Return the file that writing to `path` makes or replaces: links lead to it.
-
-        Raises
-        ------
-        InputError
-            See `file`.
-        """
-        target = Path(os.path.realpath(path))
-        try:
-            if target.exists():
-                kind = _kind(target)
-                if kind != "file":
-                    raise InputError(f"{path}: is a {kind}, expected a file name to write to")
-                if any(file.exists() and file.samefile(target) for file in self._inputs):
-                    raise InputError(f"{path}: is an input of this command, expected another name")
-            elif not target.parent.is_dir():
-                raise InputError(f"{path}: the folder {Path(path).parent} does not exist")
-            for needed in (target, target.parent):
-                if needed.exists() and not os.access(needed, os.W_OK):
-                    raise InputError(f"{path}: cannot be written (Permission denied)")
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-        return target
-
-    @contextmanager
-    def together(self) -> Iterator[Outputs]:
-        """Let files written inside the block wait for its end; if it fails, none is written.
-
-        Raises
-        ------
-        InputError
-            If one of them is an input.
-        HotleverError
-            If one cannot be written.
-        """
-        before = _outputs.set(self)
-        try:
-            yield self
-            for target in self._written:
-                self.target(target)
-            for target, temporary in self._written.items():
-                _put_in_place(temporary, target)
-        finally:
-            _outputs.reset(before)
-            for temporary in self._written.values():
-                temporary.unlink(missing_ok=True)
-            # the innermost first; one that is not empty stays
-            for folder in self._new_folders:
-                with suppress(OSError):
-                    folder.rmdir()
-            self._written, self._new_folders = {}, []
+        targets.add(target)
 
 
-#: The outputs of the `together` block that is running.
-_outputs: ContextVar[Outputs | None] = ContextVar("outputs", default=None)
+def _output_folder(path: Name) -> Path:
+    folder = Path(os.path.realpath(path))
+    above = next(path for path in (folder, *folder.parents) if os.path.lexists(path))
+    if not above.is_dir():
+        raise InputError(f"{path}: cannot be made a folder ({above} is a file)")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot be written (Permission denied)")
+    return folder
+
+
+def output_file(path: Name, inputs: Iterable[Name] = ()) -> Path:
+    """Return the file that writing to `path` makes or replaces: links lead to it.
+
+    Raises
+    ------
+    InputError
+        If it is no regular file, or one of some inputs, or its folder does not exist or cannot be
+        written.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        if target.exists():
+            kind = _kind(target)
+            if kind != "file":
+                raise InputError(f"{path}: is a {kind}, expected a file name to write to")
+            if any(os.path.exists(file) and target.samefile(file) for file in inputs):
+                raise InputError(f"{path}: is an input of this command, expected another name")
+        elif not target.parent.is_dir():
+            raise InputError(f"{path}: the folder {Path(path).parent} does not exist")
+        for needed in (target, target.parent):
+            if needed.exists() and not os.access(needed, os.W_OK):
+                raise InputError(f"{path}: cannot be written (Permission denied)")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
+    return target
 
 
 @contextmanager
@@ -271,29 +220,29 @@ def whole_file(path: Name) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If it cannot be a file, or its folder does not exist or cannot be written.
+        As `output_file`.
     HotleverError
         If writing fails: the disk is full, for one.
     """
-    running = _outputs.get()
-    with nullcontext(running) if running else Outputs().together() as outputs:
-        target = outputs.target(path)
-        temporary = target.with_name(f".hotlever-{secrets.token_hex(6)}{target.suffix}")
-        try:
-            # with the permissions that any new file would have here
-            os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-        try:
-            yield temporary
-            # what the same block wrote there before is replaced
-            temporary.replace(outputs._written.setdefault(target, temporary))
-        except BaseException as error:
-            reason = _disk_error(error, temporary)
-            temporary.unlink(missing_ok=True)
-            if reason is not None:
-                raise HotleverError(f"{path}: cannot be written ({reason})") from error
-            raise
+    target = output_file(path)
+    temporary = target.with_name(f".hotlever-{secrets.token_hex(6)}{target.suffix}")
+    try:
+        # with the permissions that any new file would have here
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
+    try:
+        yield temporary
+        if target.exists():
+            temporary.chmod(target.stat().st_mode & 0o7777)
+        temporary.replace(target)
+    except BaseException as error:
+        reason = _disk_error(error, temporary)
+        if reason is not None:
+            raise HotleverError(f"{path}: cannot be written ({reason})") from error
+        raise
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def _disk_error(error: BaseException, temporary: Path) -> str | None:
@@ -320,32 +269,17 @@ def write_text(path: Name, text: str) -> None:
 def output_folder(path: Name) -> Path:
     """Make the folder `path` (and its parents) if needed and return it.
 
-    Inside a `together` block it goes again at the end if nothing was put into it.
-
     Raises
     ------
     InputError
         If it cannot be made, or a file of that name exists.
     """
-    folder, outputs = Path(path), _outputs.get()
+    folder = Path(path)
     try:
-        missing = [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from error
-    if outputs is not None:
-        outputs._new_folders[:0] = missing
     return folder
-
-
-def _put_in_place(temporary: Path, target: Path) -> None:
-    """Rename a file; it gets the permissions of the one it replaces."""
-    try:
-        if target.exists():
-            temporary.chmod(target.stat().st_mode & 0o7777)
-        temporary.replace(target)
-    except OSError as error:
-        raise HotleverError(f"{target}: cannot be written ({error.strerror})") from error
 
 
 def _kind(path: Name | int) -> str:

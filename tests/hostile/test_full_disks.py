@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from size import cases
 
-from hotlever.files import Outputs
+from hotlever.files import check_outputs
 
 Run = Callable[..., tuple[int, str, str]]
 #: How many there are of each command with ``make test-hostile``.
 DISKS = 40
-#: Commands, and the files that each writes together.
+#: Commands, and the files that each writes.
 WRITERS = {
     ("probe", "new", "-o", "a.toml"): ["a.toml"],
     ("probe", "show", "--plot", "a.svg"): ["a.svg"],
@@ -56,7 +56,7 @@ def line(folder: Path) -> None:
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.mark.parametrize("command", WRITERS, ids=" ".join)
-def test_a_disk_that_is_full_at_any_byte_leaves_what_was_there(
+def test_a_disk_that_is_full_at_any_byte_leaves_each_file_as_it_was_or_whole(
     command: tuple[str, ...], run: Run, tmp_path: Path
 ):
     line(tmp_path)
@@ -73,7 +73,10 @@ def test_a_disk_that_is_full_at_any_byte_leaves_what_was_there(
         assert status == 1, (limit, err)
         assert len([one for one in err.splitlines() if one.startswith("hotlever: ")]) == 1
         assert "cannot be written (File too large)" in err, (limit, err)
-        assert contents(tmp_path) == before, limit
+        for name, content in contents(tmp_path).items():
+            # a picture in PDF has its date in it, and the same length at any
+            whole = name in written and len(content) == len(written[name])
+            assert content == before.get(name) or whole, (limit, name)
 
 
 @pytest.fixture
@@ -113,7 +116,7 @@ def test_a_folder_that_may_not_be_written_is_said_before_any_work(tmp_path: Path
             ended = 1
             with suppress(BaseException):
                 os.setuid(65534)
-                Outputs().file(tmp_path / name)
+                check_outputs([(tmp_path / name, (".csv",))])
                 ended = 2
             os._exit(ended)
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1, name

@@ -17,7 +17,7 @@ from hotlever.estimate.estimator import fit
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.outcome import Result, ResultFile
 from hotlever.estimate.result import Fit, FitFile
-from hotlever.files import Outputs, output_folder, without_nan
+from hotlever.files import FOLDER, check_outputs, output_file, output_folder, without_nan
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced
 from hotlever.measurement import Measurement, read_measurement_of, with_measured_circuit
@@ -170,8 +170,8 @@ def estimate_many(
     """
     if processes is not None and processes < 1:
         raise InputError(f"found processes = {processes}, expected 1 or more")
-    outputs, target, data = Outputs(*paths), Path(folder), lever_names(paths)
-    outputs.folder(target)
+    target, data = Path(folder), lever_names(paths)
+    check_outputs([(target, FOLDER)])
     files = {name: target / f"{name}{work.ending}" for name in data}
     request = {"probe": work.probe.sections(), "options": work.options.values(), **work.settings}
     request["version"] = __version__
@@ -190,7 +190,7 @@ def estimate_many(
             if reading is not None:
                 reading(measurement)
             if target.is_dir():
-                outputs.target(files[name])
+                output_file(files[name], paths)
         except InputError as error:
             batch.fail(path, error)
             continue

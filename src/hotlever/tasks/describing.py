@@ -29,7 +29,7 @@ def new_probe(reporter: Reporter, request: NewRequest) -> None:
     """Write a parametric probe as a commented file."""
     if request.shape not in NEW_PROBES:
         raise unknown_name("shape", request.shape, NEW_PROBES)
-    request.outputs()
+    request.check_outputs()
     probe: Probe = getattr(Probe, NEW_PROBES[request.shape])()
     if request.output is None:
         reporter.give(probe.to_toml())
@@ -39,7 +39,7 @@ def new_probe(reporter: Reporter, request: NewRequest) -> None:
 
 def show_probe(reporter: Reporter, request: ShowRequest) -> None:
     """Draw and describe a probe; outlines that make none are drawn with what is wrong of them."""
-    request.outputs()
+    request.check_outputs()
     try:
         probe = read_probe(reporter, request.probe)
     except DrawingError as error:
@@ -142,24 +142,23 @@ def _regions(layout: Layout) -> list[str]:
 def propose_probe(reporter: Reporter, request: ImportRequest) -> None:
     """Say what a drawing holds, and propose a probe file for it."""
     drawing, output, unit = request.drawing, request.output, request.known_unit
-    outputs = request.outputs()
+    request.check_outputs()
     folder = Path() if output is None else output.parent
     proposed = import_drawing(drawing, request.cell, folder, unit)
     fault = proposed.fault
     fault_at = fault.place if isinstance(fault, DrawingError) else None
-    with outputs.together():
-        if output is not None:
-            write_text(output, proposed.text)
-        draw(
-            request.plot,
-            lambda figures: figures.outlines_drawing(
-                proposed.outlines,
-                drawing.name,
-                tip=proposed.inference.tip,
-                fault="" if fault_at is None else str(fault),
-                fault_at=fault_at,
-            ),
-        )
+    if output is not None:
+        write_text(output, proposed.text)
+    draw(
+        request.plot,
+        lambda figures: figures.outlines_drawing(
+            proposed.outlines,
+            drawing.name,
+            tip=proposed.inference.tip,
+            fault="" if fault_at is None else str(fault),
+            fault_at=fault_at,
+        ),
+    )
     reporter.give(proposed.text if output is None else "\n".join([*proposed.listing, ""]))
     reporter.note(*proposed.notes)
     if fault is not None:
@@ -168,7 +167,7 @@ def propose_probe(reporter: Reporter, request: ImportRequest) -> None:
 
 def list_materials(reporter: Reporter, request: MaterialsRequest) -> None:
     """List kinds of material, or those of a probe, and draw their laws."""
-    request.outputs()
+    request.check_outputs()
     chosen: tuple[Any, ...] = ()
     if request.probe is not None:
         probe = read_probe(reporter, request.probe)

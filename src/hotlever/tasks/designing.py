@@ -24,7 +24,8 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
     if request.asks_for_best:
         optimise_design(reporter, request)
         return
-    output, outputs = request.output, request.outputs()
+    output = request.output
+    request.check_outputs()
     options: Any = {"power_mW": request.power, "air": request.air}
     check_number("--power", request.power, 1e-3, 1000)
     check_number("--annealing-K", request.annealing_K, 700, 1700)
@@ -54,12 +55,11 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
     with reporter.progress("design") as update:
         data = study.vary(start, varied, progress=update, **options)
     reporter.note(study.mesh_note(start.probe, request.power), *study.design_notes(data))
-    with outputs.together():
-        if output is not None and output.suffix.lower() == ".nc":
-            write_dataset(data, output, ())
-        elif output is not None:
-            write_text(output, study.design_csv(data))
-        draw(request.plot, lambda figures: figures.design_study(data))
+    if output is not None and output.suffix.lower() == ".nc":
+        write_dataset(data, output, ())
+    elif output is not None:
+        write_text(output, study.design_csv(data))
+    draw(request.plot, lambda figures: figures.design_study(data))
     if output is None:
         reporter.give(study.design_csv(data))
 
@@ -69,7 +69,7 @@ def optimise_design(reporter: Reporter, request: DesignRequest) -> None:
     from hotlever.studies.optimisation import optimise, optimum_text
     from hotlever.studies.working_point import WorkingPoint
 
-    outputs = request.outputs()
+    request.check_outputs()
     probe = request.with_physics(read_probe(reporter, request.probe))
     point = WorkingPoint(*parse_setting(request.at, tip=True))
     quantity, bounds = request.minimise or request.maximise or "", parse_bounds(request.within)
@@ -87,8 +87,7 @@ def optimise_design(reporter: Reporter, request: DesignRequest) -> None:
         optimum = optimise(probe, quantity, point, bounds, greatest=greatest, progress=update)
     if optimum.reason:
         reporter.note(f"this may not be the optimum: {optimum.reason}")
-    with outputs.together():
-        if request.output is not None:
-            optimum.best.probe.to_file(request.output)
-        draw(request.plot, lambda figures: figures.design_optimum(optimum))
+    if request.output is not None:
+        optimum.best.probe.to_file(request.output)
+    draw(request.plot, lambda figures: figures.design_optimum(optimum))
     reporter.give(optimum_text(optimum) + "\n")

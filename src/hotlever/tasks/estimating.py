@@ -39,7 +39,7 @@ from hotlever.estimate.levers import (
 from hotlever.estimate.outcome import Result
 from hotlever.estimate.power_law import read_power_law
 from hotlever.estimate.procedure import calibrate
-from hotlever.files import TABLE, Outputs, write_text
+from hotlever.files import FOLDER, TABLE, check_outputs, write_text
 from hotlever.measurement import Measurement, read_measurement_of
 from hotlever.probe import Probe
 from hotlever.tasks.measured_requests import CalibrateRequest, FitRequest, LeversRequest
@@ -68,17 +68,16 @@ def fit_files(reporter: Reporter, request: FitRequest) -> int:
     """
     request.check()
     probe = request.with_physics(read_probe(reporter, request.probe))
-    options, outputs = request.options(probe), request.outputs()
+    options = request.options(probe)
+    request.check_outputs()
     if not request.several:
-        _fit_one(reporter, request, outputs, probe, options)
+        _fit_one(reporter, request, probe, options)
         return 0
     make = partial(fit_many, probe=probe, options=options)
-    return _estimate_several(reporter, request, outputs, "fits", LEVERS_TABLE, make, _of_fits)
+    return _estimate_several(reporter, request, "fits", LEVERS_TABLE, make, _of_fits)
 
 
-def _fit_one(
-    reporter: Reporter, request: FitRequest, outputs: Outputs, probe: Probe, options: FitOptions
-) -> None:
+def _fit_one(reporter: Reporter, request: FitRequest, probe: Probe, options: FitOptions) -> None:
     (data,), waveform = request.data, request.read_waveform()
     measurement = read_measurement_of(probe, data, request.columns, waveform)
     analyses = [name for name in ("--posterior", "--profiles") if getattr(request, name[2:])]
@@ -104,13 +103,12 @@ def _fit_one(
         except (HotleverError, KeyboardInterrupt) as error:
             # the fit is there; what ends this is said when it is written
             failure = error
-    with outputs.together():
-        if request.output is not None:
-            write_text(request.output, (uncertainty or result).to_json())
-        if request.report is not None:
-            from hotlever.report.fit_pages import fit_page
+    if request.output is not None:
+        write_text(request.output, (uncertainty or result).to_json())
+    if request.report is not None:
+        from hotlever.report.fit_pages import fit_page
 
-            texts.append(f"report: {fit_page(result, uncertainty).write(request.report)}")
+        texts.append(f"report: {fit_page(result, uncertainty).write(request.report)}")
     reporter.give("\n".join([*texts, ""]))
     if failure is not None:
         raise failure
@@ -167,12 +165,12 @@ def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
         "samples": request.samples if request.posterior else 0,
     }
     at = None if request.at is None else Setting(*parse_setting(request.at))
-    outputs = request.outputs()
+    request.check_outputs()
     if request.several:
         make = partial(calibrate_many, **how)
         summarise = partial(_of_calibrations, at, request.table_options())
         names = "calibrations", CALIBRATIONS_TABLE
-        return _estimate_several(reporter, request, outputs, *names, make, summarise)
+        return _estimate_several(reporter, request, *names, make, summarise)
     (data,) = request.data
     measurement = read_measurement_of(like, data, request.columns)
     reporter.tell_table(measurement.understood)
@@ -182,14 +180,13 @@ def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
         result = calibrate(measurement, fit=of_lever, at_V=at_V, progress=update, **how)
     reporter.note(*result.notes)
     texts = [calibration_text(result)]
-    with outputs.together():
-        if request.output is not None:
-            result.write(request.output)
-        if request.table is not None:
-            write_text(request.table, result.table_csv(**request.table_options()))
-        draw(request.plot, lambda figures: figures.calibration_curves(result))
-        if request.report is not None:
-            texts.append(f"report: {_write_pages(result, request.report)}")
+    if request.output is not None:
+        result.write(request.output)
+    if request.table is not None:
+        write_text(request.table, result.table_csv(**request.table_options()))
+    draw(request.plot, lambda figures: figures.calibration_curves(result))
+    if request.report is not None:
+        texts.append(f"report: {_write_pages(result, request.report)}")
     reporter.give("\n".join([*texts, ""]))
     if not result.describes_data:
         raise ComputationError(f"{data}: {result.doubt}")
@@ -216,7 +213,8 @@ def propose(reporter: Reporter, request: NextRequest) -> None:
         If the data are not described, so that nothing follows from them.
     """
     request.check()
-    choices, outputs = request.choices(), request.outputs()
+    choices = request.choices()
+    request.check_outputs()
     beforehand: dict[str, Any] = {}
     if request.calibrated:
         assert request.data is not None
@@ -231,10 +229,9 @@ def propose(reporter: Reporter, request: NextRequest) -> None:
     with reporter.progress("next"):
         plan = plan_next(**beforehand, **choices)
     reporter.note(*plan.notes)
-    with outputs.together():
-        if request.output is not None:
-            write_text(request.output, plan.to_csv())
-        draw(request.plot, lambda figures: figures.planned_measurements(plan))
+    if request.output is not None:
+        write_text(request.output, plan.to_csv())
+    draw(request.plot, lambda figures: figures.planned_measurements(plan))
     reporter.give(plan.text() + "\n")
 
 
@@ -276,7 +273,6 @@ class _Summary:
 def _estimate_several(
     reporter: Reporter,
     request: LeversRequest,
-    outputs: Outputs,
     results: str,
     table: str,
     make: Callable[..., Batch[Result]],
@@ -290,7 +286,6 @@ def _estimate_several(
     ----------
     reporter : Reporter
     request : LeversRequest
-    outputs : Outputs
     results, table : str
         What the results are called, as their folder beside a page, and the table of all of them.
     make : callable
@@ -318,9 +313,9 @@ def _estimate_several(
         )
     folder = output or Path(str(report), results)
     if output is None:
-        outputs.folder(folder)
+        check_outputs([(folder, FOLDER)])
     if folder.is_dir():
-        outputs.file(folder / table)
+        check_outputs([(folder / table, (".csv",))], data)
     done = 0
     with reporter.progress_bars("levers", "geometry") as (estimating, reducing):
 
@@ -352,11 +347,10 @@ def _estimate_several(
     if batch.results:
         summary = summarise(batch)
         texts = [summary.text]
-        with outputs.together():
-            for name, text in summary.files.items():
-                write_text(folder / name, text)
-            if report is not None:
-                texts.append(f"report: {summary.page().write(report)}")
+        for name, text in summary.files.items():
+            write_text(folder / name, text)
+        if report is not None:
+            texts.append(f"report: {summary.page().write(report)}")
         reporter.give("\n".join([*texts, ""]))
     for failure in (*map(str, batch.failures.values()), *batch.undescribed.values()):
         reporter.fail(failure)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 from hotlever.errors import InputError, excerpt
-from hotlever.files import FIGURE_TYPES, FILM_TYPES, Outputs
+from hotlever.files import FIGURE_TYPES, FILM_TYPES, FOLDER, check_outputs
 from hotlever.tasks.shared import read_probe
 from hotlever.units import setting
 
@@ -30,8 +30,6 @@ MOST_TIMES = 10_000
 _TOLD_BY_TEXT = ("step", "pulse", "ramp", "sine")
 
 File = Path | None
-#: How the name of what is written ends if that is a folder.
-FOLDER: tuple[str, ...] = ()
 
 
 def option(default: Any, *names: str, **texts: Any) -> Any:
@@ -88,17 +86,12 @@ class Request:
         types: tuple[str, ...] = own.metadata["writes"]
         return types
 
-    def outputs(self) -> Outputs:
+    def check_outputs(self) -> None:
         """Check the files and folders that are written, none of which is read."""
-        outputs = Outputs(*self.inputs())
-        for own in fields(self):
-            if "writes" in own.metadata:
-                path, types = getattr(self, own.name), self.types_of(own)
-                if types == FOLDER:
-                    outputs.folder(path)
-                else:
-                    outputs.file(path, *types)
-        return outputs
+        written = (own for own in fields(self) if "writes" in own.metadata)
+        check_outputs(
+            ((getattr(self, own.name), self.types_of(own)) for own in written), self.inputs()
+        )
 
 
 @dataclass(kw_only=True)

@@ -43,7 +43,7 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
         return
     waveform = request.required_waveform()
     until, times = request.end_us, request.times_us
-    outputs = request.outputs()
+    request.check_outputs()
     lever = make_lever(reporter, request.read_probe(reporter))
     frames = None if request.film is None else _Frames(times or _even(waveform, until))
     failure: HistoryEndError | None = None
@@ -75,14 +75,13 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
     data = curve.isel(time=slice(None, None, per_step))
     reporter.note(*notes_of(data))
     reporter.tell_table(_times(data))
-    with outputs.together():
-        text = write_table(request.output, data, in_a_file(data, TIME_COLUMNS))
-        if data.sizes["time"]:
-            draw(request.plot, lambda figures: figures.history_overview(curve))
-        if request.fields is not None:
-            write_fields_in_time(lever, kept_at, states, output_folder(request.fields))
-        if frames is not None and request.film is not None and frames.states:
-            _draw_film(reporter, curve, frames.states, request.film)
+    text = write_table(request.output, data, in_a_file(data, TIME_COLUMNS))
+    if data.sizes["time"]:
+        draw(request.plot, lambda figures: figures.history_overview(curve))
+    if request.fields is not None:
+        write_fields_in_time(lever, kept_at, states, output_folder(request.fields))
+    if frames is not None and request.film is not None and frames.states:
+        _draw_film(reporter, curve, frames.states, request.film)
     if text:
         reporter.give(text)
     if failure is not None:
@@ -138,12 +137,11 @@ def _write_page(reporter: Reporter, request: PulseRequest, folder: Path) -> None
     """Write the page of a lever in time."""
     from hotlever.report.transient_pages import transient_page
 
-    outputs = request.outputs()
+    request.check_outputs()
     lever = make_lever(reporter, request.read_probe(reporter))
     with reporter.progress("sections") as update:
         page = transient_page(lever, update)
-    with outputs.together():
-        written = page.write(folder)
+    written = page.write(folder)
     reporter.give(f"{written}\n")
 
 

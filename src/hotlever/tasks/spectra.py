@@ -53,22 +53,19 @@ def measure_spectra(reporter: Reporter, request: RamanRequest) -> None:
     InputError
         If there is no spectrum with a line, or no calibration to be saved.
     """
-    outputs = request.outputs()
+    request.check_outputs()
     setup = set_up(reporter, request)
     if request.save_calibration is not None and setup.calibration is None:
         raise InputError("--save-calibration: there is no calibration; give --calibrate-from")
     lines, table = setup.measure(request.spectra)
     text = series.to_csv(table)
-    with outputs.together():
-        if len(lines) == 1 and setup.calibration is None:
-            draw(request.plot, lambda figures: figures.one_spectrum(lines[0]))
-        else:
-            of = setup.calibration, setup.hot_plate
-            draw(request.plot, lambda figures: figures.thermometry(lines, table, *of))
-        if request.save_calibration is not None and setup.calibration is not None:
-            setup.calibration.save(request.save_calibration)
-        if request.output is not None:
-            write_text(request.output, text)
+    if len(lines) == 1 and setup.calibration is None:
+        draw(request.plot, lambda figures: figures.one_spectrum(lines[0]))
+    else:
+        of = setup.calibration, setup.hot_plate
+        draw(request.plot, lambda figures: figures.thermometry(lines, table, *of))
+    if request.save_calibration is not None and setup.calibration is not None:
+        setup.calibration.save(request.save_calibration)
     _answer(reporter, text, request.output)
 
 
@@ -80,7 +77,7 @@ def join_spectra(reporter: Reporter, request: JoinRequest) -> None:
     InputError
         If there is no thermometer, or log and spectra do not belong together.
     """
-    outputs = request.outputs()
+    request.check_outputs()
     log = read_bias_log(request.bias_log)
     setup = set_up(reporter, request)
     if setup.thermometer is None:
@@ -90,17 +87,15 @@ def join_spectra(reporter: Reporter, request: JoinRequest) -> None:
     if missing.size:
         reporter.note(f"no temperature from {', '.join(missing)}: empty cells")
     text = join(log, table)
-    if request.output is not None:
-        with outputs.together():
-            write_text(request.output, text)
     _answer(reporter, text, request.output)
 
 
 def _answer(reporter: Reporter, text: str, output: Path | None) -> None:
-    """Give the table, or say where it was written."""
+    """Give the table, or write it and say where."""
     if output is None:
         reporter.give(text)
     else:
+        write_text(output, text)
         reporter.tell(f"wrote {output}")
 
 

@@ -52,7 +52,7 @@ def touch(reporter: Reporter, request: ContactRequest) -> None:
         sweep_in_contact,
     )
 
-    outputs = request.outputs()
+    request.check_outputs()
     waveform = request.read_waveform()
     if waveform is None:
         request.refuse("until", "at", why="goes with a wave form, such as --pulse")
@@ -71,9 +71,8 @@ def touch(reporter: Reporter, request: ContactRequest) -> None:
     if failure is not None and not data.tip_K.size:
         raise failure
     reporter.note(*contact_notes(data))
-    with outputs.together():
-        text = write_table(request.output, data, columns)
-        draw(request.plot, lambda figures: figures.contact_overview(data, probe))
+    text = write_table(request.output, data, columns)
+    draw(request.plot, lambda figures: figures.contact_overview(data, probe))
     if text:
         reporter.give(text)
     if failure is not None:
@@ -157,7 +156,7 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
     """
     from hotlever.lever.reader import Reader, best_bias, over_surface, rows_of
 
-    outputs = request.outputs()
+    request.check_outputs()
     distances, noise = parse_distances(request.distance), noise_of(request)
     pressures = None if request.pressure is None else parse_pressures(request.pressure)
     probe = probe_over_surface(reporter, request, distances)
@@ -186,10 +185,9 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
     reporter.tell_table(best_resolved(data, noise))
     rows = rows_of(data)
     columns = [str(name) for name in rows.data_vars]
-    with outputs.together():
-        whole = request.output is not None and request.output.suffix.lower() == ".nc"
-        text = write_table(request.output, data if whole else rows, columns)
-        draw(request.plot, lambda figures: figures.reader_overview(data))
+    whole = request.output is not None and request.output.suffix.lower() == ".nc"
+    text = write_table(request.output, data if whole else rows, columns)
+    draw(request.plot, lambda figures: figures.reader_overview(data))
     if text:
         reporter.give(text)
 

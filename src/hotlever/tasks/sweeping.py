@@ -28,7 +28,7 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
     ComputationError
         If it has no state at some of them; what was reached is written.
     """
-    outputs = request.outputs()
+    request.check_outputs()
     probe = request.read_probe(reporter)
     held = request.set_points
     biases = parse_bias(request.bias, probe.lowest_bias_V)
@@ -60,25 +60,24 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
             hottest = int(data.tip_K.values.argmax())
             (mapped,) = states[hottest:][:1] or lever.solve([data.bias_V.values[hottest]])
     reporter.note(*notes_of(data))
-    with outputs.together():
-        text = write_table(request.output, data, in_a_file(data, SWEEP_COLUMNS))
-        draw(
-            request.plot,
-            lambda figures: (
-                figures.sweep_overview(data) if held is None else figures.held_states(data, curve)
-            ),
-        )
-        draw(request.map, lambda figures: figures.temperature_map(mapped))
-        if request.fields is not None:
-            # what draws or writes fields is imported where it is needed: a sweep is there at once
-            from hotlever.lever.fields import write_fields
+    text = write_table(request.output, data, in_a_file(data, SWEEP_COLUMNS))
+    draw(
+        request.plot,
+        lambda figures: (
+            figures.sweep_overview(data) if held is None else figures.held_states(data, curve)
+        ),
+    )
+    draw(request.map, lambda figures: figures.temperature_map(mapped))
+    if request.fields is not None:
+        # what draws or writes fields is imported where it is needed: a sweep is there at once
+        from hotlever.lever.fields import write_fields
 
-            write_fields(
-                lever,
-                states,
-                output_folder(request.fields),
-                lambda slices, path: draw(path, lambda figures: figures.temperature_slices(slices)),
-            )
+        write_fields(
+            lever,
+            states,
+            output_folder(request.fields),
+            lambda slices, path: draw(path, lambda figures: figures.temperature_slices(slices)),
+        )
     if text:
         reporter.give(text)
     if failure is not None:
@@ -97,7 +96,7 @@ def respond(reporter: Reporter, request: SpectrumRequest) -> None:
 
     swing = None if request.amplitude is None else bias_setting(request.amplitude, "--amplitude")
     volts, frequencies = bias_setting(request.bias, "--bias"), parse_frequencies(request.frequency)
-    outputs = request.outputs()
+    request.check_outputs()
     lever = make_lever(reporter, request.read_probe(reporter))
     with reporter.progress("spectrum") as update:
         if swing is None:
@@ -106,8 +105,7 @@ def respond(reporter: Reporter, request: SpectrumRequest) -> None:
         else:
             data = harmonics(lever, volts, swing, frequencies, update)
     columns = in_a_file(data, SPECTRUM_COLUMNS if swing is None else HARMONIC_COLUMNS)
-    with outputs.together():
-        text = write_table(request.output, data, columns)
-        draw(request.plot, lambda figures: figures.figure_of(data))
+    text = write_table(request.output, data, columns)
+    draw(request.plot, lambda figures: figures.figure_of(data))
     if text:
         reporter.give(text)
