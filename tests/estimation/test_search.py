@@ -21,6 +21,7 @@ from hotlever.estimate.inverse_problem import estimate
 from hotlever.estimate.objective import Objective
 from hotlever.estimate.optimiser import Optimiser, SearchOptions
 from hotlever.estimate.options import FitOptions
+from hotlever.estimate.posterior import standard_errors
 from hotlever.estimate.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -78,6 +79,28 @@ def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
                 objective.squares(found.predictor.experiment.predict(there, at))
                 > least - 0.05 * noise
             )
+
+
+@pytest.mark.parametrize(("n_d", "known"), [(2e17, 1.5e17), (4e17, 3e17)])
+def test_a_fit_of_data_below_the_knee_ends_though_they_leave_a_valley_open(n_d, known):
+    """Each step along it gained a hundredth of the noise, until no more levers were left."""
+    true = Probe.u_shape().with_(n_d=n_d)
+    data = curve(true, 5.0)
+
+    def model(probe: Probe, bias: np.ndarray) -> ExperimentAtRest:
+        return full_experiment(Lever(probe, COARSE), bias)
+
+    found = estimate(data, true.with_(n_d=known, c_kappa=0.8), FitOptions(), model=model)
+    truth = found.predictor.experiment.predict(true, found.prediction)
+    noise = found.residuals.errors.noise_squares(found.residuals.difference(truth.values))
+    least = found.objective.squares(found.prediction)
+    assert found.converged
+    assert found.predictor.evaluations <= 20
+    assert least < found.objective.squares(truth) + noise
+    # what is open is said: the tip may be anywhere
+    off = found.prediction.columns["tip_K"] - truth.columns["tip_K"]
+    error = standard_errors(found.prediction.tip_slopes, found.posterior.covariance)
+    assert np.all(np.abs(off) < error)
 
 
 def test_a_current_that_saturates_is_not_described(reference_curve, monkeypatch):

@@ -25,10 +25,11 @@ from hotlever.types import Array
 _SMALLEST_REGION = 1e-6
 #: The share of the predicted gain from which on the region grows, and below which it shrinks.
 _TRUSTED, _DOUBTED = 0.7, 0.25
-#: Sum of squares that Gauss and Newton's step may still take away at an optimum where no longer
-#: step than the region gains anything, since values are not smooth there, as near a fold that moves
-#: past a row: a third of a standard error.
-_DECREMENT_WHERE_ROUGH, _ROUGH_REGION = 0.1, 1e-3
+#: Sum of squares, in units of the noise, that may still be taken away at an optimum where steps
+#: gain next to nothing: a third of a standard error. With priors that is where no longer step than
+#: the region gains anything, since values are not smooth there, as near a fold that moves past a
+#: row.
+_DECREMENT_OF_SMALL_STEPS, _ROUGH_REGION = 0.1, 1e-3
 #: The same in units of the noise, where weights count no standard deviations: a thirtieth of a
 #: standard error.
 _RELATIVE_DECREMENT = 1e-3
@@ -75,6 +76,10 @@ class SearchOptions:
         squares count standard deviations (with priors): a tenth of a standard error.
     scatter_rounds : int
         Rounds in which an observable without measurement errors finds its scatter.
+    creeping_steps : int
+        Steps in succession of which none promises a third of a standard error, after which a search
+        without priors has come to its end: data leave a curved valley open, as those of a current
+        below the knee, along which it would creep on.
     """
 
     most_branches: int = 25
@@ -84,6 +89,7 @@ class SearchOptions:
     largest_region: float = 0.7
     decrement: float = 1e-2
     scatter_rounds: int = 3
+    creeping_steps: int = 5
 
 
 @dataclass(frozen=True)
@@ -248,7 +254,7 @@ class Optimiser:
         # the noise of some observables may be found with the optimum
         unknown = bool(self.residuals.errors.without.any())
         takes_scatter = unknown and objective.informed and options.scatter_rounds > 0
-        at, region = self.predictor.predict(start), options.first_region
+        at, region, creeping = self.predictor.predict(start), options.first_region, 0
         while True:
             # without priors residuals have no size that says what is near
             others = self.predictor.others(at) if objective.informed else []
@@ -269,6 +275,9 @@ class Optimiser:
                 precise = precise and region < _SMALLEST_REGION
                 return self._optimum(at, left, converged=precise or self._is_near(left))
             if region < _ROUGH_REGION and self._is_near(left):
+                return self._optimum(at, left, converged=True)
+            creeping = creeping + 1 if self._creeps(at, squares - least) else 0
+            if creeping > options.creeping_steps:
                 return self._optimum(at, left, converged=True)
             length = float(np.max(np.abs(step) / room))
             trial = self._trial(at, target)
@@ -293,13 +302,24 @@ class Optimiser:
 
     def _is_near(self, left: float) -> bool:
         """Whether an optimum is so near that its errors hold, if values are not smooth there."""
-        return self.objective.informed and left <= _DECREMENT_WHERE_ROUGH
+        return self.objective.informed and left <= _DECREMENT_OF_SMALL_STEPS
+
+    def _creeps(self, at: Prediction, promised: float) -> bool:
+        """Whether a step of a search without priors promises next to nothing."""
+        if self.objective.informed:
+            return False
+        return promised <= _DECREMENT_OF_SMALL_STEPS * self._noise(at)
+
+    def _noise(self, at: Prediction) -> float:
+        """Return the sum of squares that a standard error costs."""
+        if self.objective.informed:
+            return 1.0
+        return self.residuals.errors.noise_squares(self.residuals.difference(at.values))
 
     def _tolerance(self, at: Prediction) -> float:
         """Return by how much the sum of squares may still fall where a search ends."""
         objective, residuals = self.objective, self.residuals
-        squares, difference = objective.squares(at), residuals.difference(at.values)
-        noise = 1.0 if objective.informed else residuals.errors.noise_squares(difference)
+        squares, noise = objective.squares(at), self._noise(at)
         # so far above what noise explains that no lever is near
         hopeless = squares > _MISFIT * residuals.size * noise
         least = (_NEGLIGIBLE_OF_MISFIT if hopeless else _NEGLIGIBLE) * squares
