@@ -16,7 +16,7 @@ import xarray as xr
 from hotlever import __version__
 from hotlever.errors import ComputationError
 from hotlever.probe import Probe
-from hotlever.tasks.texts import parse_bias, parse_frequencies, parse_settings
+from hotlever.tasks.parsing import parse_bias, parse_frequencies, parse_settings
 from of_materials import p_type_probe
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")

@@ -24,8 +24,10 @@ from documents import (
     without_blocks,
 )
 from experiments import on_coarse_meshes
-from hotlever.cli.commands import command_line
+from hotlever.cli.browser import open_app
+from hotlever.tasks.commands import COMMANDS, command_line
 
+COMMAND_LINE = command_line(lambda *_: 0, {**COMMANDS, "app": open_app})
 DOCS = ROOT / "docs"
 PAGES = {
     path.relative_to(DOCS).with_suffix("").as_posix(): path.read_text(encoding="utf-8")
@@ -86,7 +88,7 @@ def test_the_head_of_the_data_file_is_shown_as_it_is():
 
 def found_command(words):
     """The command that words name, and the words behind its name."""
-    command = command_line()
+    command = COMMAND_LINE
     while hasattr(command, "commands") and words and re.fullmatch(r"[a-z-]+", words[0]):
         name, *words = words
         assert name in command.commands, f"no command {name!r}"
@@ -109,7 +111,7 @@ def test_commands_and_options_exist(name):
             command, rest = found_command(words)
             used = {word for word in rest if re.match(r"--?[a-zA-Z]", word)}
             assert used <= options_of(command), words
-    known = options_of(command_line())
+    known = options_of(COMMAND_LINE)
     for code in re.findall(r"`([^`\n]+)`", without_blocks(text)):
         if code.startswith("hotlever "):
             found_command(code.split()[1:])

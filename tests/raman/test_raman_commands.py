@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import synthetic_spectra as synthetic
-from hotlever.cli.commands import spread_option
 from hotlever.figures import raman as figures
 from hotlever.raman.calibration import published_raman_calibration
 from hotlever.raman.reading import read_spectra
@@ -26,6 +25,7 @@ from hotlever.raman.series import (
 )
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.thermometer import Thermometer
+from hotlever.tasks.commands import spread_option
 
 HEADER = (
     "file,center_cm-1,center_stderr_cm-1,fwhm_cm-1,shift_cm-1,temperature_K,"

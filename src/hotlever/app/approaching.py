@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hotlever.air.bodies import BaseLine
-from hotlever.app.jobs import Task, probe_of, request_of
+from hotlever.app.jobs import Task, probe_of, surrounded_probe
 from hotlever.app.live import coloured
 from hotlever.app.workers import Report
 from hotlever.errors import ComputationError, InputError
@@ -26,9 +26,10 @@ from hotlever.lever.reader import Reader, Signal, at_distance, over_surface, rea
 from hotlever.probe import Layout, Probe
 from hotlever.probe.shapes import Shape
 from hotlever.steps import each
-from hotlever.tasks.shared import make_lever, notes_of
-from hotlever.tasks.surfaces import jumping_at_tip, needs_jump, noise_of, probe_over_surface
-from hotlever.tasks.texts import parse_bias, parse_distances
+from hotlever.tasks.commands import arguments_of
+from hotlever.tasks.common_steps import make_lever, notes_of
+from hotlever.tasks.parsing import parse_bias, parse_distances
+from hotlever.tasks.surfaces import jumping_at_tip, needs_jump, over_a_surface, reader_noise
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
@@ -83,24 +84,27 @@ def answer(
     HotleverError
         If the reader can show nothing, or has no state at this bias.
     """
-    request = request_of(task)
-    ends = parse_distances(request.distance)
+    told = arguments_of(task.words)
+    noise = reader_noise(told["bandwidth"], told["amplifier"], told["hooge"], told["vibration"])
+    ends = parse_distances(told["distance"])
     distances = np.geomspace(ends[0], ends[-1], ends.size)
-    probe = probe_over_surface(report, request, distances)
-    bias = float(parse_bias(request.bias, probe.lowest_bias_V).item())
+    medium = told["medium"]
+    probe = surrounded_probe(report, told, finds_air=True)
+    probe = over_a_surface(report, probe, medium, distances)
+    bias = float(parse_bias(told["bias"], probe.lowest_bias_V).item())
     if quick:
         if needs_jump(probe) and jump_K is None:
             probe = jumping_at_tip(report, _nearest(report, probe, True), bias).probe
         elif needs_jump(probe):
             probe = probe.with_(jump_temperature_K=jump_K)
-        return _moving(report, Reader(probe, noise_of(request)), distances, distance, bias)
+        return _moving(report, Reader(probe, noise), distances, distance, bias)
     with report.progress("full lever") as update:
         update(0, 2)
         lever = _nearest(report, probe, False)
         if needs_jump(probe):
             lever = jumping_at_tip(report, lever, bias)
         update(1, 2)
-        data = over_surface(lever, [distance], [bias], noise_of(request))
+        data = over_surface(lever, [distance], [bias], noise)
     if not data.tip_K.notnull().any():
         raise ComputationError(notes_of(data)[0])
     report.note(*notes_of(data))

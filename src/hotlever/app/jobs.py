@@ -14,12 +14,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import TypeAdapter, ValidationError
-
 from hotlever.app.workers import Report, Worker
-from hotlever.errors import HotleverError, InputError
+from hotlever.errors import HotleverError
 from hotlever.probe import Probe
-from hotlever.tasks.commands import COMMANDS
+from hotlever.tasks.commands import COMMANDS, run_command, written_by
+from hotlever.tasks.common_steps import read_surrounded_probe
 
 Standing = Literal["running", "done", "failed", "cancelled"]
 
@@ -62,8 +61,8 @@ class Task:
         }
 
     @property
-    def line(self) -> str:
-        """The command line that does the same."""
+    def words(self) -> list[str]:
+        """The words of the command line that does the same."""
         files = (f"./{name}" if name.startswith("-") else name for name in self.files)
         words = [*self.command.split(), *files]
         for name, value in self.effective_options.items():
@@ -73,11 +72,16 @@ class Task:
             else:
                 values = value if isinstance(value, list) else [value]
                 words += [word for text in values for word in (option, str(text))]
-        return shlex.join(["hotlever", *words])
+        return words
+
+    @property
+    def line(self) -> str:
+        """This command line."""
+        return shlex.join(["hotlever", *self.words])
 
     def writing(self, files: Mapping[str, str]) -> Task:
         """Return the same that writes other files."""
-        written = COMMANDS[self.command].written
+        written = written_by(COMMANDS[self.command])
         options = {name: value for name, value in self.options.items() if name not in written}
         return replace(self, options={**options, **files})
 
@@ -246,28 +250,13 @@ def run(report: Report, task: Task) -> None:
     HotleverError
         If it cannot be done, or only in part.
     """
-    COMMANDS[task.command].do(report, request_of(task))
+    run_command(task.words, report)
 
 
-def request_of(task: Task) -> Any:
-    """Return the request of a task.
-
-    Raises
-    ------
-    InputError
-        As the command line says, if a value is not of its option's type.
-    """
-    command, options = COMMANDS[task.command], task.effective_options
-    if task.files:
-        (argument,) = command.arguments
-        several = "list" in str(argument.type)
-        options[argument.name] = list(task.files) if several else task.files[0]
-    try:
-        return TypeAdapter(command.request).validate_python(options)
-    except ValidationError as error:
-        (first, *_) = error.errors()
-        name = str(first["loc"][0]).replace("_", "-")
-        raise InputError(f"Invalid value for '--{name}': {first['msg']}") from None
+def surrounded_probe(report: Report, told: Mapping[str, Any], *, finds_air: bool = False) -> Probe:
+    """Return the probe, in its medium, of a command whose arguments are given by name."""
+    around = told["medium"], told["set"], told["physics"]
+    return read_surrounded_probe(report, told["probe"], *around, finds_air=finds_air)
 
 
 def probe_of(name: str) -> Probe:

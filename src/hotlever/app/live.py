@@ -19,7 +19,7 @@ from matplotlib import colormaps
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from hotlever.app.jobs import Task, probe_of, request_of
+from hotlever.app.jobs import Task, probe_of, surrounded_probe
 from hotlever.app.workers import Report
 from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError
@@ -36,7 +36,8 @@ from hotlever.materials.parameters import own_name
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parameters import of_materials
 from hotlever.probe.shapes import EDGE_BIAS
-from hotlever.tasks.shared import make_lever
+from hotlever.tasks.commands import arguments_of
+from hotlever.tasks.common_steps import make_lever
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
@@ -209,7 +210,7 @@ def answer(
         If the lever has no state at this bias; a reduced lever that ends below leaves the answer to
         a coarse one.
     """
-    probe, most = request_of(task).read_probe(report), max(most, bias)
+    probe, most = surrounded_probe(report, arguments_of(task.words)), max(most, bias)
     live = _quick(probe, most, reduced) if quick else _full(report, probe, most)
     if live.model == REDUCED and not live.reaches(bias):
         live = _quick(probe, most, False)
@@ -229,7 +230,7 @@ def prepare(report: Report, task: Task) -> bool:
     """Make the reduced lever of a task's probe, if it can have one; return whether it has."""
     with suppress(OSError, AttributeError):
         os.nice(_NICE)  # sliders come first
-    probe = request_of(task).read_probe(report)
+    probe = surrounded_probe(report, arguments_of(task.words))
     if not _can_be_reduced(probe):
         return False
     with report.progress_bars("air", "live sliders") as (meshing, training):

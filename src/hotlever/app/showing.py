@@ -10,7 +10,7 @@ import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.app.jobs import Task, probe_of, request_of
+from hotlever.app.jobs import Task, probe_of
 from hotlever.app.probe_fields import figure_file, svg
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
@@ -48,8 +48,9 @@ from hotlever.raman.tables import corrections_text
 from hotlever.report.calibration_pages import budget_page, calibration_page
 from hotlever.report.fit_pages import fit_page
 from hotlever.report.page import Page
+from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.reporter import Silence
-from hotlever.tasks.spectra import set_up
+from hotlever.tasks.spectra import ThermometerOptions, set_up
 from hotlever.types import Array
 
 #: Kinds of results.
@@ -226,17 +227,18 @@ def spectrum(
     corrections : mapping of str to Correction
         By hand, which may be in no file yet.
     """
-    counted, request, doubt = _spectrum(name), request_of(task), ""
+    counted, told, doubt = _spectrum(name), arguments_of(task.words), ""
     with tempfile.TemporaryDirectory() as folder:
         by_hand = Path(folder, "by-hand.csv") if corrections else None
         if by_hand is not None:
             by_hand.write_text(corrections_text(corrections), encoding="utf-8")
-        request = replace(request, corrections=by_hand)
+        told = {field.name: told[field.name] for field in fields(ThermometerOptions)}
+        options = ThermometerOptions(**{**told, "corrections": by_hand})
         try:
-            setup = set_up(Silence(), request)
+            setup = set_up(Silence(), options)
         except HotleverError as error:
             doubt = f"no temperature: {error}"
-            setup = set_up(Silence(), replace(request, calibration=None, calibrate_from=None))
+            setup = set_up(Silence(), replace(options, calibration=None, calibrate_from=None))
     (line,) = measure([counted], setup.options, corrections=setup.corrections)
     table = read_lines([line], setup.thermometer)
     inside = in_window(counted.x, "")

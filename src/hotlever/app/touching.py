@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from hotlever.app.jobs import Task, probe_of, request_of
+from hotlever.app.jobs import Task, probe_of, surrounded_probe
 from hotlever.app.live import coloured
 from hotlever.app.workers import Report
 from hotlever.contact.law import INTERFACE
@@ -23,8 +23,9 @@ from hotlever.lever.contact import state_in_contact, sweep_in_contact
 from hotlever.lever.lever import COARSE, State
 from hotlever.probe import Probe
 from hotlever.probe.tip import EXAMPLE, OUT_OF_CONTACT
-from hotlever.tasks.shared import make_lever
-from hotlever.tasks.surfaces import contact_notes, probe_in_contact
+from hotlever.tasks.commands import arguments_of
+from hotlever.tasks.common_steps import make_lever
+from hotlever.tasks.surfaces import contact_notes, in_contact
 from hotlever.threads import one_blas_thread
 
 #: Biases of the curves, and levers kept.
@@ -67,8 +68,9 @@ def answer(report: Report, task: Task, bias: float, most: float, quick: bool) ->
     HotleverError
         If there is no such contact, or no state at this bias.
     """
-    request = request_of(task)
-    probe = probe_in_contact(report, request)
+    told = arguments_of(task.words)
+    probe = surrounded_probe(report, told)
+    probe = in_contact(report, probe, told["sample"], told["radius"], told["interface"])
     curves: dict[str, Any] | None = None
     if quick:
         end = 1e-3 * described(report, next(iter(task.files), ""))["radius_nm"]

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from typer import Argument, Option
 
 from hotlever.errors import InputError, unforeseen_error
+from hotlever.tasks.arguments import refuse
+from hotlever.tasks.parsing import check_number
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import Request, argument, option
-from hotlever.tasks.texts import check_number
 
 
-@dataclass(kw_only=True)
-class AppRequest(Request):
+def open_app(
+    reporter: Reporter,
+    folder: Annotated[
+        Path,
+        Argument(metavar="[FOLDER]", help="The project: its files are those of the command line."),
+    ] = Path(),
+    *,
+    port: Annotated[int, Option(help="Port to serve at; a free one if left out.")] = 0,
+    no_browser: Annotated[bool, Option("--no-browser", help="Print the address only.")] = False,
+    host: Annotated[str | None, Option(hidden=True)] = None,
+    yes_share: Annotated[bool, Option("--yes-share", hidden=True)] = False,
+) -> None:
     """Open a page in your browser in which files are dropped and sliders moved."""
-
-    folder: Path = argument(
-        Path(), metavar="[FOLDER]", help="The project: its files are those of the command line."
-    )
-    port: int = option(0, help="Port to serve at; a free one if left out.")
-    no_browser: bool = option(False, "--no-browser", help="Print the address only.")
-    host: str | None = option(None, hidden=True)
-    yes_share: bool = option(False, "--yes-share", hidden=True)
-
-
-def open_app(reporter: Reporter, request: AppRequest) -> None:
-    """Serve a project until Ctrl-C."""
     try:
         import nicegui  # noqa: F401
     except ImportError:
@@ -34,19 +34,13 @@ def open_app(reporter: Reporter, request: AppRequest) -> None:
     from hotlever.app.server import serve
 
     gone = "went in 3.0.0: the app is for this machine (from another, ssh -L PORT:127.0.0.1:PORT)"
-    request.refuse("host", "yes_share", why=gone)
-    check_number("--port", request.port, 0, 65535)
+    refuse(gone, host=host, yes_share=yes_share)
+    check_number("--port", port, 0, 65535)
 
     def say(address: str) -> None:
         reporter.tell(f"hotlever app: {address}  (Ctrl-C ends it)")
 
     def failed(error: BaseException) -> None:
-        reporter.fail(unforeseen_error(error, ["app", str(request.folder)]))
+        reporter.fail(unforeseen_error(error, ["app", str(folder)]))
 
-    serve(
-        Project(request.folder),
-        port=request.port,
-        browser=not request.no_browser,
-        say=say,
-        failed=failed,
-    )
+    serve(Project(folder), port=port, browser=not no_browser, say=say, failed=failed)

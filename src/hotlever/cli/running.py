@@ -15,6 +15,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
+from hotlever.cli import output
 from hotlever.cli.output import fail, give
 from hotlever.errors import HotleverError, unforeseen_error
 
@@ -86,22 +87,13 @@ def _keep_to_ourselves() -> None:
 
 
 def _run(arguments: list[str]) -> int:
-    import typer
-
-    from hotlever.cli.commands import command_line
+    from hotlever.cli.browser import open_app
+    from hotlever.tasks.commands import COMMANDS, run_command
 
     try:
-        command = command_line(arguments[0])
-        with command.make_context("hotlever", arguments) as context:
-            command.invoke(context)
-    except typer.Exit as ended:
-        return ended.exit_code
-    except typer.TyperException as error:
-        fail(error.format_message())
-        return error.exit_code
+        return run_command(arguments, output, {**COMMANDS, "app": open_app})
     finally:
         give()
-    return 0
 
 
 def _ended(error: BaseException, arguments: list[str]) -> tuple[int, str]:

@@ -4,27 +4,26 @@ from __future__ import annotations
 
 from collections import defaultdict
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import Annotated
 
-from hotlever.cache import CACHE_VARIABLE, cache_folder, kept_files, largest_size
+from typer import Option
+
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import option
 
 
-@dataclass(kw_only=True)
-class CacheRequest:
+def show_cache(
+    reporter: Reporter,
+    *,
+    clear: Annotated[bool, Option("--clear", help="Remove all that is kept.")] = False,
+) -> None:
     """Show what is kept on disk to save time: reduced levers, operators of the air, states."""
+    from hotlever.cache import CACHE_VARIABLE, cache_folder, kept_files, largest_size
 
-    clear: bool = option(False, "--clear", help="Remove all that is kept.")
-
-
-def show_cache(reporter: Reporter, request: CacheRequest) -> None:
-    """Show how many files of each kind are kept, and how large they are."""
     folder = cache_folder()
     if folder is None:
         reporter.give(f"the cache is switched off: {CACHE_VARIABLE} is empty\n")
         return
-    if request.clear:
+    if clear:
         for _, path in kept_files(folder):
             with suppress(OSError):
                 path.unlink()

@@ -1,88 +1,303 @@
-"""The commands: what each takes, and the task that does it, for the command line and the app."""
+"""The commands, and the command line made of them.
+
+A command is a function of what it tells (`hotlever.tasks.reporter.Reporter`) and of its arguments
+and options, whose types say what the command line has of them and whose docstring is the help. It
+returns an exit status, or nothing. What it computes with is imported when it is called, so that the
+command line answers at once.
+"""
 
 from __future__ import annotations
 
-from dataclasses import Field, dataclass, fields
-from importlib import import_module
-from typing import Any
+import inspect
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin
 
-from hotlever.tasks.caching import CacheRequest
-from hotlever.tasks.evidence import ReproduceRequest, ValidateRequest
-from hotlever.tasks.measured_requests import (
-    CalibrateRequest,
-    FitRequest,
-    JoinRequest,
-    RamanRequest,
-)
-from hotlever.tasks.planning_requests import (
-    DesignRequest,
-    ImportRequest,
-    MaterialsRequest,
-    NewRequest,
-    NextRequest,
-    ShowRequest,
-)
+import typer
+import typer.core
+
+from hotlever import __version__
+from hotlever.errors import InputError, unknown_name
+from hotlever.files import check_outputs
+from hotlever.tasks.arguments import Written
+from hotlever.tasks.caching import show_cache
+from hotlever.tasks.describing import list_materials, new_probe, propose_probe, show_probe
+from hotlever.tasks.designing import vary_design
+from hotlever.tasks.estimating import calibrate_files, fit_files, propose
+from hotlever.tasks.evidence import reproduce, validate
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import (
-    ContactRequest,
-    PulseRequest,
-    ReaderRequest,
-    SpectrumRequest,
-    SweepRequest,
-)
+from hotlever.tasks.simulating import simulate_in_time
+from hotlever.tasks.spectra import join_spectra, measure_spectra
+from hotlever.tasks.surfaces import approach, touch
+from hotlever.tasks.sweeping import respond, sweep
 
-
-@dataclass(frozen=True)
-class Command:
-    """What is done by one command.
-
-    Attributes
-    ----------
-    request : type
-        A dataclass whose fields are arguments and options, and whose docstring is the help.
-    module, task : str
-        The function that takes a reporter and a request, and returns an exit status or nothing. Its
-        module, which may import what it computes with, is imported when the command is done.
-    """
-
-    request: type
-    module: str
-    task: str
-
-    @property
-    def arguments(self) -> list[Field[Any]]:
-        """The fields of the request that have no names on the command line."""
-        return [field for field in fields(self.request) if "names" not in field.metadata]
-
-    @property
-    def written(self) -> set[str]:
-        """The names of the fields that say what is written."""
-        return {field.name for field in fields(self.request) if "writes" in field.metadata}
-
-    def do(self, reporter: Reporter, request: Any) -> int:
-        """Do what is requested; return the exit status."""
-        status: int | None = getattr(import_module(self.module), self.task)(reporter, request)
-        return status or 0
-
+Command = Callable[..., int | None]
 
 #: By name, in the order in which the help lists them.
-COMMANDS = {
-    "probe new": Command(NewRequest, "hotlever.tasks.describing", "new_probe"),
-    "probe show": Command(ShowRequest, "hotlever.tasks.describing", "show_probe"),
-    "probe import": Command(ImportRequest, "hotlever.tasks.describing", "propose_probe"),
-    "materials": Command(MaterialsRequest, "hotlever.tasks.describing", "list_materials"),
-    "sweep": Command(SweepRequest, "hotlever.tasks.sweeping", "sweep"),
-    "pulse": Command(PulseRequest, "hotlever.tasks.simulating", "simulate_in_time"),
-    "contact": Command(ContactRequest, "hotlever.tasks.surfaces", "touch"),
-    "reader": Command(ReaderRequest, "hotlever.tasks.surfaces", "approach"),
-    "spectrum": Command(SpectrumRequest, "hotlever.tasks.sweeping", "respond"),
-    "design": Command(DesignRequest, "hotlever.tasks.designing", "vary_design"),
-    "raman": Command(RamanRequest, "hotlever.tasks.spectra", "measure_spectra"),
-    "join": Command(JoinRequest, "hotlever.tasks.spectra", "join_spectra"),
-    "fit": Command(FitRequest, "hotlever.tasks.estimating", "fit_files"),
-    "calibrate": Command(CalibrateRequest, "hotlever.tasks.estimating", "calibrate_files"),
-    "next": Command(NextRequest, "hotlever.tasks.estimating", "propose"),
-    "reproduce": Command(ReproduceRequest, "hotlever.tasks.evidence", "reproduce"),
-    "validate": Command(ValidateRequest, "hotlever.tasks.evidence", "validate"),
-    "cache": Command(CacheRequest, "hotlever.tasks.caching", "show_cache"),
+COMMANDS: dict[str, Command] = {
+    "probe new": new_probe,
+    "probe show": show_probe,
+    "probe import": propose_probe,
+    "materials": list_materials,
+    "sweep": sweep,
+    "pulse": simulate_in_time,
+    "contact": touch,
+    "reader": approach,
+    "spectrum": respond,
+    "design": vary_design,
+    "raman": measure_spectra,
+    "join": join_spectra,
+    "fit": fit_files,
+    "calibrate": calibrate_files,
+    "next": propose,
+    "reproduce": reproduce,
+    "validate": validate,
+    "cache": show_cache,
 }
+#: What the commands are for whose names have a word in common.
+_GROUPS = {"probe": "Write, describe, draw and import probes."}
+_AT_REST = "no controller is followed in time; hotlever sweep --hold-resistance finds its states"
+#: Commands and options of version 2 that are gone, and what there is in their place.
+_GONE = {
+    "raman-check": "the check of the paper's linear law is a section of hotlever reproduce",
+    "fit --drift": "correct the zeros of the file; a note says where one seems to drift",
+    **{
+        f"pulse --{name}": _AT_REST
+        for name in ("controller", "hold-resistance", "filter", "limit", "gain-map")
+    },
+}
+#: The option that takes all paths up to the next option.
+_SPREAD = "--calibrate-from"
+
+
+def run_command(
+    words: Sequence[str], reporter: Reporter, commands: Mapping[str, Command] = COMMANDS
+) -> int:
+    """Do what a command line says, of which the words follow ``hotlever``; return the exit status.
+
+    Raises
+    ------
+    InputError
+        If a word is no command, option or value.
+    HotleverError
+        As the command does.
+    """
+
+    def call(command: Command, values: dict[str, Any]) -> int:
+        check_files(command, values)
+        return command(reporter, **values) or 0
+
+    return _parsed(words, call, reporter, commands)
+
+
+def arguments_of(words: Sequence[str]) -> dict[str, Any]:
+    """Return what the command of a command line is called with, those left out too, by name.
+
+    Raises
+    ------
+    InputError
+        If a word is no command, option or value.
+    """
+    arguments = dict[str, Any]()
+
+    def keep(_: Command, values: dict[str, Any]) -> int:
+        arguments.update(values)
+        return 0
+
+    _parsed(words, keep, None, COMMANDS)
+    return arguments
+
+
+def written_by(command: Command) -> dict[str, Written]:
+    """Return what a command writes, by the parameters that name it."""
+    return {
+        name: mark
+        for name, parameter in inspect.signature(command, eval_str=True).parameters.items()
+        if get_origin(parameter.annotation) is Annotated
+        for mark in get_args(parameter.annotation)
+        if isinstance(mark, Written)
+    }
+
+
+def check_files(command: Command, values: Mapping[str, Any]) -> None:
+    """Check the files and folders that a command writes, none of which it reads.
+
+    Raises
+    ------
+    InputError
+        As `hotlever.files.check_outputs`.
+    """
+    written = written_by(command)
+    told = [value for name, value in values.items() if name not in written]
+    each = (value if isinstance(value, list) else [value] for value in told)
+    # whatever else is the name of a file may be read
+    read = [text for texts in each for text in texts if isinstance(text, str | Path)]
+    outputs = [
+        (values[name], mark.types if mark.types_of is None else mark.types_of(values))
+        for name, mark in written.items()
+    ]
+    check_outputs(outputs, read)
+
+
+# --- the command line ---------------------------------------------------------------------------
+
+Call = Callable[[Command, dict[str, Any]], int]
+
+
+def _parsed(
+    words: Sequence[str], call: Call, reporter: Reporter | None, commands: Mapping[str, Command]
+) -> int:
+    """Parse words and call the command that they name; return the exit status."""
+    try:
+        line = command_line(call, commands, words[0], reporter)
+        with line.make_context("hotlever", list(words)) as context:
+            line.invoke(context)
+    except typer.Exit as ended:
+        return ended.exit_code
+    except typer.TyperException as error:
+        raise InputError(error.format_message()) from None
+    return 0
+
+
+def command_line(
+    call: Call,
+    commands: Mapping[str, Command] = COMMANDS,
+    word: str = "",
+    reporter: Reporter | None = None,
+) -> Any:
+    """Return the command line with the commands that begin with a word, or all if none does.
+
+    Parameters
+    ----------
+    call : callable
+        Takes a command and the values of its parameters by name; returns the exit status.
+    commands : mapping of str to callable
+    word : str
+    reporter : Reporter, optional
+        Given the version, if that is asked for.
+    """
+
+    def root(
+        version: Annotated[
+            bool, typer.Option("--version", help="Print the version and exit.", is_eager=True)
+        ] = False,
+    ) -> None:
+        if version and reporter is not None:
+            reporter.give(f"{__version__}\n")
+            raise typer.Exit
+
+    app = typer.Typer(
+        name="hotlever",
+        cls=_Commands,
+        help="How hot is the tip of a Joule-heated silicon cantilever probe, and how sure are we?",
+        invoke_without_command=True,
+        add_completion=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+    )
+    app.callback()(root)
+    groups = {"": app}
+    chosen = {name: command for name, command in commands.items() if name.split()[0] == word}
+    for name, command in (chosen or commands).items():
+        group, _, last = name.rpartition(" ")
+        if group not in groups:
+            groups[group] = typer.Typer(cls=_Commands, help=_GROUPS[group], rich_markup_mode=None)
+            app.add_typer(groups[group], name=group)
+        groups[group].command(last, cls=_OneCommand)(_called(command, call))
+    return typer.main.get_command(app)
+
+
+def _called(command: Command, call: Call) -> Callable[..., None]:
+    """Return what typer calls in place of a command: it is not told of the reporter."""
+
+    @wraps(command)
+    def run(**values: Any) -> None:
+        raise typer.Exit(call(command, values))
+
+    signature = inspect.signature(command, eval_str=True)
+    _, *told = signature.parameters.values()
+    run.__signature__ = signature.replace(parameters=told)  # type: ignore[attr-defined]
+    return run
+
+
+def _check_gone(words: str) -> None:
+    """Refuse a command, or an option after its command, that is gone."""
+    if words in _GONE:
+        raise InputError(f"{words}: gone since version 3.0; {_GONE[words]}")
+
+
+class _Commands(typer.core.TyperGroup):
+    """A command group that answers a typo with the nearest command."""
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command, or raise with the nearest name that exists."""
+        _check_gone(cmd_name)
+        command = super().get_command(ctx, cmd_name)
+        if command is None:
+            raise unknown_name("command", cmd_name, self.list_commands(ctx))
+        return command
+
+
+class _OneCommand(typer.core.TyperCommand):
+    """A command none of whose options may be given twice, which would lose a value.
+
+    Its ``--calibrate-from``, if it has one, takes all paths up to the next option. Where that would
+    leave no spectra to measure, it takes the first path only, so that ``hotlever raman
+    --calibrate-from hot-plate/ tip/`` means what it says.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat the option before each of its paths, then parse as usual."""
+        for word in args:
+            _check_gone(f"{self.name} {word.partition('=')[0]}")
+        options = [param for param in self.params if param.param_type_name == "option"]
+        valued = [option for option in options if not getattr(option, "is_flag", False)]
+        names = {name for option in valued for name in option.opts}
+        if _SPREAD in names:
+            args = spread_option(args, _SPREAD, names)
+        _, _, param_order = self.make_parser(ctx).parse_args(list(args))
+        for option in param_order:
+            if param_order.count(option) > 1 and not option.multiple:
+                raise InputError(f"{option.opts[-1]}: given twice, expected once")
+        return super().parse_args(ctx, args)
+
+
+def spread_option(args: list[str], option: str, takes_value: set[str]) -> list[str]:
+    """Turn ``--option a b`` into ``--option a --option b``.
+
+    Examples
+    --------
+    >>> spread_option(["x", "--from", "a", "b", "-o", "c"], "--from", {"--from", "-o"})
+    ['x', '--from', 'a', '--from', 'b', '-o', 'c']
+    >>> spread_option(["--from", "a", "b"], "--from", {"--from"})
+    ['--from', 'a', 'b']
+    """
+    # each option with its values, and each other word by itself
+    parts: list[list[str]] = []
+    words = deque(args)
+    while words:
+        word = words.popleft()
+        name, equals, value = word.partition("=")
+        part = [word]
+        if name == option:
+            part = [option, value] if equals else [option]
+            while words and not words[0].startswith("-"):
+                part.append(words.popleft())
+        elif word.startswith("-") and word in takes_value and words:
+            part.append(words.popleft())
+        parts.append(part)
+    groups = [part for part in parts if part[0] == option and len(part) > 1]
+    if groups and all(part[0].startswith("-") for part in parts):
+        # nothing is left to measure: what follows the first path of the last group
+        last = groups[-1]
+        parts.insert(parts.index(last) + 1, last[2:])
+        del last[2:]
+    out: list[str] = []
+    for part in parts:
+        if part in groups:
+            out += [word for value in part[1:] for word in (option, value)]
+        else:
+            out += part
+    return out

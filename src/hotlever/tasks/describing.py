@@ -3,49 +3,63 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from typer import Argument, Option
 
 from hotlever.errors import unknown_name
 from hotlever.files import write_text
-from hotlever.materials import Kind
-from hotlever.materials.catalogue import curves, listing
-from hotlever.probe import Probe, ProbeMesh
-from hotlever.probe.drawing.outlines import DrawingError
-from hotlever.probe.importing import import_drawing
-from hotlever.probe.layout import Layout, Taper
-from hotlever.probe.shapes import Parametric
-from hotlever.tasks.planning_requests import (
-    NEW_PROBES,
-    ImportRequest,
-    MaterialsRequest,
-    NewRequest,
-    ShowRequest,
-)
+from hotlever.tasks.arguments import Plot, ProbeFile, Written
+from hotlever.tasks.common_steps import draw, read_probe
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.shared import draw, read_probe
+
+if TYPE_CHECKING:
+    from hotlever.probe import Probe, ProbeMesh
+    from hotlever.probe.layout import Layout
+
+#: Shapes of new probe files.
+_NEW_PROBES = ("three-leg", "u-shape")
 
 
-def new_probe(reporter: Reporter, request: NewRequest) -> None:
-    """Write a parametric probe as a commented file."""
-    if request.shape not in NEW_PROBES:
-        raise unknown_name("shape", request.shape, NEW_PROBES)
-    request.check_outputs()
-    probe: Probe = getattr(Probe, NEW_PROBES[request.shape])()
-    if request.output is None:
+def new_probe(
+    reporter: Reporter,
+    *,
+    output: Annotated[
+        Path | None,
+        Option("-o", "--output", help="File; standard output if left out."),
+        Written((".toml",)),
+    ] = None,
+    shape: Annotated[str, Option(help=f"One of: {', '.join(_NEW_PROBES)}.")] = "three-leg",
+) -> None:
+    """Write the reference probe as a commented file."""
+    from hotlever.probe import Probe
+
+    if shape not in _NEW_PROBES:
+        raise unknown_name("shape", shape, _NEW_PROBES)
+    probe = Probe.u_shape() if shape == "u-shape" else Probe.reference()
+    if output is None:
         reporter.give(probe.to_toml())
     else:
-        probe.to_file(request.output)
+        probe.to_file(output)
 
 
-def show_probe(reporter: Reporter, request: ShowRequest) -> None:
-    """Draw and describe a probe; outlines that make none are drawn with what is wrong of them."""
-    request.check_outputs()
+def show_probe(
+    reporter: Reporter,
+    probe: ProbeFile = None,
+    *,
+    plot: Plot = None,
+    mesh: Annotated[bool, Option("--mesh", help="Draw the triangles of the mesh too.")] = False,
+) -> None:
+    """Draw and describe a probe."""
+    from hotlever.probe.drawing.outlines import DrawingError
+
     try:
-        probe = read_probe(reporter, request.probe)
+        shown = read_probe(reporter, probe)
     except DrawingError as error:
+        # outlines that make no probe are drawn with what is wrong of them
         fault = error
         draw(
-            request.plot,
+            plot,
             lambda figures: figures.outlines_drawing(
                 fault.outlines, fault=str(fault), fault_at=fault.place
             ),
@@ -53,15 +67,17 @@ def show_probe(reporter: Reporter, request: ShowRequest) -> None:
         raise
     from hotlever.lever.discretisation import chosen_space  # brings all of the lever along
 
-    name = "reference probe" if request.probe is None else request.probe.name
-    layout, triangles = probe.layout(), chosen_space(probe).mesh
-    drawn = triangles if request.mesh else None
-    draw(request.plot, lambda figures: figures.probe_drawing(layout, name, mesh=drawn))
-    reporter.give(_probe_text(probe, triangles, name))
+    name = "reference probe" if probe is None else probe.name
+    layout, triangles = shown.layout(), chosen_space(shown).mesh
+    drawn = triangles if mesh else None
+    draw(plot, lambda figures: figures.probe_drawing(layout, name, mesh=drawn))
+    reporter.give(_probe_text(shown, triangles, name))
 
 
 def _probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
     """Return a probe in words, with the number of triangles of its mesh; `name` heads them."""
+    from hotlever.probe.shapes import Parametric
+
     circuit, silicon, layout = probe.circuit, probe.heater_silicon, mesh.layout
     x, y = (coordinate + 0.0 for coordinate in layout.tip)  # no -0
     values = {key: getattr(probe.shape, key) for key in probe.shape.description()}
@@ -101,6 +117,8 @@ def _probe_text(probe: Probe, mesh: ProbeMesh, name: str) -> str:
 
 def _sections(probe: Probe) -> list[str]:
     """Return what else the probe file says, a line for each section; of surroundings their own."""
+    from hotlever.materials import Kind
+
     parts = {name: part for name, part in probe.parts.items() if name != "circuit"}
     lines = []
     for name, part in {**parts, **probe.materials}.items():
@@ -120,6 +138,8 @@ def _sections(probe: Probe) -> list[str]:
 
 def _regions(layout: Layout) -> list[str]:
     """Return what the regions of a drawing are."""
+    from hotlever.probe.layout import Taper
+
     plain = {"high-doped", "low-doped"}
     lines = []
     for region in layout.regions:
@@ -139,18 +159,38 @@ def _regions(layout: Layout) -> list[str]:
     return lines
 
 
-def propose_probe(reporter: Reporter, request: ImportRequest) -> None:
+def propose_probe(
+    reporter: Reporter,
+    drawing: Annotated[Path, Argument(metavar="DRAWING", help="GDSII, OASIS or DXF file.")],
+    *,
+    plot: Plot = None,
+    output: Annotated[
+        Path | None,
+        Option("-o", "--output", help="Probe file to write; standard output if left out."),
+        Written((".toml",)),
+    ] = None,
+    cell: Annotated[str | None, Option(help="Of GDSII or OASIS; the top cell if left out.")] = None,
+    unit: Annotated[
+        str | None,
+        Option(help="Of the drawing's numbers, as mm; what the file says if left out."),
+    ] = None,
+) -> None:
     """Say what a drawing holds, and propose a probe file for it."""
-    drawing, output, unit = request.drawing, request.output, request.known_unit
-    request.check_outputs()
+    from hotlever.probe.drawing.outlines import DrawingError
+    from hotlever.probe.drawing.sheet import UNITS
+    from hotlever.probe.importing import import_drawing
+
+    known_unit = None if unit is None else unit.replace("µ", "u").replace("μ", "u")
+    if known_unit is not None and known_unit not in UNITS:
+        raise unknown_name("unit", known_unit, UNITS, "--unit")
     folder = Path() if output is None else output.parent
-    proposed = import_drawing(drawing, request.cell, folder, unit)
+    proposed = import_drawing(drawing, cell, folder, known_unit)
     fault = proposed.fault
     fault_at = fault.place if isinstance(fault, DrawingError) else None
     if output is not None:
         write_text(output, proposed.text)
     draw(
-        request.plot,
+        plot,
         lambda figures: figures.outlines_drawing(
             proposed.outlines,
             drawing.name,
@@ -165,12 +205,24 @@ def propose_probe(reporter: Reporter, request: ImportRequest) -> None:
         reporter.note(f"the probe file needs an edit before it can be solved: {fault}")
 
 
-def list_materials(reporter: Reporter, request: MaterialsRequest) -> None:
-    """List kinds of material, or those of a probe, and draw their laws."""
-    request.check_outputs()
+def list_materials(
+    reporter: Reporter,
+    probe: Annotated[
+        Path | None,
+        Argument(
+            metavar="[PROBE.toml]",
+            help="Probe file whose materials are listed; all kinds and presets if left out.",
+        ),
+    ] = None,
+    *,
+    plot: Plot = None,
+) -> None:
+    """List kinds of material, or those of a probe: parameters, units, bounds, laws, sources."""
+    from hotlever.materials.catalogue import curves, listing
+
     chosen: tuple[Any, ...] = ()
-    if request.probe is not None:
-        probe = read_probe(reporter, request.probe)
-        chosen = probe.made_of, probe.layout().thickness_um
-    draw(request.plot, lambda figures: figures.material_curves(curves(*chosen)))
+    if probe is not None:
+        own = read_probe(reporter, probe)
+        chosen = own.made_of, own.layout().thickness_um
+    draw(plot, lambda figures: figures.material_curves(curves(*chosen)))
     reporter.give("\n".join([*listing(*chosen[:1]), ""]))

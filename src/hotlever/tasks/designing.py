@@ -2,49 +2,113 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
-from hotlever.datasets import write_dataset
+from typer import Option
+
 from hotlever.errors import InputError
 from hotlever.files import write_text
-from hotlever.probe.shapes import DRAWING
-from hotlever.studies import design as study
-from hotlever.tasks.planning_requests import DesignRequest
+from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
+from hotlever.tasks.arguments import Physics, Plot, ProbeFile, Written, at_most_one, refuse
+from hotlever.tasks.common_steps import draw, read_probe
+from hotlever.tasks.parsing import check_number, parse_bounds, parse_setting, parse_varied
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.shared import draw, read_probe
-from hotlever.tasks.texts import check_number, parse_bounds, parse_setting, parse_varied
 
+if TYPE_CHECKING:
+    from hotlever.probe import Probe
+
+_POWER_MW, _ANNEALING_MIN, _WORKING_POINT = 2.0, ANNEALING_S / 60.0, "700K"
 #: Numbers that are varied at once of which there are figures: a curve or a map.
 _DRAWN = 2
 
 
-def vary_design(reporter: Reporter, request: DesignRequest) -> None:
-    """Find how knee, tip temperature and loss to air depend on a probe's design."""
-    request.need_no_others()
-    if request.asks_for_best:
-        optimise_design(reporter, request)
+def vary_design(
+    reporter: Reporter,
+    probe: ProbeFile = None,
+    *,
+    physics: Physics = None,
+    vary: Annotated[
+        list[str] | None,
+        Option(
+            metavar="NAME=START:STOP:COUNT",
+            help="Sweep a number of the probe file, annealing_K or annealing_min; repeated: each "
+            "with each, as a map. A table of sensitivities if left out.",
+        ),
+    ] = None,
+    power: Annotated[
+        float, Option(help="Power (mW) in vacuum at which the tip temperature is given.")
+    ] = _POWER_MW,
+    annealing_K: Annotated[
+        float, Option("--annealing-K", help="Annealing (K) that the probe's delta is of.")
+    ] = ANNEALING_K,
+    annealing_min: Annotated[
+        float, Option(help="Annealing (min) that the delta is of.")
+    ] = _ANNEALING_MIN,
+    air: Annotated[bool, Option(help="Solve in air too, for k.")] = True,
+    minimise: Annotated[
+        str | None,
+        Option(
+            metavar="QUANTITY",
+            help="Find the design whose quantity is least, such as time_constant_us; it writes a "
+            "probe file (-o FILE.toml).",
+        ),
+    ] = None,
+    maximise: Annotated[str | None, Option(metavar="QUANTITY", help="Or greatest.")] = None,
+    within: Annotated[
+        list[str] | None,
+        Option(
+            metavar="NAME=LOW:HIGH",
+            help="Bounds of a number that may change, or of a quantity (one may be left out).",
+        ),
+    ] = None,
+    at: Annotated[
+        str,
+        Option(metavar="POINT", help="Working point: a tip temperature, or as 8V or 2mW."),
+    ] = _WORKING_POINT,
+    output: Annotated[
+        Path | None,
+        Option("-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."),
+        Written(
+            types_of=lambda values: (
+                (".toml",) if values["minimise"] or values["maximise"] else (".csv", ".nc")
+            )
+        ),
+    ] = None,
+    plot: Plot = None,
+) -> None:
+    """Show how knee, tip temperature and loss to air depend on a probe's design."""
+    from hotlever.datasets import write_dataset
+    from hotlever.probe.shapes import DRAWING
+    from hotlever.studies import design as study
+
+    beside: dict[str, Any] = {
+        "vary": vary,
+        "power": power != _POWER_MW,
+        "annealing_K": annealing_K != ANNEALING_K,
+        "annealing_min": annealing_min != _ANNEALING_MIN,
+        "no_air": not air,
+    }
+    if minimise is not None or maximise is not None:
+        at_most_one(minimise=minimise, maximise=maximise)
+        refuse("does not go with --minimise or --maximise", **beside)
+        changed = read_probe(reporter, probe, physics=physics)
+        _optimise(reporter, changed, minimise, maximise, within, at, output, plot)
         return
-    output = request.output
-    request.check_outputs()
-    options: Any = {"power_mW": request.power, "air": request.air}
-    check_number("--power", request.power, 1e-3, 1000)
-    check_number("--annealing-K", request.annealing_K, 700, 1700)
-    check_number("--annealing-min", request.annealing_min, 1e-3, 1e5)
-    varied = parse_varied(request.vary or [])
+    refuse("goes with --minimise or --maximise", within=within, at=at != _WORKING_POINT)
+    check_number("--power", power, 1e-3, 1000)
+    check_number("--annealing-K", annealing_K, 700, 1700)
+    check_number("--annealing-min", annealing_min, 1e-3, 1e5)
+    varied = parse_varied(vary or [])
     if not varied:
-        request.refuse("plot", "output", why="needs a sweep, --vary NAME=START:STOP:COUNT")
+        refuse("needs a sweep, --vary NAME=START:STOP:COUNT", plot=plot, output=output)
     elif len(varied) > _DRAWN:
-        why = f"found {len(varied)} of --vary, expected at most {_DRAWN}"
-        request.refuse("plot", why=why)
-    start = study.Design(
-        request.with_physics(read_probe(reporter, request.probe)),
-        request.annealing_K,
-        request.annealing_min,
-    )
+        refuse(f"found {len(varied)} of --vary, expected at most {_DRAWN}", plot=plot)
+    start = study.Design(read_probe(reporter, probe, physics=physics), annealing_K, annealing_min)
     if not varied:
         with reporter.progress("design") as update:
-            sensitivities = study.sensitivities(start, progress=update, **options)
-        reporter.note(study.mesh_note(start.probe, request.power))
+            sensitivities = study.sensitivities(start, power_mW=power, air=air, progress=update)
+        reporter.note(study.mesh_note(start.probe, power))
         reporter.give(study.sensitivity_text(sensitivities) + "\n")
         if start.probe.shape.shape == DRAWING:
             names = ", ".join(start.numbers)
@@ -53,41 +117,48 @@ def vary_design(reporter: Reporter, request: DesignRequest) -> None:
             )
         return
     with reporter.progress("design") as update:
-        data = study.vary(start, varied, progress=update, **options)
-    reporter.note(study.mesh_note(start.probe, request.power), *study.design_notes(data))
+        data = study.vary(start, varied, power_mW=power, air=air, progress=update)
+    reporter.note(study.mesh_note(start.probe, power), *study.design_notes(data))
     if output is not None and output.suffix.lower() == ".nc":
         write_dataset(data, output, ())
     elif output is not None:
         write_text(output, study.design_csv(data))
-    draw(request.plot, lambda figures: figures.design_study(data))
+    draw(plot, lambda figures: figures.design_study(data))
     if output is None:
         reporter.give(study.design_csv(data))
 
 
-def optimise_design(reporter: Reporter, request: DesignRequest) -> None:
+def _optimise(
+    reporter: Reporter,
+    probe: Probe,
+    minimise: str | None,
+    maximise: str | None,
+    within: list[str] | None,
+    at: str,
+    output: Path | None,
+    plot: Path | None,
+) -> None:
     """Find the design within bounds whose quantity is least or greatest."""
     from hotlever.studies.optimisation import optimise, optimum_text
     from hotlever.studies.working_point import WorkingPoint
 
-    request.check_outputs()
-    probe = request.with_physics(read_probe(reporter, request.probe))
-    point = WorkingPoint(*parse_setting(request.at, tip=True))
-    quantity, bounds = request.minimise or request.maximise or "", parse_bounds(request.within)
+    point = WorkingPoint(*parse_setting(at, tip=True))
+    quantity, bounds = minimise or maximise or "", parse_bounds(within)
     for option, name in (
-        ("--minimise" if request.minimise else "--maximise", quantity),
+        ("--minimise" if minimise else "--maximise", quantity),
         *(("--within", name) for name in bounds),
     ):
         if name == point.column:
             raise InputError(
-                f"{option} {name}: it is what --at {request.at} holds, expected another quantity, "
-                "or another --at"
+                f"{option} {name}: it is what --at {at} holds, expected another quantity, or "
+                "another --at"
             )
     with reporter.progress("design") as update:
-        greatest = request.maximise is not None
+        greatest = maximise is not None
         optimum = optimise(probe, quantity, point, bounds, greatest=greatest, progress=update)
     if optimum.reason:
         reporter.note(f"this may not be the optimum: {optimum.reason}")
-    if request.output is not None:
-        optimum.best.probe.to_file(request.output)
-    draw(request.plot, lambda figures: figures.design_optimum(optimum))
+    if output is not None:
+        optimum.best.probe.to_file(output)
+    draw(plot, lambda figures: figures.design_optimum(optimum))
     reporter.give(optimum_text(optimum) + "\n")

@@ -2,118 +2,232 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimate import (
-    Calibration,
-    Fit,
-    FitOptions,
-    fit,
-    plan_next,
-    read_calibration,
-    read_fit,
-)
-from hotlever.estimate.batch import Batch, fit_many
-from hotlever.estimate.calibration_summary import calibration_text
-from hotlever.estimate.experiment import Prediction
-from hotlever.estimate.fit_summary import (
-    compare_levers,
-    fit_text,
-    lever_rows,
-    levers_csv,
-    statements,
-    table_text,
-)
-from hotlever.estimate.levers import (
-    Setting,
-    calibrate_many,
-    calibrations_csv,
-    calibrations_text,
-    compare_calibrations,
-)
-from hotlever.estimate.outcome import Result
-from hotlever.estimate.power_law import read_power_law
-from hotlever.estimate.procedure import calibrate
+from typer import Argument, Option
+
+from hotlever.errors import ComputationError, HotleverError, InputError, quoted, unknown_name
 from hotlever.files import FOLDER, TABLE, check_outputs, write_text
-from hotlever.measurement import Measurement, read_measurement_of
-from hotlever.probe import Probe
-from hotlever.tasks.measured_requests import CalibrateRequest, FitRequest, LeversRequest
-from hotlever.tasks.planning_requests import NextRequest
+from hotlever.tasks.arguments import (
+    Column,
+    Count,
+    Data,
+    Laws,
+    MeasuredMedium,
+    MeasuredProbe,
+    Period,
+    Physics,
+    Plot,
+    Priors,
+    Processes,
+    Pulse,
+    Ramp,
+    Report,
+    Results,
+    Scheduler,
+    Sine,
+    Step,
+    WaveformFile,
+    Written,
+    at_most_one,
+    check_medium,
+    read_drive,
+    refuse,
+)
+from hotlever.tasks.common_steps import draw, read_probe
+from hotlever.tasks.parsing import (
+    MOST_PROPOSALS,
+    USUAL,
+    check_number,
+    parse_bias,
+    parse_costs,
+    parse_kinds,
+    parse_noise,
+    parse_number,
+    parse_pairs,
+    parse_priors,
+    parse_setting,
+    parse_temperature,
+    parse_timing,
+)
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.shared import draw, read_probe
-from hotlever.tasks.texts import parse_priors, parse_setting, parse_timing
+from hotlever.units import setting
 
 if TYPE_CHECKING:
+    from hotlever.estimate import Calibration, Fit
+    from hotlever.estimate.batch import Batch
+    from hotlever.estimate.experiment import Prediction
+    from hotlever.estimate.levers import Setting
+    from hotlever.estimate.outcome import Result
     from hotlever.estimate.uncertainty import Uncertainty
+    from hotlever.measurement import Measurement
+    from hotlever.probe import Probe
     from hotlever.report.page import Page
 
 #: Points of a curve that is shown while a fit goes on.
 _DRAWN = 200
 #: The tables of many levers, in the folders of their fits or calibrations.
 LEVERS_TABLE, CALIBRATIONS_TABLE = "levers.csv", "calibrations.csv"
+#: Samples of a posterior, where nothing is said: of a fit, and of a calibration.
+_FIT_SAMPLES, _CALIBRATION_SAMPLES = 10_000, 4_000
+#: Proposals, unless kinds of measurement are limited.
+_PROPOSALS = 5
+#: What the rows of a table for an instrument are even in, where nothing is said.
+_EVEN_IN = "temperature"
 
 
-def fit_files(reporter: Reporter, request: FitRequest) -> int:
-    """Fit one lever or many; return the exit status.
+def fit_files(
+    reporter: Reporter,
+    data: Data,
+    *,
+    probe: MeasuredProbe = None,
+    medium: MeasuredMedium = None,
+    physics: Physics = None,
+    column: Column = None,
+    prior: Priors = None,
+    laws: Laws = None,
+    step: Step = None,
+    pulse: Pulse = None,
+    period: Period = None,
+    count: Count = None,
+    ramp: Ramp = None,
+    sine: Sine = None,
+    waveform: WaveformFile = None,
+    observables: Annotated[
+        str | None,
+        Option(help="Some of current,reader,tip,bridge; all that the file has if left out."),
+    ] = None,
+    fix: Annotated[
+        list[str] | None, Option(metavar="NAME[=VALUE]", help="Hold a parameter.")
+    ] = None,
+    free: Annotated[
+        str | None,
+        Option(
+            metavar="NAME[,...]",
+            help="Vary more than is usual: any parameter of a material, as film.lorenz_ratio, or "
+            "of the probe.",
+        ),
+    ] = None,
+    robust: Annotated[
+        bool, Option("--robust", help="Lessen the weight of points far off the others.")
+    ] = False,
+    weights: Annotated[
+        str,
+        Option(help="maximum: of each observable, as in the paper; or errors, as measured."),
+    ] = "maximum",
+    posterior: Annotated[
+        bool,
+        Option("--posterior", help="Sample the posterior; predict the tip with its band."),
+    ] = False,
+    samples: Annotated[int, Option(metavar="N", help="Of the posterior, at least.")] = _FIT_SAMPLES,
+    profiles: Annotated[
+        bool, Option("--profiles", help="Profile the likelihood of each parameter.")
+    ] = False,
+    output: Results = None,
+    report: Report = None,
+    processes: Processes = None,
+    scheduler: Scheduler = None,
+) -> int:
+    """Find the material parameters that make the model match a measurement.
 
-    Raises
-    ------
-    ComputationError
-        If no lever shows the data of a single one; what the search ended at is written.
+    Of what was measured in time, a file with a column as 'time (us)', the heat capacity, and what
+    else is free; the wave form is the column V_b, or what is told.
+
+    With several data files: of each lever, in parallel, and how the levers scatter. The same
+    command again goes on where it was stopped.
     """
-    request.check()
-    probe = request.with_physics(read_probe(reporter, request.probe))
-    options = request.options(probe)
-    request.check_outputs()
-    if not request.several:
-        _fit_one(reporter, request, probe, options)
-        return 0
-    make = partial(fit_many, probe=probe, options=options)
-    return _estimate_several(reporter, request, "fits", LEVERS_TABLE, make, _of_fits)
+    from hotlever.estimate import FitOptions, fit
+    from hotlever.estimate.batch import fit_many
+    from hotlever.estimate.fit_summary import fit_text
+    from hotlever.measurement import parse_columns, read_measurement_of
+    from hotlever.probe.priors import is_of_laws
 
-
-def _fit_one(reporter: Reporter, request: FitRequest, probe: Probe, options: FitOptions) -> None:
-    (data,), waveform = request.data, request.read_waveform()
-    measurement = read_measurement_of(probe, data, request.columns, waveform)
-    analyses = [name for name in ("--posterior", "--profiles") if getattr(request, name[2:])]
-    if analyses:
-        measurement.need_rest(analyses[0])
-    options.of(probe, in_time=measurement.time_us is not None)  # raises before anything is said
+    several = _check_levers(data, processes, scheduler)
+    check_number("--samples", samples, 1, 1_000_000)
+    if not posterior:
+        refuse("goes with --posterior", samples=samples != _FIT_SAMPLES)
+    if several:
+        why = "expected a single data file"
+        refuse(why, posterior=posterior, profiles=profiles, step=step, pulse=pulse)
+        refuse(why, period=period, count=count, ramp=ramp, sine=sine, waveform=waveform)
+    like = read_probe(reporter, probe, physics=physics)
+    priors, stated = parse_priors(_beforehand(prior, laws), like), like.stated_priors
+    if laws is not None:
+        stated = {name: text for name, text in stated.items() if not is_of_laws(name)}
+    usual = USUAL in (prior or [])
+    choices: dict[str, Any] = {"robust": robust, "weights": weights, "medium": medium}
+    options = FitOptions(
+        observables=None if observables is None else observables.split(","),
+        fixed={
+            name: parse_number(text, f"--fix {name}") if text else None
+            for name, text in parse_pairs("--fix", fix, bare=True).items()
+        },
+        priors=stated if priors is None else {**stated, **priors} if priors or usual else {},
+        usual_priors=usual,
+        free=() if free is None else tuple(map(str.strip, free.split(","))),
+        **choices,
+    )
+    if several:
+        levers = _Levers(data, column, output, report, processes, scheduler, "fits", LEVERS_TABLE)
+        make = partial(fit_many, probe=like, options=options)
+        return _estimate_several(reporter, levers, make, _of_fits)
+    (path,) = data
+    drive = read_drive(step, pulse, period, count, ramp, sine, waveform)
+    measurement = read_measurement_of(like, path, parse_columns(column or []), drive)
+    options.of(like, in_time=measurement.time_us is not None)  # raises before anything is said
+    if posterior or profiles:
+        measurement.need_rest("--posterior" if posterior else "--profiles")
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes, *measurement.unused)
     with reporter.progress("fit") as update:
         seen = partial(_show_curve, reporter)
-        result = fit(measurement, probe, options, progress=update, seen=seen)
+        result = fit(measurement, like, options, progress=update, seen=seen)
     reporter.note(*result.notes)
     texts = [fit_text(result)]
     uncertainty: Uncertainty | None = None
     failure: HotleverError | KeyboardInterrupt | None = None
-    if analyses and not result.describes_data:
+    if (posterior or profiles) and not result.describes_data:
         reporter.note("no posterior and no profiles of a lever that does not show these data")
-    elif analyses:
+    elif posterior or profiles:
         try:
-            uncertainty = _examine(reporter, request, result)
+            uncertainty = _examine(
+                reporter, result, samples if posterior else None, profiles, processes
+            )
             reporter.note(*uncertainty.statements())
             texts.append(uncertainty.text())
         except (HotleverError, KeyboardInterrupt) as error:
             # the fit is there; what ends this is said when it is written
             failure = error
-    if request.output is not None:
-        write_text(request.output, (uncertainty or result).to_json())
-    if request.report is not None:
+    if output is not None:
+        write_text(output, (uncertainty or result).to_json())
+    if report is not None:
         from hotlever.report.fit_pages import fit_page
 
-        texts.append(f"report: {fit_page(result, uncertainty).write(request.report)}")
+        texts.append(f"report: {fit_page(result, uncertainty).write(report)}")
     reporter.give("\n".join([*texts, ""]))
     if failure is not None:
         raise failure
     if not result.describes_data:
-        raise ComputationError(f"{data}: {result.doubt}")
+        raise ComputationError(f"{path}: {result.doubt}")
+    return 0
+
+
+def _check_levers(data: Sequence[Path], processes: int | None, scheduler: str | None) -> bool:
+    """Refuse ways to work on levers that do not go together; return whether there are several."""
+    check_number("--processes", processes, 1, 256)
+    at_most_one(processes=processes, scheduler=scheduler)
+    if len(data) == 1:
+        refuse("expected several data files", scheduler=scheduler)
+    return len(data) > 1
+
+
+def _beforehand(prior: list[str] | None, laws: str | None) -> list[str]:
+    """Return what is known beforehand, as ``--prior`` has it."""
+    return [*(prior or []), *([] if laws is None else [f"laws={laws}"])]
 
 
 def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
@@ -124,73 +238,175 @@ def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
     reporter.show("curve", {name: values[some].tolist() for name, values in columns.items()})
 
 
-def _examine(reporter: Reporter, request: FitRequest, result: Fit) -> Uncertainty:
+def _examine(
+    reporter: Reporter,
+    result: Fit,
+    samples: int | None,
+    profiles: bool,
+    processes: int | None,
+) -> Uncertainty:
     """Sample the posterior of a fit, and profile its parameters, as is asked."""
     from hotlever.estimate.uncertainty import examine  # brings scipy's statistics along
 
     with reporter.progress_bars("profiles", "posterior", "band") as (profiling, sampling, banding):
         return examine(
             result,
-            samples=request.samples if request.posterior else None,
-            profiles=request.profiles,
-            processes=request.processes,
+            samples=samples,
+            profiles=profiles,
+            processes=processes,
             profiling=profiling,
             sampling=sampling,
             banding=banding,
         )
 
 
-def calibrate_files(reporter: Reporter, request: CalibrateRequest) -> int:
-    """Calibrate one lever or many; return the exit status.
+def calibrate_files(
+    reporter: Reporter,
+    data: Data,
+    *,
+    fit: Annotated[Path | None, Option(help="A fit of this lever (hotlever fit -o).")] = None,
+    probe: MeasuredProbe = None,
+    power_law: Annotated[
+        Path | None, Option(help="Power law in vacuum (JSON), or a calibration file.")
+    ] = None,
+    medium: MeasuredMedium = None,
+    physics: Physics = None,
+    column: Column = None,
+    prior: Priors = None,
+    laws: Laws = None,
+    pulse: Annotated[
+        str | None,
+        Option(metavar="TIME[,PERIOD]", help="Calibrate a pulse too, such as 5us or 5us,100us."),
+    ] = None,
+    posterior: Annotated[
+        bool, Option("--posterior", help="Take the limits from samples of the posterior.")
+    ] = False,
+    samples: Annotated[
+        int, Option(metavar="N", min=1, help="Of the posterior, at least.")
+    ] = _CALIBRATION_SAMPLES,
+    at: Annotated[
+        str | None,
+        Option(
+            metavar="BIAS|POWER",
+            help="Bias of the uncertainty budget, as 8V; the hottest tip if left out. With several "
+            "levers where they are compared, as 8V or 2mW; the highest bias that all of them were "
+            "measured at if left out.",
+        ),
+    ] = None,
+    budget_of: Annotated[
+        str,
+        Option(help="What the uncertainty budget is of: tip, or apex of a tip in contact."),
+    ] = "tip",
+    table: Annotated[
+        Path | None,
+        Option(
+            help="Write the table for an instrument, or for its pulses, to this CSV file; with "
+            "several data files each has one beside its calibration."
+        ),
+        Written((".csv",)),
+    ] = None,
+    table_by: Annotated[
+        str, Option(help="What the rows are even in: temperature, power or bias.")
+    ] = _EVEN_IN,
+    table_step: Annotated[
+        str | None,
+        Option(
+            metavar="STEP",
+            help="Between the rows, as 10K, 0.05mW or 0.1V; left out: for 50 rows or more.",
+        ),
+    ] = None,
+    output: Results = None,
+    report: Report = None,
+    plot: Plot = None,
+    processes: Processes = None,
+    scheduler: Scheduler = None,
+) -> int:
+    """Find the tip temperature of a lever from its I-V curve, with its error.
 
-    Raises
-    ------
-    ComputationError
-        If no lever shows the data of a single one; what the search ended at is written.
+    With several data files: of each lever, in parallel, and where the levers differ. The same
+    command again goes on where it was stopped.
     """
-    request.check()
-    law = None if request.power_law is None else read_power_law(request.power_law)
-    of_lever = None if request.fit is None else read_fit(request.fit)
-    if of_lever is None:
-        like = request.with_physics(read_probe(reporter, request.probe))
-    else:
-        like = of_lever.probe
+    from hotlever.estimate import read_fit
+    from hotlever.estimate.calibration_summary import calibration_text
+    from hotlever.estimate.levers import Setting, calibrate_many
+    from hotlever.estimate.options import UNKNOWN_MEDIUM
+    from hotlever.estimate.power_law import read_power_law
+    from hotlever.estimate.procedure import calibrate
+    from hotlever.estimate.uncertainty_budget import check_budget_of
+    from hotlever.measurement import parse_columns, read_measurement_of
+
+    several = _check_levers(data, processes, scheduler)
+    if not posterior:
+        refuse("goes with --posterior", samples=samples != _CALIBRATION_SAMPLES)
+    if table is None and not several:
+        refuse("goes with --table", table_by=table_by != _EVEN_IN, table_step=table_step)
+    check_budget_of(budget_of)
+    at_most_one(fit=fit, probe=probe, power_law=power_law)
+    if fit or power_law:
+        refuse("goes with --probe, expected neither --fit nor --power-law", physics=physics)
+    check_medium(medium, UNKNOWN_MEDIUM)
+    if several:
+        refuse("expected a single data file", fit=fit, table=table, plot=plot)
+    budget_at = None if at is None else Setting(*parse_setting(at))
+    if budget_at is not None and not several and budget_at.along != "bias_V":
+        raise InputError(
+            f"--at: found {quoted(at)}, expected a bias such as 8V of one data file, or several "
+            "data files"
+        )
+    table_options = _table_options(table_by, table_step)
+    law = None if power_law is None else read_power_law(power_law)
+    of_lever = None if fit is None else read_fit(fit)
+    like = of_lever.probe if of_lever else read_probe(reporter, probe, physics=physics)
     how: dict[str, Any] = {
         "probe": like if of_lever is None and law is None else None,
         "law": law,
-        "priors": parse_priors(request.beforehand, like),
-        "medium": request.medium,
-        "budget_of": request.budget_of,
-        "pulse": None if request.pulse is None else parse_timing(request.pulse),
-        "samples": request.samples if request.posterior else 0,
+        "priors": parse_priors(_beforehand(prior, laws), like),
+        "medium": medium,
+        "budget_of": budget_of,
+        "pulse": None if pulse is None else parse_timing(pulse),
+        "samples": samples if posterior else 0,
     }
-    at = None if request.at is None else Setting(*parse_setting(request.at))
-    request.check_outputs()
-    if request.several:
-        make = partial(calibrate_many, **how)
-        summarise = partial(_of_calibrations, at, request.table_options())
-        names = "calibrations", CALIBRATIONS_TABLE
-        return _estimate_several(reporter, request, *names, make, summarise)
-    (data,) = request.data
-    measurement = read_measurement_of(like, data, request.columns)
+    if several:
+        levers = _Levers(
+            data, column, output, report, processes, scheduler, "calibrations", CALIBRATIONS_TABLE
+        )
+        summarise = partial(_of_calibrations, budget_at, table_options)
+        return _estimate_several(reporter, levers, partial(calibrate_many, **how), summarise)
+    (path,) = data
+    measurement = read_measurement_of(like, path, parse_columns(column or []))
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes, *measurement.unused)
     with reporter.progress("calibrate") as update:
-        at_V = None if at is None else at.value
+        at_V = None if budget_at is None else budget_at.value
         result = calibrate(measurement, fit=of_lever, at_V=at_V, progress=update, **how)
     reporter.note(*result.notes)
     texts = [calibration_text(result)]
-    if request.output is not None:
-        result.write(request.output)
-    if request.table is not None:
-        write_text(request.table, result.table_csv(**request.table_options()))
-    draw(request.plot, lambda figures: figures.calibration_curves(result))
-    if request.report is not None:
-        texts.append(f"report: {_write_pages(result, request.report)}")
+    if output is not None:
+        result.write(output)
+    if table is not None:
+        write_text(table, result.table_csv(**table_options))
+    draw(plot, lambda figures: figures.calibration_curves(result))
+    if report is not None:
+        texts.append(f"report: {_write_pages(result, report)}")
     reporter.give("\n".join([*texts, ""]))
     if not result.describes_data:
-        raise ComputationError(f"{data}: {result.doubt}")
+        raise ComputationError(f"{path}: {result.doubt}")
     return 0
+
+
+def _table_options(by: str, step: str | None) -> dict[str, Any]:
+    """Return what the table for an instrument is even in, and its step."""
+    from hotlever.estimate.tip_table import TABLES_BY
+
+    if by not in TABLES_BY:
+        raise unknown_name("quantity", by, TABLES_BY, "--table-by")
+    if step is None:
+        return {"by": by}
+    unit = TABLES_BY[by][1]
+    value = setting(step, unit, "--table-step", bare=True)
+    if value <= 0.0:
+        raise InputError(f"--table-step {value:g}: expected more than 0 {unit}")
+    return {"by": by, "step": value}
 
 
 def _write_pages(result: Calibration, folder: Path) -> Path:
@@ -204,52 +420,179 @@ def _write_pages(result: Calibration, folder: Path) -> Path:
     return page.write(folder)
 
 
-def propose(reporter: Reporter, request: NextRequest) -> None:
-    """Say what to measure next, or first.
+def propose(
+    reporter: Reporter,
+    data: Annotated[
+        Path | None,
+        Argument(
+            metavar="[DATA]",
+            help="Calibration (hotlever calibrate -o CAL.json), or a measurement file, which is "
+            "calibrated first; left out: a lever that was not measured yet.",
+        ),
+    ] = None,
+    *,
+    probe: Annotated[
+        Path | None,
+        Option(help="Probe file of a lever like this one; the reference probe if left out."),
+    ] = None,
+    medium: MeasuredMedium = None,
+    physics: Physics = None,
+    column: Column = None,
+    prior: Priors = None,
+    laws: Laws = None,
+    allow: Annotated[
+        str | None,
+        Option(
+            metavar="KIND[=COUNT],...",
+            help="Some of bias,spectra,reader, and at most how many, as bias=15,spectra=3; bias "
+            "and spectra if left out, and reader where it was measured.",
+        ),
+    ] = None,
+    count: Annotated[
+        int | None,
+        Option(metavar="N", help="Proposals; 5, or as many as are allowed, if left out."),
+    ] = None,
+    at: Annotated[
+        str | None,
+        Option(
+            metavar="TEMPERATURE",
+            help="Tip temperature whose error counts, as 800K; if left out the hottest that was "
+            "measured, or without data the hottest that may be.",
+        ),
+    ] = None,
+    stay_below: Annotated[
+        str | None,
+        Option(
+            metavar="TEMPERATURE",
+            help="Propose nothing at which the tip could be hotter with more than 1 % probability, "
+            "as 900K; what melts if left out.",
+        ),
+    ] = None,
+    bias: Annotated[
+        str | None,
+        Option(
+            metavar="START:STOP:COUNT",
+            help="Biases that can be taken (V); even ones to half beyond those measured if left "
+            "out.",
+        ),
+    ] = None,
+    cost: Annotated[
+        list[str] | None,
+        Option(
+            metavar="KIND=TIME",
+            help="Of one measurement, as spectra=10min; repeated for each kind. The gain is then "
+            "that per minute.",
+        ),
+    ] = None,
+    noise: Annotated[
+        list[str] | None,
+        Option(
+            metavar="NAME=SHARE",
+            help="Of a measurement to come, as current=0.2% or tip=1% (of the rise); that of the "
+            "data, or what is usual, if left out; repeated.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        Option("-o", "--output", help="CSV file; a table in words if left out."),
+        Written((".csv",)),
+    ] = None,
+    plot: Plot = None,
+) -> None:
+    """Say what to measure next, so that the tip temperature is known best.
 
-    Raises
-    ------
-    InputError
-        If the data are not described, so that nothing follows from them.
+    One row for each proposal, best first: how hot the tip would be there, and how hot at most
+    with 99 % certainty, and how sure its temperature is known then. Without data: where to begin.
     """
-    request.check()
-    choices = request.choices()
-    request.check_outputs()
-    beforehand: dict[str, Any] = {}
-    if request.calibrated:
-        assert request.data is not None
-        beforehand["calibration"] = read_calibration(request.data)
+    from hotlever.estimate import plan_next, read_calibration
+    from hotlever.estimate.options import UNKNOWN_MEDIUM
+
+    # of a lever that was not measured nothing could tell in which it is
+    check_medium(medium, *([] if data is None else [UNKNOWN_MEDIUM]))
+    check_number("--count", count, 1, MOST_PROPOSALS)
+    allowed = parse_kinds(allow)
+    limits = list((allowed or {"": None}).values())
+    usual = sum(number or 0 for number in limits) if all(limits) else _PROPOSALS
+    choices: dict[str, Any] = {
+        "at_K": parse_temperature(at, "--at"),
+        "stay_below_K": parse_temperature(stay_below, "--stay-below"),
+        "allowed": allowed,
+        "count": count or min(usual, MOST_PROPOSALS),
+        "bias": None if bias is None else parse_bias(bias),
+        "costs": parse_costs(cost, list(allowed or ("bias", "spectra"))),
+        "noise": parse_noise(noise),
+    }
+    if data is not None and data.suffix.lower() == ".json":
+        why = "the calibration has its own; expected a measurement file"
+        refuse(why, probe=probe, prior=prior, laws=laws, medium=medium)
+        refuse(why, physics=physics, column=column)
+        choices["calibration"] = read_calibration(data)
+    elif data is not None:
+        like = read_probe(reporter, probe, physics=physics)
+        choices["calibration"] = _calibrated_first(
+            reporter, data, like, column, _beforehand(prior, laws), medium
+        )
     else:
-        probe = request.with_physics(read_probe(reporter, request.probe))
-        if request.data is not None:
-            beforehand["calibration"] = _calibrated_first(reporter, request, request.data, probe)
-        else:
-            probe = probe if request.medium is None else probe.in_medium(request.medium)
-            beforehand |= {"probe": probe, "priors": parse_priors(request.beforehand, probe)}
+        refuse("expected a measurement file", column=column)
+        like = read_probe(reporter, probe, physics=physics)
+        like = like if medium is None else like.in_medium(medium)
+        choices |= {"probe": like, "priors": parse_priors(_beforehand(prior, laws), like)}
     with reporter.progress("next"):
-        plan = plan_next(**beforehand, **choices)
+        plan = plan_next(**choices)
     reporter.note(*plan.notes)
-    if request.output is not None:
-        write_text(request.output, plan.to_csv())
-    draw(request.plot, lambda figures: figures.planned_measurements(plan))
+    if output is not None:
+        write_text(output, plan.to_csv())
+    draw(plot, lambda figures: figures.planned_measurements(plan))
     reporter.give(plan.text() + "\n")
 
 
 def _calibrated_first(
-    reporter: Reporter, request: NextRequest, data: Path, like: Probe
+    reporter: Reporter,
+    data: Path,
+    like: Probe,
+    column: list[str] | None,
+    beforehand: Sequence[str],
+    medium: str | None,
 ) -> Calibration:
-    measurement = read_measurement_of(like, data, request.columns)
+    from hotlever.estimate.procedure import calibrate
+    from hotlever.measurement import parse_columns, read_measurement_of
+
+    measurement = read_measurement_of(like, data, parse_columns(column or []))
     reporter.note(*measurement.notes)
-    priors = parse_priors(request.beforehand, like)
+    priors = parse_priors(beforehand, like)
     with reporter.progress("calibrate") as update:
-        result = calibrate(
-            measurement, probe=like, priors=priors, medium=request.medium, progress=update
-        )
+        result = calibrate(measurement, probe=like, priors=priors, medium=medium, progress=update)
     reporter.note(f"{data} was calibrated first, which a file of hotlever calibrate -o saves")
     return result
 
 
 # --- many levers --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Levers:
+    """Data files of several levers, how they are worked on, and where what comes out goes.
+
+    Attributes
+    ----------
+    data : list of path
+    column : list of str or None
+    output, report : path or None
+    processes : int or None
+    scheduler : str or None
+        As the options say it.
+    results, table : str
+        What the results are called, as their folder beside a page, and the table of all of them.
+    """
+
+    data: list[Path]
+    column: list[str] | None
+    output: Path | None
+    report: Path | None
+    processes: int | None
+    scheduler: str | None
+    results: str
+    table: str
 
 
 @dataclass(frozen=True)
@@ -272,9 +615,7 @@ class _Summary:
 
 def _estimate_several(
     reporter: Reporter,
-    request: LeversRequest,
-    results: str,
-    table: str,
+    levers: _Levers,
     make: Callable[..., Batch[Result]],
     summarise: Callable[[Batch[Result]], _Summary],
 ) -> int:
@@ -285,9 +626,7 @@ def _estimate_several(
     Parameters
     ----------
     reporter : Reporter
-    request : LeversRequest
-    results, table : str
-        What the results are called, as their folder beside a page, and the table of all of them.
+    levers : _Levers
     make : callable
         Takes data files, a folder, and how they are worked on: see `estimate_many`.
     summarise : callable
@@ -299,8 +638,10 @@ def _estimate_several(
     ComputationError
         If it is stopped.
     """
-    data, output, report = request.data, request.output, request.report
-    scheduler = request.scheduler
+    from hotlever.measurement import parse_columns
+
+    data, output, report = levers.data, levers.output, levers.report
+    scheduler, results = levers.scheduler, levers.results
     if scheduler is not None and _is_open(scheduler):
         reporter.note(
             f"--scheduler {scheduler}: without TLS whoever reaches this address can have its "
@@ -315,7 +656,7 @@ def _estimate_several(
     if output is None:
         check_outputs([(folder, FOLDER)])
     if folder.is_dir():
-        check_outputs([(folder / table, (".csv",))], data)
+        check_outputs([(folder / levers.table, (".csv",))], data)
     done = 0
     with reporter.progress_bars("levers", "geometry") as (estimating, reducing):
 
@@ -330,10 +671,10 @@ def _estimate_several(
             reporter.tell(f"{name}: {rows}; {columns_read}")
             reporter.note(*measurement.notes, *measurement.unused)
 
-        where: Any = {"processes": request.processes, "scheduler": scheduler}
+        where: Any = {"processes": levers.processes, "scheduler": scheduler}
         bars: Any = {"reading": read, "reducing": reducing, "progress": update}
         try:
-            batch = make(data, folder, columns=request.columns, **where, **bars)
+            batch = make(data, folder, columns=parse_columns(levers.column or []), **where, **bars)
         except KeyboardInterrupt:
             raise ComputationError(
                 f"stopped by the user after {done} of {len(data)} files; the same command goes "
@@ -371,6 +712,13 @@ def _is_open(address: str) -> bool:
 
 
 def _of_fits(batch: Batch[Fit]) -> _Summary:
+    from hotlever.estimate.fit_summary import (
+        compare_levers,
+        lever_rows,
+        levers_csv,
+        statements,
+        table_text,
+    )
     from hotlever.report.fit_pages import levers_page
 
     table = compare_levers(batch.results)
@@ -382,6 +730,12 @@ def _of_fits(batch: Batch[Fit]) -> _Summary:
 def _of_calibrations(
     at: Setting | None, table: dict[str, Any], batch: Batch[Calibration]
 ) -> _Summary:
+    from hotlever.estimate.levers import (
+        calibrations_csv,
+        calibrations_text,
+        compare_calibrations,
+    )
+
     levers = compare_calibrations(batch.results, at)
     files, without = {CALIBRATIONS_TABLE: calibrations_csv(levers, batch.failures)}, []
     for name, each in batch.results.items():

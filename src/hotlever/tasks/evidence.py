@@ -1,76 +1,66 @@
-"""Pages that show how far the numbers hold: the paper's results, and other levers' published ones.
-
-What computes is imported when it is needed, since the requests stand here too.
-"""
+"""Pages that show how far the numbers hold: the paper's results, and other published ones."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from typer import Argument, Option
 
 from hotlever.files import write_text
+from hotlever.tasks.arguments import Written, refuse
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import FOLDER, File, Request, argument, option, written
+
+_VALIDATION = Path("validate")
 
 
-@dataclass(kw_only=True)
-class ReproduceRequest(Request):
+def reproduce(
+    reporter: Reporter,
+    *,
+    output: Annotated[
+        Path, Option("-o", "--output", help="Folder for the page and its figures."), Written()
+    ] = Path("reproduce"),
+    quick: Annotated[
+        bool,
+        Option(
+            "--quick",
+            help="Leave out what takes longest: k by geometry, the tip, the mesh; fewer levers.",
+        ),
+    ] = False,
+) -> None:
     """Compute the paper's tables and figures and put them on one page."""
-
-    output: Path = written(
-        FOLDER,
-        *("-o", "--output"),
-        default=Path("reproduce"),
-        help="Folder for the page and its figures.",
-    )
-    quick: bool = option(
-        False,
-        "--quick",
-        help="Leave out what takes longest: k by geometry, the tip, the mesh; fewer levers.",
-    )
-
-
-@dataclass(kw_only=True)
-class ValidateRequest(Request):
-    """Predict published numbers of other levers and compare them, on one page and in a table."""
-
-    case: File = argument(
-        None, metavar="[CASE.toml]", help="A case of your own, whose prediction is printed."
-    )
-    output: Path = written(
-        FOLDER,
-        *("-o", "--output"),
-        default=Path("validate"),
-        help="Folder for the page and its table.",
-    )
-
-
-def reproduce(reporter: Reporter, request: ReproduceRequest) -> None:
-    """Write the page of the paper's results."""
     from hotlever.report.reproduce import reproduce_page
 
-    request.check_outputs()
     with reporter.progress_bars("reproduce", "levers") as (update, within):
-        page = reproduce_page(quick=request.quick, progress=update, within=within)
-    written = page.write(request.output)
-    reporter.give(f"{written}\n")
+        page = reproduce_page(quick=quick, progress=update, within=within)
+    reporter.give(f"{page.write(output)}\n")
 
 
-def validate(reporter: Reporter, request: ValidateRequest) -> None:
-    """Write the page and the table of published numbers, or predict those of one case."""
-    if request.case is not None:
-        request.refuse("output", why="goes without a case of your own, whose prediction is printed")
-        _predict(reporter, request.case)
+def validate(
+    reporter: Reporter,
+    case: Annotated[
+        Path | None,
+        Argument(metavar="[CASE.toml]", help="A case of your own, whose prediction is printed."),
+    ] = None,
+    *,
+    output: Annotated[
+        Path, Option("-o", "--output", help="Folder for the page and its table."), Written()
+    ] = _VALIDATION,
+) -> None:
+    """Predict published numbers of other levers and compare them, on one page and in a table."""
+    if case is not None:
+        why = "goes without a case of your own, whose prediction is printed"
+        refuse(why, output=output != _VALIDATION)
+        _predict(reporter, case)
         return
     from hotlever.datasets import frame_text
     from hotlever.report.validation_pages import validation_page
 
-    request.check_outputs()
     with reporter.progress("validate") as update:
         page, compared = validation_page(update)
-    written = page.write(request.output)
+    written = page.write(output)
     table = frame_text(compared.to_dataframe(), float_format="%.6g")
-    write_text(request.output / "validation.csv", table)
+    write_text(output / "validation.csv", table)
     reporter.give(f"{written}\n")
 
 

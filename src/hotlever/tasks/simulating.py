@@ -7,21 +7,48 @@ from collections import deque
 from collections.abc import Sequence
 from itertools import count as count_up
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-import xarray as xr
+from typer import Option
 
-from hotlever.datasets import in_a_file
-from hotlever.errors import HistoryEndError
-from hotlever.files import output_folder
-from hotlever.lever import State
-from hotlever.lever.fields import write_fields_in_time
-from hotlever.lever.transient import Waveform, simulate, with_times
-from hotlever.lever.transient.history import TIME_COLUMNS
+from hotlever.errors import HistoryEndError, InputError
+from hotlever.files import FILM_TYPES, output_folder
+from hotlever.tasks.arguments import (
+    Count,
+    Medium,
+    Period,
+    Physics,
+    Plot,
+    ProbeFile,
+    Pulse,
+    Ramp,
+    Settings,
+    Sine,
+    Step,
+    Table,
+    Times,
+    Until,
+    WaveformFile,
+    Written,
+    read_drive,
+    refuse,
+)
+from hotlever.tasks.common_steps import (
+    draw,
+    make_lever,
+    notes_of,
+    read_surrounded_probe,
+    write_table,
+)
+from hotlever.tasks.parsing import parse_times
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import PulseRequest
-from hotlever.tasks.shared import draw, make_lever, notes_of, write_table
-from hotlever.types import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hotlever.lever import Lever, State
+    from hotlever.lever.transient import Waveform
+    from hotlever.types import Array
 
 #: Points of a curve for each step of the solver, and frames of a film where no times are asked.
 _CURVE, _FRAMES = 8, 120
@@ -29,23 +56,69 @@ _CURVE, _FRAMES = 8, 120
 _COARSE = 0.25
 
 
-def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
-    """Solve a lever in time, or write the page of it.
+def simulate_in_time(
+    reporter: Reporter,
+    probe: ProbeFile = None,
+    *,
+    step: Step = None,
+    pulse: Pulse = None,
+    period: Period = None,
+    count: Count = None,
+    ramp: Ramp = None,
+    sine: Sine = None,
+    waveform: WaveformFile = None,
+    until: Until = None,
+    at: Times = None,
+    medium: Medium = None,
+    set: Settings = None,
+    physics: Physics = None,
+    output: Table = None,
+    plot: Plot = None,
+    fields: Annotated[
+        Path | None,
+        Option(help="Write the fields as a series of VTU to this folder."),
+        Written(),
+    ] = None,
+    film: Annotated[
+        Path | None,
+        Option(
+            help="Animate temperature and tip to this file: .gif; a frame for each of --at, or 120."
+        ),
+        Written(FILM_TYPES),
+    ] = None,
+    report: Annotated[
+        Path | None,
+        Option(help="Folder for a page of the lever in time; goes without a wave form."),
+        Written(),
+    ] = None,
+) -> None:
+    """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
+    from hotlever.datasets import in_a_file
+    from hotlever.lever.fields import write_fields_in_time
+    from hotlever.lever.transient import simulate, with_times
+    from hotlever.lever.transient.history import TIME_COLUMNS
 
-    Raises
-    ------
-    HistoryEndError
-        If it has no state any more; what was reached is written.
-    """
-    if request.report is not None:
-        request.need_no_waveform()
-        _write_page(reporter, request, request.report)
+    drive: dict[str, Any] = {
+        "step": step,
+        "pulse": pulse,
+        "period": period,
+        "count": count,
+        "ramp": ramp,
+    }
+    drive |= {"sine": sine, "waveform": waveform}
+    if report is not None:
+        others = {"until": until, "at": at, "output": output, "plot": plot, "fields": fields}
+        why = "does not go with --report, which has wave forms of its own"
+        refuse(why, **drive, **others, film=film)
+        changed = read_surrounded_probe(reporter, probe, medium, set, physics)
+        _write_page(reporter, make_lever(reporter, changed), report)
         return
-    waveform = request.required_waveform()
-    until, times = request.end_us, request.times_us
-    request.check_outputs()
-    lever = make_lever(reporter, request.read_probe(reporter))
-    frames = None if request.film is None else _Frames(times or _even(waveform, until))
+    bias = read_drive(step, pulse, period, count, ramp, sine, waveform)
+    if bias is None:
+        raise InputError("found none: expected one of --step, --pulse, --ramp, --sine, --waveform")
+    end, times = parse_times(until, at)
+    lever = make_lever(reporter, read_surrounded_probe(reporter, probe, medium, set, physics))
+    frames = None if film is None else _Frames(times or _even(bias, end))
     failure: HistoryEndError | None = None
     # figures and rise times are of smooth curves, the table of the steps alone
     per_step = _CURVE if times is None else 1
@@ -59,15 +132,16 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
             ends[1:] = [state]
             if frames is not None:
                 frames.keep(t, state)
-            if next(point_numbers) % per_step == 0 and request.fields is not None:
+            if next(point_numbers) % per_step == 0 and fields is not None:
                 kept_at.append(t)
                 states.append(state)
 
         try:
             curve = simulate(
-                lever, waveform, until, times, per_step=per_step, progress=update, callback=keep
+                lever, bias, end, times, per_step=per_step, progress=update, callback=keep
             )
         except HistoryEndError as error:
+            # what was reached is written
             curve, failure = error.partial, error
     resolved = times is None
     if ends:
@@ -75,13 +149,13 @@ def simulate_in_time(reporter: Reporter, request: PulseRequest) -> None:
     data = curve.isel(time=slice(None, None, per_step))
     reporter.note(*notes_of(data))
     reporter.tell_table(_times(data))
-    text = write_table(request.output, data, in_a_file(data, TIME_COLUMNS))
+    text = write_table(output, data, in_a_file(data, TIME_COLUMNS))
     if data.sizes["time"]:
-        draw(request.plot, lambda figures: figures.history_overview(curve))
-    if request.fields is not None:
-        write_fields_in_time(lever, kept_at, states, output_folder(request.fields))
-    if frames is not None and request.film is not None and frames.states:
-        _draw_film(reporter, curve, frames.states, request.film)
+        draw(plot, lambda figures: figures.history_overview(curve))
+    if fields is not None:
+        write_fields_in_time(lever, kept_at, states, output_folder(fields))
+    if frames is not None and film is not None and frames.states:
+        _draw_film(reporter, curve, frames.states, film)
     if text:
         reporter.give(text)
     if failure is not None:
@@ -98,6 +172,8 @@ class _Frames:
 
     def keep(self, t: float, state: State) -> None:
         """Keep the states up to the next time that is reported."""
+        from hotlever.lever import State
+
         before, x = self._before or (t, state.x)
         while self._times and self._times[0] <= t:
             at = self._times.popleft()
@@ -108,6 +184,8 @@ class _Frames:
 
 def _even(waveform: Waveform, until: float | None) -> list[float]:
     """Return times (µs) even on the axis on which a history is drawn, and of some corners."""
+    import numpy as np
+
     end = waveform.usual_end if until is None else until
     times = np.linspace(0.0, end, _FRAMES)
     if np.ptp(waveform.bias(times)) == 0.0:
@@ -120,6 +198,8 @@ def _draw_film(
     reporter: Reporter, curve: xr.Dataset, states: Sequence[tuple[float, State]], path: Path
 ) -> None:
     """Draw a film; what comes and goes between its frames is told."""
+    import numpy as np
+
     from hotlever import figures
 
     interpolated_K = np.interp(curve.time, *np.transpose([(t, state.tip_K) for t, state in states]))
@@ -133,20 +213,19 @@ def _draw_film(
         figures.save_film(figures.pulse_film(curve, states), path, update)
 
 
-def _write_page(reporter: Reporter, request: PulseRequest, folder: Path) -> None:
+def _write_page(reporter: Reporter, lever: Lever, folder: Path) -> None:
     """Write the page of a lever in time."""
     from hotlever.report.transient_pages import transient_page
 
-    request.check_outputs()
-    lever = make_lever(reporter, request.read_probe(reporter))
     with reporter.progress("sections") as update:
         page = transient_page(lever, update)
-    written = page.write(folder)
-    reporter.give(f"{written}\n")
+    reporter.give(f"{page.write(folder)}\n")
 
 
 def _times(data: xr.Dataset) -> list[list[str]]:
     """Return rows that say how hot the tip gets, and how fast."""
+    import numpy as np
+
     rows, of = [], data.attrs
     if "tip_mean_K" in of:
         highest = f"{of['tip_highest_K']:.1f} K at {of['tip_highest_at_us']:.4g} µs"

@@ -6,88 +6,164 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
+
+from typer import Argument, Option
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.files import write_text
-from hotlever.raman import series
-from hotlever.raman.calibration import (
-    RamanCalibration,
-    published_raman_calibration,
-    read_raman_calibration,
+from hotlever.files import FIGURE_TYPES, write_text
+from hotlever.tasks.arguments import (
+    CalibrateFrom,
+    CalibrationLaw,
+    CalibrationName,
+    Corrections,
+    LaserPower,
+    LineShape,
+    Reference,
+    Resolution,
+    Spectra,
+    Stress,
+    Temperatures,
+    ThermalResistance,
+    Written,
+    at_most_one,
+    refuse,
 )
-from hotlever.raman.lineshape import PeakOptions
-from hotlever.raman.reading import read_spectra
-from hotlever.raman.series import Line
-from hotlever.raman.spectrum import Spectrum, file_and_label
-from hotlever.raman.tables import (
-    Correction,
-    check_corrections,
-    join,
-    read_bias_log,
-    read_corrections,
-    read_temperatures,
-)
-from hotlever.raman.thermometer import Law, Thermometer, laser_heating
-from hotlever.tasks.measured_requests import (
-    JoinRequest,
-    RamanRequest,
-    ThermometerRequest,
-)
+from hotlever.tasks.common_steps import draw
 from hotlever.tasks.reporter import Listener, Reporter
-from hotlever.tasks.shared import draw
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from hotlever.raman.calibration import RamanCalibration
+    from hotlever.raman.lineshape import PeakOptions
+    from hotlever.raman.series import Line
+    from hotlever.raman.spectrum import Spectrum
+    from hotlever.raman.tables import Correction
+    from hotlever.raman.thermometer import Thermometer
+
 #: What stands for the published laws in place of a calibration file.
 PUBLISHED = "published"
+_ANHARMONIC = "anharmonic"
 _MOST_NOTES = 20
 
 
-def measure_spectra(reporter: Reporter, request: RamanRequest) -> None:
-    """Find the silicon line in spectra and, calibrated, the temperature.
+def measure_spectra(
+    reporter: Reporter,
+    spectra: Spectra,
+    *,
+    calibration: CalibrationName = None,
+    calibrate_from: CalibrateFrom = None,
+    temperatures: Temperatures = None,
+    corrections: Corrections = None,
+    reference: Reference = None,
+    law: CalibrationLaw = _ANHARMONIC,
+    shape: LineShape = None,
+    resolution: Resolution = None,
+    laser_power: LaserPower = None,
+    thermal_resistance: ThermalResistance = None,
+    stress: Stress = 0.0,
+    save_calibration: Annotated[
+        Path | None,
+        Option(metavar="CAL.json", help="Write the calibration to this file."),
+        Written((".json",)),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        Option("--output", "-o", metavar="FILE.csv", help="Left out: print."),
+        Written((".csv",)),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        Option(metavar="FILE.png|.svg|.pdf", help="Figure of spectra and calibration."),
+        Written(FIGURE_TYPES),
+    ] = None,
+) -> None:
+    """Find the silicon line in Raman spectra and, calibrated, the temperature."""
+    from hotlever.raman import series
 
-    Raises
-    ------
-    InputError
-        If there is no spectrum with a line, or no calibration to be saved.
-    """
-    request.check_outputs()
-    setup = set_up(reporter, request)
-    if request.save_calibration is not None and setup.calibration is None:
+    setup = set_up(
+        reporter,
+        ThermometerOptions(
+            calibration=calibration,
+            calibrate_from=calibrate_from,
+            temperatures=temperatures,
+            corrections=corrections,
+            reference=reference,
+            law=law,
+            shape=shape,
+            resolution=resolution,
+            laser_power=laser_power,
+            thermal_resistance=thermal_resistance,
+            stress=stress,
+        ),
+    )
+    if save_calibration is not None and setup.calibration is None:
         raise InputError("--save-calibration: there is no calibration; give --calibrate-from")
-    lines, table = setup.measure(request.spectra)
-    text = series.to_csv(table)
+    lines, table = setup.measure(spectra)
     if len(lines) == 1 and setup.calibration is None:
-        draw(request.plot, lambda figures: figures.one_spectrum(lines[0]))
+        draw(plot, lambda figures: figures.one_spectrum(lines[0]))
     else:
         of = setup.calibration, setup.hot_plate
-        draw(request.plot, lambda figures: figures.thermometry(lines, table, *of))
-    if request.save_calibration is not None and setup.calibration is not None:
-        setup.calibration.save(request.save_calibration)
-    _answer(reporter, text, request.output)
+        draw(plot, lambda figures: figures.thermometry(lines, table, *of))
+    if save_calibration is not None and setup.calibration is not None:
+        setup.calibration.save(save_calibration)
+    _answer(reporter, series.to_csv(table), output)
 
 
-def join_spectra(reporter: Reporter, request: JoinRequest) -> None:
-    """Join a bias log with tip spectra into a measurement file.
+def join_spectra(
+    reporter: Reporter,
+    bias_log: Annotated[Path, Argument(metavar="BIAS_LOG.csv", help="The bias sweep.")],
+    spectra: Spectra,
+    *,
+    calibration: CalibrationName = None,
+    calibrate_from: CalibrateFrom = None,
+    temperatures: Temperatures = None,
+    corrections: Corrections = None,
+    reference: Reference = None,
+    law: CalibrationLaw = _ANHARMONIC,
+    shape: LineShape = None,
+    resolution: Resolution = None,
+    laser_power: LaserPower = None,
+    thermal_resistance: ThermalResistance = None,
+    stress: Stress = 0.0,
+    output: Annotated[
+        Path | None,
+        Option("--output", "-o", metavar="DATA.csv", help="Left out: print."),
+        Written((".csv",)),
+    ] = None,
+) -> None:
+    """Join a bias log with tip spectra into the file that `hotlever fit` takes.
 
-    Raises
-    ------
-    InputError
-        If there is no thermometer, or log and spectra do not belong together.
+    A spectrum belongs to the row that names it in a 'file' column, or has the bias in its name
+    (tip_5.25V.txt); else spectra and rows are paired in order.
     """
-    request.check_outputs()
-    log = read_bias_log(request.bias_log)
-    setup = set_up(reporter, request)
+    from hotlever.raman.tables import join, read_bias_log
+
+    log = read_bias_log(bias_log)
+    setup = set_up(
+        reporter,
+        ThermometerOptions(
+            calibration=calibration,
+            calibrate_from=calibrate_from,
+            temperatures=temperatures,
+            corrections=corrections,
+            reference=reference,
+            law=law,
+            shape=shape,
+            resolution=resolution,
+            laser_power=laser_power,
+            thermal_resistance=thermal_resistance,
+            stress=stress,
+        ),
+    )
     if setup.thermometer is None:
         raise InputError("join needs temperatures: give --calibration or --calibrate-from")
-    _, table = setup.measure(request.spectra)
+    _, table = setup.measure(spectra)
     missing = table.file.values[table.temperature_K.isnull().values]
     if missing.size:
         reporter.note(f"no temperature from {', '.join(missing)}: empty cells")
-    text = join(log, table)
-    _answer(reporter, text, request.output)
+    _answer(reporter, join(log, table), output)
 
 
 def _answer(reporter: Reporter, text: str, output: Path | None) -> None:
@@ -100,6 +176,23 @@ def _answer(reporter: Reporter, text: str, output: Path | None) -> None:
 
 
 # --- the thermometer ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ThermometerOptions:
+    """How the silicon line is found, and what its shift is read with, as the options say it."""
+
+    calibration: str | None = None
+    calibrate_from: Sequence[Path] | None = None
+    temperatures: Path | None = None
+    corrections: Path | None = None
+    reference: Sequence[Path] | None = None
+    law: str = _ANHARMONIC
+    shape: str | None = None
+    resolution: float | None = None
+    laser_power: float | None = None
+    thermal_resistance: float | None = None
+    stress: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -127,6 +220,9 @@ class Thermometry:
         InputError
             If one cannot be read, none is left to use, or none has a silicon line.
         """
+        from hotlever.raman import series
+        from hotlever.raman.tables import check_corrections
+
         spectra = _read(self.listener, paths)
         table = self.corrected_by
         elsewhere = check_corrections(self.corrections, [*self.spectra, *spectra], table)
@@ -151,6 +247,9 @@ def _note_some(listener: Listener, texts: Sequence[str]) -> None:
 
 def _read(listener: Listener, paths: Sequence[Path]) -> list[Spectrum]:
     """Read spectra; what a folder holds beside them is noted."""
+    from hotlever.raman.reading import read_spectra
+    from hotlever.raman.spectrum import file_and_label
+
     skipped: list[str] = []
     with listener.progress("reading") as update:
         spectra = read_spectra(paths, skipped, update)
@@ -172,6 +271,8 @@ def _measure(
     label: str,
 ) -> list[Line]:
     """Fit the lines of spectra; those of many that have none are noted."""
+    from hotlever.raman import series
+
     with listener.progress(label) as update:
         lines = series.measure(spectra, options, update, corrections)
     if len(lines) > 1:
@@ -183,12 +284,14 @@ def _measure(
 
 def calibration_named(name: str | None) -> RamanCalibration | None:
     """Return the published calibration, the one in a file, or none."""
+    from hotlever.raman.calibration import published_raman_calibration, read_raman_calibration
+
     if name is None:
         return None
     return published_raman_calibration() if name == PUBLISHED else read_raman_calibration(name)
 
 
-def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
+def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
     """Set up a thermometer, or only the fit of the line if no calibration is named.
 
     Raises
@@ -196,29 +299,33 @@ def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
     InputError
         If a file is at fault, or these do not go together.
     """
-    if request.law not in get_args(Law):
-        raise unknown_name("law", request.law, get_args(Law))
-    request.at_most_one("calibration", "calibrate_from")
-    if not request.calibrate_from:
-        request.refuse("temperatures", why="goes with --calibrate-from")
-    laser_power, thermal_resistance = request.laser_power, request.thermal_resistance
+    from hotlever.raman import series
+    from hotlever.raman.tables import read_corrections, read_temperatures
+    from hotlever.raman.thermometer import Law, Thermometer, laser_heating
+
+    if asked.law not in get_args(Law):
+        raise unknown_name("law", asked.law, get_args(Law))
+    at_most_one(calibration=asked.calibration, calibrate_from=asked.calibrate_from or None)
+    if not asked.calibrate_from:
+        refuse("goes with --calibrate-from", temperatures=asked.temperatures)
+    laser_power, thermal_resistance = asked.laser_power, asked.thermal_resistance
     if (laser_power is None) != (thermal_resistance is None):
         raise InputError("--laser-power and --thermal-resistance belong together: give both")
     heating = 0.0
     if laser_power is not None and thermal_resistance is not None:
         heating = laser_heating(laser_power, thermal_resistance)
         listener.note(f"laser heating is estimated as {heating:.2g} K and enters the error")
-    chosen = calibration_named(request.calibration)
-    options = _options(listener, chosen, request)
-    by_hand = read_corrections(request.corrections) if request.corrections else {}
-    corrected_by = str(request.corrections)
+    chosen = calibration_named(asked.calibration)
+    options = _peak_options(listener, chosen, asked.shape, asked.resolution)
+    by_hand = read_corrections(asked.corrections) if asked.corrections else {}
+    corrected_by = str(asked.corrections)
     hot_plate: list[Line] = []
     spectra: list[Spectrum] = []
-    if request.calibrate_from:
-        stated = request.temperatures
+    if asked.calibrate_from:
+        stated = asked.temperatures
         table = read_temperatures(stated) if stated else None
-        spectra = _read(listener, request.calibrate_from)
-        source = ", ".join(path.name or str(path) for path in request.calibrate_from)
+        spectra = _read(listener, asked.calibrate_from)
+        source = ", ".join(path.name or str(path) for path in asked.calibrate_from)
         with listener.progress("hot plate") as update:
             chosen, hot_plate = series.calibrate_from(
                 spectra, options, table, update, source, by_hand
@@ -226,22 +333,25 @@ def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
         options = chosen.options
         _describe(listener, chosen)
     if chosen is None:
-        unused = "reference", "stress", "laser_power", "law"
-        request.refuse(*unused, why="needs --calibration or --calibrate-from")
+        refuse(
+            "needs --calibration or --calibrate-from",
+            reference=asked.reference or None,
+            stress=asked.stress or None,
+            laser_power=asked.laser_power,
+            law=asked.law != _ANHARMONIC,
+        )
         return Thermometry(listener, options, corrections=by_hand, corrected_by=corrected_by)
-    if chosen.reference_cm is None and not request.reference:
+    if chosen.reference_cm is None and not asked.reference:
         raise InputError(
             "--calibration published: give --reference, a spectrum of your instrument at room "
             "temperature, from which the shifts are taken"
         )
     # a calibration without reference gets one below; 0 stands in until then
     start = 0.0 if chosen.reference_cm is None else None
-    law: Any = request.law
-    thermometer = Thermometer(chosen, law, start, 0.0, heating, request.stress)
-    if request.reference:
-        lines = _measure(
-            listener, _read(listener, request.reference), options, by_hand, "reference"
-        )
+    law: Any = asked.law
+    thermometer = Thermometer(chosen, law, start, 0.0, heating, asked.stress)
+    if asked.reference:
+        lines = _measure(listener, _read(listener, asked.reference), options, by_hand, "reference")
         if options.band_evidence is None:
             options = replace(options, band_evidence=series.band_evidence(lines))
         peaks = [(line.peak, line.spectrum.temperature) for line in lines if line.peak]
@@ -252,12 +362,15 @@ def set_up(listener: Listener, request: ThermometerRequest) -> Thermometry:
     )
 
 
-def _options(
-    listener: Listener, calibration: RamanCalibration | None, request: ThermometerRequest
+def _peak_options(
+    listener: Listener,
+    calibration: RamanCalibration | None,
+    shape: Any,
+    resolution: float | None,
 ) -> PeakOptions:
     """As is asked for, else as the calibration was made: both sides must be fitted alike."""
-    shape: Any = request.shape
-    resolution = request.resolution
+    from hotlever.raman.lineshape import PeakOptions
+
     if calibration is None or not calibration.points:
         return PeakOptions(shape or "lorentzian", resolution)
     alike = calibration.options

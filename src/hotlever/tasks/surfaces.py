@@ -6,18 +6,39 @@ Tables and figures, at rest or in time.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
+from typer import Option
 
 from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
-from hotlever.probe.surroundings import Surroundings
-from hotlever.probe.tip import EXAMPLE, interface_of, parsed_layers
+from hotlever.tasks.arguments import (
+    Count,
+    Medium,
+    Period,
+    Physics,
+    Plot,
+    ProbeFile,
+    Pulse,
+    Ramp,
+    Settings,
+    Sine,
+    Step,
+    Table,
+    Times,
+    Until,
+    WaveformFile,
+    read_drive,
+    refuse,
+)
+from hotlever.tasks.common_steps import (
+    draw,
+    make_lever,
+    notes_of,
+    read_surrounded_probe,
+    write_table,
+)
+from hotlever.tasks.parsing import parse_bias, parse_distances, parse_pressures, parse_times
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import ContactRequest, ReaderRequest
-from hotlever.tasks.shared import draw, make_lever, notes_of, write_table
-from hotlever.tasks.texts import parse_bias, parse_distances, parse_pressures
-from hotlever.types import Array
 from hotlever.units import setting
 
 if TYPE_CHECKING:
@@ -26,6 +47,7 @@ if TYPE_CHECKING:
     from hotlever.lever import Lever
     from hotlever.lever.noise import NoiseOptions
     from hotlever.probe import Probe
+    from hotlever.types import Array
 
 #: Radii that a contact may have (µm).
 _SMALLEST, _LARGEST = 1e-4, 10.0
@@ -33,18 +55,55 @@ _SMALLEST, _LARGEST = 1e-4, 10.0
 _CURRENT_KNOWN = 1e-4
 #: Up to this bias (V) the best one for a reader is looked for.
 _HIGHEST_V = 11.0
-#: What probe files have where they do not state of what temperature the jumping air is (K).
-_USUAL_K = Surroundings.model_fields["jump_temperature_K"].default
 
 
-def touch(reporter: Reporter, request: ContactRequest) -> None:
-    """Solve a lever in contact over a range of bias, or in time.
-
-    Raises
-    ------
-    ComputationError
-        If it has no state at some of them; what was reached is written.
-    """
+def touch(
+    reporter: Reporter,
+    probe: ProbeFile = None,
+    *,
+    sample: Annotated[
+        str | None,
+        Option(
+            metavar="LAYER,...",
+            help="From the top, such as polymer,100nm,silicon: materials or their W/(m K), each "
+            "but the last with its thickness; what the probe file says if left out.",
+        ),
+    ] = None,
+    radius: Annotated[
+        str | None,
+        Option(metavar="LENGTH", help="Of the contact, the tip's flat end, such as 5nm."),
+    ] = None,
+    interface: Annotated[
+        str | None,
+        Option(
+            metavar="RESISTANCE",
+            help="Such as 1e7K/W, or for an area 1e-8m2K/W; none at first.",
+        ),
+    ] = None,
+    bias: Annotated[
+        str | None,
+        Option(
+            metavar="START:STOP:COUNT",
+            help="In volts, ends included, or a single one; 1:11:25 if neither this nor a wave "
+            "form is given.",
+        ),
+    ] = None,
+    step: Step = None,
+    pulse: Pulse = None,
+    period: Period = None,
+    count: Count = None,
+    ramp: Ramp = None,
+    sine: Sine = None,
+    waveform: WaveformFile = None,
+    until: Until = None,
+    at: Times = None,
+    medium: Medium = None,
+    set: Settings = None,
+    physics: Physics = None,
+    output: Table = None,
+    plot: Plot = None,
+) -> None:
+    """Touch a sample with the tip: apex, heat into the sample, change of the current."""
     from hotlever.lever.contact import (
         CONTACT_COLUMNS,
         HISTORY_COLUMNS,
@@ -52,65 +111,72 @@ def touch(reporter: Reporter, request: ContactRequest) -> None:
         sweep_in_contact,
     )
 
-    request.check_outputs()
-    waveform = request.read_waveform()
-    if waveform is None:
-        request.refuse("until", "at", why="goes with a wave form, such as --pulse")
+    drive = read_drive(step, pulse, period, count, ramp, sine, waveform)
+    if drive is None:
+        refuse("goes with a wave form, such as --pulse", until=until, at=at)
     else:
-        request.refuse("bias", why="does not go with a wave form, which has biases of its own")
-    probe = probe_in_contact(reporter, request)
-    biases = parse_bias(request.bias, probe.lowest_bias_V)
-    lever = make_lever(reporter, probe)
+        refuse("does not go with a wave form, which has biases of its own", bias=bias)
+    read = read_surrounded_probe(reporter, probe, medium, set, physics)
+    touching = in_contact(reporter, read, sample, radius, interface)
+    biases = parse_bias(bias, touching.lowest_bias_V)
+    lever = make_lever(reporter, touching)
     with reporter.progress("contact") as update:
-        if waveform is None:
+        if drive is None:
             columns, solve = CONTACT_COLUMNS, partial(sweep_in_contact, lever, biases)
         else:
-            times = waveform, request.end_us, request.times_us
-            columns, solve = HISTORY_COLUMNS, partial(history_in_contact, lever, *times)
+            times = parse_times(until, at)
+            columns, solve = HISTORY_COLUMNS, partial(history_in_contact, lever, drive, *times)
         data, failure = as_far_as_possible(lambda: solve(progress=update))
     if failure is not None and not data.tip_K.size:
         raise failure
     reporter.note(*contact_notes(data))
-    text = write_table(request.output, data, columns)
-    draw(request.plot, lambda figures: figures.contact_overview(data, probe))
+    text = write_table(output, data, columns)
+    draw(plot, lambda figures: figures.contact_overview(data, touching))
     if text:
         reporter.give(text)
     if failure is not None:
         raise failure
 
 
-def probe_in_contact(reporter: Reporter, request: ContactRequest) -> Probe:
-    """Read the probe, and have its tip touch the sample.
+def in_contact(
+    reporter: Reporter,
+    probe: Probe,
+    sample: str | None,
+    radius: str | None,
+    interface: str | None,
+) -> Probe:
+    """Return a probe whose tip touches a sample, where told in other ways than its file says.
 
     Raises
     ------
     InputError
         If there is no sample, or what is asked for cannot be.
     """
-    probe = request.read_probe(reporter)
+    from hotlever.probe.tip import EXAMPLE, interface_of, parsed_layers
+
     changes: dict[str, Any] = {}
     tip = probe.tip or EXAMPLE
-    radius = tip.apex_radius_um
+    radius_um = tip.apex_radius_um
     if probe.tip is None:
         changes["tip.height_um"] = tip.height_um
-    if request.radius is not None:
-        radius = setting(request.radius, "um", "--radius")
-        if not _SMALLEST <= radius <= _LARGEST:
+    if radius is not None:
+        radius_um = setting(radius, "um", "--radius")
+        if not _SMALLEST <= radius_um <= _LARGEST:
             raise InputError(
-                f"--radius: found '{excerpt(request.radius)}', expected a length from "
+                f"--radius: found '{excerpt(radius)}', expected a length from "
                 f"{1e3 * _SMALLEST:g} nm to {_LARGEST:g} µm, such as 5nm"
             )
-        changes["tip.apex_radius_um"] = radius
-    if request.sample is not None:
-        parsed_layers(request.sample, "--sample")
-        changes["sample"] = request.sample
+        changes["tip.apex_radius_um"] = radius_um
+    if sample is not None:
+        parsed_layers(sample, "--sample")
+        changes["sample"] = sample
     elif probe.contact is None:
         raise InputError(
             "--sample: found none, expected layers such as polymer,100nm,silicon, or a probe file "
             "with a section [contact]"
         )
-    if request.interface is not None:
-        resistance = interface_of(request.interface, radius, "--interface")
+    if interface is not None:
+        resistance = interface_of(interface, radius_um, "--interface")
         changes["interface_K_per_mW"] = resistance
     if probe.surroundings.medium == "air" and probe.surroundings.surface_gap_um is None:
         changes["surface_gap_um"] = tip.height_um
@@ -131,6 +197,8 @@ def contact_notes(data: xr.Dataset) -> list[str]:
 
 def what_the_current_tells(data: xr.Dataset) -> str:
     """Say how well the sum of resistances is known by the current, where it tells most of it."""
+    import numpy as np
+
     with np.errstate(divide="ignore", invalid="ignore"):
         error = _CURRENT_KNOWN * np.abs(data.current_mA / data.current_by_resistance)
         whole = data.tip_K_per_mW + data.interface_K_per_mW + data.spreading_K_per_mW
@@ -146,23 +214,61 @@ def what_the_current_tells(data: xr.Dataset) -> str:
     )
 
 
-def approach(reporter: Reporter, request: ReaderRequest) -> None:
-    """Read a lever at distances to a surface, over biases and pressures.
+def approach(
+    reporter: Reporter,
+    probe: ProbeFile = None,
+    *,
+    distance: Annotated[
+        str,
+        Option(
+            metavar="START:STOP:COUNT",
+            help="From the lever's lower face to the surface, ends included, or a single one.",
+        ),
+    ] = "0.3um:3um:10",
+    bias: Annotated[
+        str | None,
+        Option(
+            metavar="START:STOP:COUNT",
+            help="In volts, ends included, or a single one; the one up to 11 V that resolves the "
+            "distances best if left out.",
+        ),
+    ] = None,
+    pressure: Annotated[
+        str | None,
+        Option(
+            metavar="START:STOP:COUNT",
+            help="Of the air, in mbar, spaced evenly in the logarithm, or a single one; what the "
+            "probe file says if left out.",
+        ),
+    ] = None,
+    bandwidth: Annotated[str, Option(metavar="LOW:HIGH", help="Of what is read.")] = "1Hz:1kHz",
+    amplifier: Annotated[
+        str, Option(metavar="V", help="Noise at its input, for each √Hz.")
+    ] = "5nV",
+    hooge: Annotated[float, Option(help="Hooge's parameter of the silicon, for 1/f noise.")] = 0.0,
+    vibration: Annotated[
+        str | None,
+        Option(metavar="LENGTH", help="Of the lever itself, for each √Hz; none if left out."),
+    ] = None,
+    medium: Medium = None,
+    set: Settings = None,
+    physics: Physics = None,
+    output: Table = None,
+    plot: Plot = None,
+) -> None:
+    """Read the distance to a surface: signal, noise, resolution."""
+    import numpy as np
 
-    Raises
-    ------
-    ComputationError
-        If it has no state at any of them.
-    """
     from hotlever.lever.reader import Reader, best_bias, over_surface, rows_of
 
-    request.check_outputs()
-    distances, noise = parse_distances(request.distance), noise_of(request)
-    pressures = None if request.pressure is None else parse_pressures(request.pressure)
-    probe = probe_over_surface(reporter, request, distances)
-    biases = None if request.bias is None else parse_bias(request.bias, probe.lowest_bias_V)
-    reader = Reader(probe, noise)
-    lever = make_lever(reporter, probe)
+    distances = parse_distances(distance)
+    noise = reader_noise(bandwidth, amplifier, hooge, vibration)
+    pressures = None if pressure is None else parse_pressures(pressure)
+    read = read_surrounded_probe(reporter, probe, medium, set, physics, finds_air=True)
+    above = over_a_surface(reporter, read, medium, distances)
+    biases = None if bias is None else parse_bias(bias, above.lowest_bias_V)
+    reader = Reader(above, noise)
+    lever = make_lever(reporter, above)
     with reporter.progress_bars("best bias", "distances") as (trying, update):
         if biases is None:
             best_V = best_bias(lever, distances[[0, -1]], _HIGHEST_V, noise, trying)
@@ -171,36 +277,35 @@ def approach(reporter: Reporter, request: ReaderRequest) -> None:
                 f"of all biases up to {_HIGHEST_V:g} V {biases.item():.4g} V resolves these "
                 "distances best (--bias chooses others)"
             )
-        if needs_jump(probe):
+        if needs_jump(above):
             lever = jumping_at_tip(reporter, lever, float(biases[biases.size // 2]))
         data = over_surface(lever, distances, biases, noise, pressures, progress=update)
     if not data.tip_K.notnull().any():
         raise ComputationError(notes_of(data)[0])
-    if not reader.is_held and probe.circuit.swept != "reader":
+    if not reader.is_held and above.circuit.swept != "reader":
         reporter.note(
             "no supply heats the terminal reader ([circuit.reader]): the heater itself is read, "
-            f"behind {probe.circuit.series_resistance_ohm:g} ohm"
+            f"behind {above.circuit.series_resistance_ohm:g} ohm"
         )
     reporter.note(*notes_of(data), "that films bend the lever when it gets warm is left out")
     reporter.tell_table(best_resolved(data, noise))
     rows = rows_of(data)
     columns = [str(name) for name in rows.data_vars]
-    whole = request.output is not None and request.output.suffix.lower() == ".nc"
-    text = write_table(request.output, data if whole else rows, columns)
-    draw(request.plot, lambda figures: figures.reader_overview(data))
+    whole = output is not None and output.suffix.lower() == ".nc"
+    text = write_table(output, data if whole else rows, columns)
+    draw(plot, lambda figures: figures.reader_overview(data))
     if text:
         reporter.give(text)
 
 
-def probe_over_surface(reporter: Reporter, request: ReaderRequest, distances: Array) -> Probe:
-    """Read the probe, in air over a surface at the nearest of some distances (µm)."""
+def over_a_surface(reporter: Reporter, probe: Probe, medium: str | None, distances: Array) -> Probe:
+    """Return a probe in air over a surface at the nearest of some distances (µm)."""
     from hotlever.lever.reader import check_distances
 
-    probe = request.read_probe(reporter)
     check_distances(probe, distances)
     around = probe.surroundings
     changes: dict[str, Any] = {"surface_gap_um": float(distances.min())}
-    if request.medium is None and around.medium == "vacuum":
+    if medium is None and around.medium == "vacuum":
         reporter.note("in vacuum a reader sees no surface: the lever is taken in air")
         changes["medium"] = "air"
     if around.accommodation is None:
@@ -213,7 +318,14 @@ def probe_over_surface(reporter: Reporter, request: ReaderRequest, distances: Ar
 
 def needs_jump(probe: Probe) -> bool:
     """Return whether a probe leaves it open of which temperature the air is that jumps."""
-    return probe.surroundings.jump_temperature_K == _USUAL_K
+    return probe.surroundings.jump_temperature_K == _usual_jump_K()
+
+
+def _usual_jump_K() -> float:
+    """Return what probe files have where they do not state of what temperature the air is (K)."""
+    from hotlever.probe.surroundings import Surroundings
+
+    return float(Surroundings.model_fields["jump_temperature_K"].default)
 
 
 def jumping_at_tip(reporter: Reporter, lever: Lever, bias_V: float) -> Lever:
@@ -228,12 +340,14 @@ def jumping_at_tip(reporter: Reporter, lever: Lever, bias_V: float) -> Lever:
     T = round(state.tip_K)
     reporter.note(
         f"the air's temperature jumps as at {T} K, the tip's at {bias_V:.4g} V "
-        f"(--set jump_temperature_K=... states another one than {_USUAL_K:g})"
+        f"(--set jump_temperature_K=... states another one than {_usual_jump_K():g})"
     )
     return lever.with_probe(lever.probe.with_(jump_temperature_K=T))
 
 
-def noise_of(request: ReaderRequest) -> NoiseOptions:
+def reader_noise(
+    bandwidth: str, amplifier: str, hooge: float, vibration: str | None
+) -> NoiseOptions:
     """Return what is known of noise beside the lever.
 
     Raises
@@ -243,18 +357,20 @@ def noise_of(request: ReaderRequest) -> NoiseOptions:
     """
     from hotlever.lever.noise import NoiseOptions
 
-    low, _, high = request.bandwidth.partition(":")
+    low, _, high = bandwidth.partition(":")
     return NoiseOptions(
         setting(low, "Hz", "--bandwidth"),
         setting(high, "Hz", "--bandwidth"),
-        setting(request.amplifier, "V", "--amplifier"),
-        request.hooge,
-        0.0 if request.vibration is None else setting(request.vibration, "nm", "--vibration"),
+        setting(amplifier, "V", "--amplifier"),
+        hooge,
+        0.0 if vibration is None else setting(vibration, "nm", "--vibration"),
     )
 
 
 def best_resolved(data: xr.Dataset, noise: NoiseOptions) -> list[list[str]]:
     """Return rows that say how well the best distance and bias are resolved, and by what."""
+    import numpy as np
+
     density = data.resolution_nm_per_rtHz
     if not density.notnull().any():
         return []

@@ -2,80 +2,146 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from hotlever.datasets import in_a_file
-from hotlever.errors import ComputationError, InputError, as_far_as_possible
-from hotlever.files import output_folder
-from hotlever.lever import State
-from hotlever.lever.dataset import SWEEP_COLUMNS
-from hotlever.lever.set_points import hold
+from typer import Option
+
+from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
+from hotlever.files import FIGURE_TYPES, output_folder
+from hotlever.tasks.arguments import (
+    Bias,
+    Medium,
+    Physics,
+    Plot,
+    ProbeFile,
+    Settings,
+    Table,
+    Written,
+    at_most_one,
+    refuse,
+)
+from hotlever.tasks.common_steps import (
+    draw,
+    make_lever,
+    notes_of,
+    read_surrounded_probe,
+    write_table,
+)
+from hotlever.tasks.parsing import parse_bias, parse_frequencies, parse_set_points
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.requests import SpectrumRequest, SweepRequest
-from hotlever.tasks.shared import draw, make_lever, notes_of, write_table
-from hotlever.tasks.texts import parse_bias, parse_frequencies
 from hotlever.units import bias_setting
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from hotlever.lever import State
 
-def sweep(reporter: Reporter, request: SweepRequest) -> None:
-    """Solve a lever over a range of bias, or where it is held at a resistance or a power.
 
-    Raises
-    ------
-    ComputationError
-        If it has no state at some of them; what was reached is written.
-    """
-    request.check_outputs()
-    probe = request.read_probe(reporter)
-    held = request.set_points
-    biases = parse_bias(request.bias, probe.lowest_bias_V)
-    lever = make_lever(reporter, probe, request.model)
+def sweep(
+    reporter: Reporter,
+    probe: ProbeFile = None,
+    *,
+    medium: Medium = None,
+    set: Settings = None,
+    physics: Physics = None,
+    bias: Bias = None,
+    and_back: Annotated[
+        bool,
+        Option(
+            "--and-back",
+            help="Let the bias go back as well: a lever that jumps does so elsewhere.",
+        ),
+    ] = False,
+    hold_resistance: Annotated[
+        str | None,
+        Option(
+            metavar="OHM",
+            help="The states that a controller of V_l/I_h holds, in place of a bias: such as "
+            "3kohm, 2.5kohm,3kohm or 2.5kohm:3.3kohm:9.",
+        ),
+    ] = None,
+    hold_power: Annotated[
+        str | None,
+        Option(metavar="WATT", help="The same of V_l I_h, such as 2.5mW or 1mW:4mW:7."),
+    ] = None,
+    model: Annotated[
+        str,
+        Option(
+            help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
+            "(minutes; goes on where it was stopped).",
+        ),
+    ] = "flat",
+    output: Table = None,
+    plot: Plot = None,
+    map: Annotated[
+        Path | None,
+        Option(help="Draw the temperature at the highest tip temperature to this file, as --plot."),
+        Written(FIGURE_TYPES),
+    ] = None,
+    fields: Annotated[
+        Path | None,
+        Option(help="Write the fields of each state as VTU to this folder."),
+        Written(),
+    ] = None,
+) -> None:
+    """Solve a lever over a range of bias."""
+    from hotlever.datasets import in_a_file
+    from hotlever.lever.dataset import SWEEP_COLUMNS
+    from hotlever.lever.set_points import hold
+
+    changed = read_surrounded_probe(reporter, probe, medium, set, physics)
+    at_most_one(bias=bias, hold_resistance=hold_resistance, hold_power=hold_power)
+    held, unit = ("resistance", "ohm") if hold_resistance is not None else ("power", "mW")
+    option, points = f"--hold-{held}", hold_resistance if hold_power is None else hold_power
+    if points is not None:
+        refuse(f"does not go with {option}", and_back=and_back)
+        if model != "flat":
+            raise InputError(f"{option}: goes with --model flat, found {excerpt(model)}")
+        set_points = parse_set_points(points, unit, option)
+    biases = parse_bias(bias, changed.lowest_bias_V)
+    lever = make_lever(reporter, changed, model)
     states: list[State] = []
     curve: xr.Dataset | None = None
     failure: ComputationError | None = None
     with reporter.progress("sweep") as update:
-        if held is not None:
-            what, option, set_points = held
+        if points is not None:
             try:
-                held_states = hold(lever, what, set_points, progress=update)
+                held_states = hold(lever, held, set_points, progress=update)
             except InputError as error:
                 raise InputError(f"{option}: {error}") from None
             data, states, curve = held_states.data, held_states.states, held_states.curve
         else:
             data, failure = as_far_as_possible(
-                lambda: lever.sweep(biases, and_back=request.and_back, progress=update)
+                lambda: lever.sweep(biases, and_back=and_back, progress=update)
             )
         if failure is not None and not data.bias.size:
             raise failure
-        if request.fields is not None and not states:
-            solved = biases if request.and_back else data.bias_V.values
+        if fields is not None and not states:
+            solved = biases if and_back else data.bias_V.values
             states, ended = as_far_as_possible(
-                lambda: lever.solve(solved, update, and_back=request.and_back)
+                lambda: lever.solve(solved, update, and_back=and_back)
             )
             failure = failure or ended
-        if request.map is not None:
+        if map is not None:
             hottest = int(data.tip_K.values.argmax())
             (mapped,) = states[hottest:][:1] or lever.solve([data.bias_V.values[hottest]])
     reporter.note(*notes_of(data))
-    text = write_table(request.output, data, in_a_file(data, SWEEP_COLUMNS))
+    text = write_table(output, data, in_a_file(data, SWEEP_COLUMNS))
     draw(
-        request.plot,
+        plot,
         lambda figures: (
-            figures.sweep_overview(data) if held is None else figures.held_states(data, curve)
+            figures.sweep_overview(data) if points is None else figures.held_states(data, curve)
         ),
     )
-    draw(request.map, lambda figures: figures.temperature_map(mapped))
-    if request.fields is not None:
-        # what draws or writes fields is imported where it is needed: a sweep is there at once
+    draw(map, lambda figures: figures.temperature_map(mapped))
+    if fields is not None:
         from hotlever.lever.fields import write_fields
 
         write_fields(
             lever,
             states,
-            output_folder(request.fields),
+            output_folder(fields),
             lambda slices, path: draw(path, lambda figures: figures.temperature_slices(slices)),
         )
     if text:
@@ -84,9 +150,30 @@ def sweep(reporter: Reporter, request: SweepRequest) -> None:
         raise failure
 
 
-def respond(reporter: Reporter, request: SpectrumRequest) -> None:
-    """Find impedance and thermal response to small signals at a bias, or harmonics."""
-    # takes longer to import than all that a sweep needs
+def respond(
+    reporter: Reporter,
+    probe: ProbeFile = None,
+    *,
+    medium: Medium = None,
+    set: Settings = None,
+    physics: Physics = None,
+    bias: Annotated[str, Option(metavar="V", help="Of the operating point.")],
+    frequency: Annotated[
+        str,
+        Option(
+            metavar="START:STOP:COUNT",
+            help="Spaced evenly in the logarithm, or a single one.",
+        ),
+    ] = "1Hz:10MHz:71",
+    amplitude: Annotated[
+        str | None,
+        Option(metavar="V", help="Of a sine about the bias: harmonics of V_l instead (3ω method)."),
+    ] = None,
+    output: Table = None,
+    plot: Plot = None,
+) -> None:
+    """Show impedance and thermal response to small signals at a bias, or harmonics."""
+    from hotlever.datasets import in_a_file
     from hotlever.lever.transient.frequency_domain import (
         HARMONIC_COLUMNS,
         SPECTRUM_COLUMNS,
@@ -94,10 +181,10 @@ def respond(reporter: Reporter, request: SpectrumRequest) -> None:
         spectrum,
     )
 
-    swing = None if request.amplitude is None else bias_setting(request.amplitude, "--amplitude")
-    volts, frequencies = bias_setting(request.bias, "--bias"), parse_frequencies(request.frequency)
-    request.check_outputs()
-    lever = make_lever(reporter, request.read_probe(reporter))
+    swing = None if amplitude is None else bias_setting(amplitude, "--amplitude")
+    volts, frequencies = bias_setting(bias, "--bias"), parse_frequencies(frequency)
+    changed = read_surrounded_probe(reporter, probe, medium, set, physics)
+    lever = make_lever(reporter, changed)
     with reporter.progress("spectrum") as update:
         if swing is None:
             (state,) = lever.solve([volts], update)
@@ -105,7 +192,7 @@ def respond(reporter: Reporter, request: SpectrumRequest) -> None:
         else:
             data = harmonics(lever, volts, swing, frequencies, update)
     columns = in_a_file(data, SPECTRUM_COLUMNS if swing is None else HARMONIC_COLUMNS)
-    text = write_table(request.output, data, columns)
-    draw(request.plot, lambda figures: figures.figure_of(data))
+    text = write_table(output, data, columns)
+    draw(plot, lambda figures: figures.figure_of(data))
     if text:
         reporter.give(text)

@@ -25,7 +25,7 @@ from hotlever.errors import HotleverError, InputError
 from hotlever.lever.set_points import HELD
 from hotlever.materials.parameters import label
 from hotlever.probe.surroundings import Physics
-from hotlever.tasks.texts import parse_set_points
+from hotlever.tasks.parsing import parse_set_points
 
 #: Numbers of a state, those of the lever beside too.
 _NUMBERS = {

@@ -1,4 +1,4 @@
-"""What tasks share: probes read and levers made, with what should be known of them; files."""
+"""Steps that commands have in common: read a probe, mesh its lever, write a table, draw."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hotlever.errors import unknown_name
+from hotlever.errors import InputError, unknown_name
+from hotlever.tasks.arguments import check_medium
+from hotlever.tasks.parsing import parse_settings
 from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.texts import parse_settings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,17 +23,67 @@ MODELS = ("flat", "full-3d")
 
 
 def read_probe(
-    reporter: Reporter, path: Path | None = None, settings: Sequence[str] | None = None
+    reporter: Reporter,
+    path: Path | None,
+    settings: Sequence[str] | None = None,
+    physics: str | None = None,
 ) -> Probe:
-    """Read a probe file, or take the reference probe, and change some of its values.
+    """Read a probe file, or take the reference probe, with other values and effects.
 
     What should be known of its shape is told.
+
+    Parameters
+    ----------
+    reporter : Reporter
+    path : path or None
+    settings : sequence of str, optional
+        As ``--set`` has them.
+    physics : str, optional
+        Effects with commas between; those of the file if left out, or ``none``.
+
+    Raises
+    ------
+    InputError
+        If the file, or one of these, is at fault.
     """
     from hotlever.probe import Probe
 
     probe = Probe.reference() if path is None else Probe.from_file(path)
     probe = probe.with_(**parse_settings(settings, probe)) if settings else probe
     reporter.note(*probe.shape.notes())
+    if physics is None:
+        return probe
+    names = [name.strip() for name in physics.split(",")]
+    return probe.with_physics(() if names == ["none"] else names, "--physics")
+
+
+def read_surrounded_probe(
+    reporter: Reporter,
+    path: Path | None,
+    medium: str | None,
+    settings: Sequence[str] | None,
+    physics: str | None,
+    *,
+    finds_air: bool = False,
+) -> Probe:
+    """Read a probe as `read_probe` does, in a medium.
+
+    Unless the command takes air where nothing is said (`finds_air`), settings of the air around a
+    lever in vacuum are refused, since they would do nothing.
+    """
+    from hotlever.probe.file_sections import field_of
+
+    check_medium(medium)
+    probe = read_probe(reporter, path, settings, physics)
+    probe = probe if medium is None else probe.in_medium(medium)
+    if probe.surroundings.medium == "vacuum" and not finds_air:
+        for name, value in parse_settings(settings, probe).items():
+            section, key, _ = field_of(probe, name)
+            if section == "surroundings" and key != "medium" and value not in (None, False):
+                raise InputError(
+                    f"--set {name}: counts in air, and this lever is in vacuum; expected --medium "
+                    "air too"
+                )
     return probe
 
 

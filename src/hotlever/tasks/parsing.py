@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
-from hotlever.errors import InputError, excerpt, quoted
+from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.units import NUMBER, bias_setting, setting
 
 if TYPE_CHECKING:
@@ -26,8 +26,10 @@ MOST_BIASES, MOST_DESIGNS = 10_000, 1000
 MOST_FREQUENCIES, MOST_SET_POINTS = 10_000, 1000
 #: Distances to a surface, of which each takes seconds, and between which they are (µm).
 MOST_DISTANCES, NEAREST, FARTHEST = 1000, 0.001, 1e4
-#: The paper's sweep.
-_BIAS = "1:11:25"
+#: Times that may be asked for, and measurements that are proposed at once.
+MOST_TIMES, MOST_PROPOSALS = 10_000, 100
+#: Minutes by unit of time.
+_MINUTES = {"s": 1.0 / 60.0, "min": 1.0, "h": 60.0}
 
 
 def parse_number(text: str, where: str) -> float:
@@ -197,6 +199,102 @@ def parse_bounds(texts: Iterable[str] | None) -> dict[str, tuple[float | None, f
     return bounds
 
 
+def parse_times(until: str | None, at: str | None) -> tuple[float | None, list[float] | None]:
+    """Parse when to stop, and the times to report with commas between (µs), if they are stated.
+
+    Examples
+    --------
+    >>> parse_times("1ms", "5us,20us"), parse_times(None, None)
+    ((1000.0, [5.0, 20.0]), (None, None))
+    """
+    end = None if until is None else setting(until, "us", "--until")
+    times = None if at is None else [setting(time, "us", "--at") for time in at.split(",")]
+    if times is not None and len(times) > MOST_TIMES:
+        raise InputError(f"--at: found {len(times)} times, expected at most {MOST_TIMES}")
+    return end, times
+
+
+# --- what to measure next -----------------------------------------------------------------------
+
+
+def parse_temperature(text: str | None, option: str) -> float | None:
+    """Parse ``800K``, if it is stated."""
+    if text is None:
+        return None
+    kelvins = setting(text, "K", option)
+    check_number(option, kelvins, 1.0, 5000.0)
+    return kelvins
+
+
+def parse_kinds(text: str | None) -> dict[str, int | None] | None:
+    """Parse ``bias,spectra`` or ``bias=15,spectra=3``: kinds of measurement, at most so many.
+
+    Examples
+    --------
+    >>> parse_kinds("bias,spectra=3")
+    {'bias': None, 'spectra': 3}
+    """
+    if text is None:
+        return None
+    kinds = dict[str, int | None]()
+    expected = "KIND,... or KIND=COUNT,..., such as bias,spectra=3"
+    for name, number in parse_pairs("--allow", text.split(","), expected, bare=True).items():
+        if number and not (number.isdecimal() and 1 <= int(number[:9]) <= MOST_PROPOSALS):
+            raise InputError(
+                f"--allow {excerpt(name)}: found {quoted(number)}, expected a whole number from 1 "
+                f"to {MOST_PROPOSALS}"
+            )
+        kinds[name] = int(number) if number else None
+    return kinds
+
+
+def parse_costs(texts: Iterable[str] | None, kinds: Sequence[str]) -> dict[str, float]:
+    """Parse several ``KIND=TIME``, such as ``spectra=10min``, in minutes.
+
+    Examples
+    --------
+    >>> parse_costs(["spectra=10min", "bias=30s"], ["bias", "spectra"])
+    {'spectra': 10.0, 'bias': 0.5}
+    """
+    costs, expected = dict[str, float](), "KIND=TIME, such as spectra=10min"
+    for name, text in parse_pairs("--cost", texts, expected).items():
+        where = f"--cost {excerpt(name)}"
+        if name not in kinds:
+            raise unknown_name("kind of measurement", name, kinds, "--cost")
+        number, minutes = text.rstrip("hminsec "), 0.0
+        with suppress(InputError):
+            minutes = _MINUTES.get(text[len(number) :].strip(), 0.0) * parse_number(number, where)
+        if not 0.0 < minutes < math.inf:
+            raise InputError(f"{where}: found {quoted(text)}, expected a time such as 30s or 10min")
+        costs[name] = minutes
+    missing = [kind for kind in kinds if kind not in costs]
+    if costs and missing:
+        raise InputError(f"--cost: found none of {', '.join(missing)}, expected one of each kind")
+    return costs
+
+
+def parse_noise(texts: Iterable[str] | None) -> dict[str, float]:
+    """Parse several ``NAME=SHARE``, such as ``current=0.2%``, of observables.
+
+    Examples
+    --------
+    >>> parse_noise(["current=0.2%", "tip=1%"])
+    {'current': 0.002, 'tip': 0.01}
+    """
+    from hotlever.quantities import OBSERVABLES
+
+    noise, expected = dict[str, float](), "NAME=SHARE, such as current=0.2%"
+    for name, text in parse_pairs("--noise", texts, expected).items():
+        if name not in OBSERVABLES:
+            raise unknown_name("observable", name, OBSERVABLES, "--noise")
+        where = f"--noise {name}"
+        share = parse_number(text.removesuffix("%"), where) / 100.0 if text.endswith("%") else 0.0
+        if not 1e-6 <= share <= 0.5:
+            raise InputError(f"{where}: found {quoted(text)}, expected a share from 1e-4% to 50%")
+        noise[name] = share
+    return noise
+
+
 # --- ranges -------------------------------------------------------------------------------------
 
 
@@ -211,7 +309,7 @@ def parse_bias(text: str | None, lowest_V: float = 0.0) -> Array:
     >>> parse_bias("1:11:3").tolist(), parse_bias("8V").tolist()
     ([1.0, 6.0, 11.0], [8.0])
     """
-    text = _BIAS if text is None else text
+    text = "1:11:25" if text is None else text  # the paper's sweep
     where = f"--bias {excerpt(text)}"
     biases = _values(text, where, "1:11:25 (V)", MOST_BIASES, bias_setting)
     # between two ends of either sign there are smaller ones
