@@ -127,16 +127,15 @@ def plain_intrinsic(T):
 def carriers_ratio(T, law):
     """Return the intrinsic density of a published law over that of Eq. 7, without dopants.
 
-    Morin and Maita, Phys. Rev. 96, 28 (1954); Misiakos and Tsamakis, J. Appl. Phys. 74, 3293
-    (1993); Barber, Solid-State Electron. 10, 1039 (1967), of which the ratio at 700 K is taken for
-    all temperatures.
+    Morin and Maita, Phys. Rev. 96, 28 (1954); Putley and Mitchell, Proc. Phys. Soc. 72, 193 (1958);
+    Misiakos and Tsamakis, J. Appl. Phys. 74, 3293 (1993).
     """
     if law == "Morin and Maita":
         return 3.87e16 * T**1.5 * np.exp(-0.605 / (BOLTZMANN_EV * T)) / plain_intrinsic(T)
+    if law == "Putley and Mitchell":
+        return 3.0e16 * T**1.5 * np.exp(-0.603 / (BOLTZMANN_EV * T)) / plain_intrinsic(T)
     if law == "Misiakos and Tsamakis":
         return 5.29e19 * (T / 300.0) ** 2.54 * np.exp(-6726.0 / T) / plain_intrinsic(T)
-    if law == "Barber":
-        return 0.59 + 0.0 * T
     raise ValueError(law)
 
 

@@ -5,7 +5,7 @@ with a richer model than the one that calibrates it, and measured in 40 points, 
 0.2 % of noise, unless --noise states another share.
 
 Run: python benchmarks/twins.py [LEVERS] [vacuum|air] [iv|reader|raman] [--noise SHARE]
-                          [--without DEPARTURE ...]
+                          [--without DEPARTURE ...] [--laws paper]
      python benchmarks/twins.py [LEVERS] all      every medium and kind of data
 
 With --wild, levers of which the owner knows little, and says so. Those above depart from the model
@@ -14,7 +14,11 @@ doping, dimensions and thickness with wide priors. What is tried is the search: 
 such a lever from so far away, and whether the errors that it states are those it makes.
 
      python benchmarks/twins.py --wild [--count N] [--first K] [--medium vacuum|air]
-                                [--results FILE] [--write DIR]
+                                [--laws paper] [--obey] [--results FILE] [--write DIR]
+
+With --laws paper calibrations take the laws of silicon to be the paper's, as --laws says. Those of
+levers above are the paper's or MINIMOS'; those of the wild ones depart as the model has it, unless
+they are to --obey.
 
 With --results a line for each of them is appended to a file, and an interrupted run goes on with
 those that are not in it. With --write the data and probe file of each, and the true lever's, are
@@ -49,10 +53,11 @@ from hotlever.lever.full_space import FullSpace
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.parameters import parameters_of
 from hotlever.probe.parts import PriorTexts
-from hotlever.probe.priors import default_priors
+from hotlever.probe.priors import ALL_LAWS, PAPERS, UNCERTAIN, default_priors, updated
 from hotlever.studies.simulation_based_calibration import (
     DEPARTURES,
     HIGHEST_V,
+    HOT,
     KINDS,
     LEVELS,
     NOISE,
@@ -67,11 +72,11 @@ from problems import table
 
 
 def judged(
-    number: int, medium: str, what: str, departures: list[str], noise: float
+    number: int, medium: str, what: str, departures: list[str], noise: float, laws: str
 ) -> xr.Dataset | str:
     """Judge the calibration of a lever; the reason in words if there is none of that number."""
     try:
-        return judge(number, medium, what, departures, noise)
+        return judge(number, medium, what, departures, noise, laws)
     except HotleverError as error:
         return str(error)
 
@@ -92,6 +97,8 @@ def report(results: list[xr.Dataset | str], title: str) -> None:
     ]
     table(("largest error above 400 K (K)", "median", "90 %", "worst"), rows)
     print(f"\npooled rms of error / stated: {total.rms:.2f}")
+    stated = np.sqrt((answers.stated_K.where(answers.tip_K > HOT) ** 2).mean("row").values)
+    print(f"stated above 400 K (rms of a lever): median {np.nanmedian(stated):.1f} K")
     print(f"levers within 2 stated errors everywhere: {total.everywhere:.0%}")
     print_coverage(total.coverage.values)
     seconds = answers.seconds.values
@@ -114,41 +121,48 @@ def two_at_a_time(judged: Callable[[int], Any], numbers: list[int]) -> Iterator[
             yield future.result()
 
 
-def main(count: int, medium: str, what: str, departures: list[str], noise: float) -> None:
-    judge_one = partial(judged, medium=medium, what=what, departures=departures, noise=noise)
+def main(
+    count: int, medium: str, what: str, departures: list[str], noise: float, laws: str
+) -> None:
+    told = {"medium": medium, "what": what, "departures": departures, "noise": noise, "laws": laws}
+    judge_one = partial(judged, **told)
     results = list(two_at_a_time(judge_one, [*range(count)]))
     without = [name for name in DEPARTURES if name not in departures]
     ending = f", without {', '.join(without)}" if without else ""
-    report(results, f"{medium}, {what}, noise of {noise:g}{ending}")
+    report(results, f"{medium}, {what}, noise of {noise:g}, {laws} laws{ending}")
 
 
 # --- levers of which little is known, reported ---------------------------------------------------
 
 
-def judged_wild(number: int, medium: str | None) -> dict[str, Any]:
+def judged_wild(number: int, medium: str | None, laws: str, obey: bool) -> dict[str, Any]:
     """Judge a lever of which little is known; without one of that number, say why."""
     try:
-        record = judge_little_known(number, medium)
+        record = judge_little_known(number, medium, laws, obey)
     except HotleverError as error:
         record = {"lever": number, "outcome": "no lever", "reason": str(error)}
-    return record | {"asked_for": medium}
+    return record | {"asked_for": [medium, laws, obey]}
 
 
-def wild(numbers: list[int], medium: str | None, results: Path | None) -> None:
+def wild(
+    numbers: list[int], medium: str | None, laws: str, obey: bool, results: Path | None
+) -> None:
     """Judge levers of which little is known, unless in the file of results, and sum all up."""
     lines = results.read_text().splitlines() if results and results.exists() else []
     records = {
         record["lever"]: record
         for record in map(json.loads, lines)
-        if record["lever"] in numbers and record["asked_for"] == medium
+        if record["lever"] in numbers and record["asked_for"] == [medium, laws, obey]
     }
     missing = [number for number in numbers if number not in records]
-    for record in two_at_a_time(partial(judged_wild, medium=medium), missing):
+    judge_one = partial(judged_wild, medium=medium, laws=laws, obey=obey)
+    for record in two_at_a_time(judge_one, missing):
         records[record["lever"]] = record
         if results:
             with results.open("a") as file:
                 file.write(json.dumps(record) + "\n")
-    report_wild([records[number] for number in numbers], f"wild, {medium or 'vacuum and air'}")
+    title = f"wild{', obeying' * obey}, {medium or 'vacuum and air'}, {laws} laws"
+    report_wild([records[number] for number in numbers], title)
 
 
 def report_wild(records: list[dict[str, Any]], title: str) -> None:
@@ -202,6 +216,9 @@ def report_wild(records: list[dict[str, Any]], title: str) -> None:
     largest = [float(error.max()) for error in off]
     there = [float(band[np.argmax(error)]) for error, band in zip(off, stated, strict=True)]
     print(f"largest error: median {np.median(largest):.1f} K, worst {max(largest):.1f} K")
+    pooled = np.sqrt(np.mean([np.mean(ratio**2) for ratio in ratios]))
+    sizes = [float(np.sqrt(np.mean(band**2))) for band in stated]
+    print(f"rms of error / stated: {pooled:.2f}; stated (rms), median {np.median(sizes):.1f} K")
     print(f"stated there: median {np.median(there):.1f} K")
     most = [float(ratio.max()) for ratio in ratios]
     print(f"largest error in stated errors: median {np.median(most):.1f}, worst {max(most):.1f}")
@@ -297,7 +314,9 @@ class LittleKnownLever:
         return "\n".join(lines) + "\n"
 
 
-def little_known_lever(number: int, medium: str | None = None) -> LittleKnownLever:
+def little_known_lever(
+    number: int, medium: str | None = None, obey: bool = False
+) -> LittleKnownLever:
     """Draw and measure the lever of a number, the same each time.
 
     Parameters
@@ -306,6 +325,8 @@ def little_known_lever(number: int, medium: str | None = None) -> LittleKnownLev
         Decides the shape in turn, and the rest by chance.
     medium : {"vacuum", "air"}, optional
         By default, either by chance.
+    obey : bool
+        Whether its laws are the paper's.
 
     Raises
     ------
@@ -318,7 +339,7 @@ def little_known_lever(number: int, medium: str | None = None) -> LittleKnownLev
         by_chance = MEDIA[int(rng.random() < 0.5)]
         try:
             nominal = _nominal(rng, SHAPES[number % len(SHAPES)]).in_medium(medium or by_chance)
-            true = _drawn(rng, nominal)
+            true = _drawn(rng, nominal, obey)
             branch = _finer(true).branch(np.inf)
             measurement, digitised, jumps = _measured(rng, true, branch)
         except HotleverError as error:
@@ -397,7 +418,7 @@ def _drawing(rng: Generator, common: float) -> Probe:
     return Probe.from_sections(sections, "drawn lever")
 
 
-def _drawn(rng: Generator, nominal: Probe) -> Probe:
+def _drawn(rng: Generator, nominal: Probe, obey: bool) -> Probe:
     """Draw a lever from all that its owner knows.
 
     Raises
@@ -406,7 +427,10 @@ def _drawn(rng: Generator, nominal: Probe) -> Probe:
         If it cannot be drawn, or a parameter is beyond what levers have.
     """
     bounds, values = parameters_of(nominal, anywhere=True), dict[str, float]()
-    for name, prior in default_priors(nominal).items():
+    known = default_priors(nominal)
+    if obey:
+        known = updated(known, {ALL_LAWS: PAPERS}, nominal, "levers")
+    for name, prior in known.items():
         values[name] = value = prior.at(float(rng.standard_normal()))
         if not bounds[name].lower <= value <= bounds[name].upper:
             raise InputError(f"{name} = {value:g} is beyond what levers have")
@@ -465,7 +489,9 @@ def _measured(rng: Generator, true: Probe, branch: Branch) -> tuple[Measurement,
     return measurement, digitised, jumps
 
 
-def judge_little_known(number: int, medium: str | None = None) -> dict[str, Any]:
+def judge_little_known(
+    number: int, medium: str | None = None, laws: str = UNCERTAIN, obey: bool = False
+) -> dict[str, Any]:
     """Make the lever of a number, calibrate it, and compare with its true temperature.
 
     Returns
@@ -481,7 +507,7 @@ def judge_little_known(number: int, medium: str | None = None) -> dict[str, Any]
     HotleverError
         If there is no lever of that number.
     """
-    lever = little_known_lever(number, medium)
+    lever = little_known_lever(number, medium, obey)
     probe, data = lever.nominal, lever.measurement
     record: dict[str, Any] = {
         "lever": number,
@@ -499,7 +525,7 @@ def judge_little_known(number: int, medium: str | None = None) -> dict[str, Any]
     }
     began = time.process_time()
     try:
-        calibration = calibrate(data, probe=probe)
+        calibration = calibrate(data, probe=probe, priors={ALL_LAWS: laws})
     except Exception as error:  # also what should never come is a result here
         record |= {"outcome": FAILED, "exception": type(error).__name__, "reason": str(error)}
         return record | {"seconds": time.process_time() - began}
@@ -529,6 +555,8 @@ if __name__ == "__main__":
     listed = listed.replace("%", "%%")  # argparse formats its help
     parser.add_argument("--without", nargs="+", choices=DEPARTURES, default=[], help=listed)
     parser.add_argument("--noise", type=float, default=NOISE, help="of meters, a share")
+    parser.add_argument("--laws", choices=(UNCERTAIN, PAPERS), default=UNCERTAIN)
+    parser.add_argument("--obey", action="store_true", help="wild levers obey the paper's laws")
     parser.add_argument("--wild", action="store_true", help="levers of which little is known")
     parser.add_argument("--count", type=int, default=200, help="of levers of which little is known")
     parser.add_argument("--first", type=int, default=0, help="number of the first of them")
@@ -541,9 +569,9 @@ if __name__ == "__main__":
         if given.write:
             write(numbers, given.around, given.write)
         else:
-            wild(numbers, given.around, given.results)
+            wild(numbers, given.around, given.laws, given.obey, given.results)
         sys.exit()
     chosen = [name for name in DEPARTURES if name not in given.without]
     everything = [(medium, what) for medium in HIGHEST_V for what in KINDS]
     for medium, what in everything if given.medium == "all" else [(given.medium, given.what)]:
-        main(given.levers, medium, what, chosen, given.noise)
+        main(given.levers, medium, what, chosen, given.noise, given.laws)

@@ -7,28 +7,63 @@ import pytest
 
 from hotlever.materials.departures import DEPARTURES, HOT_K, MODES_FROM, MODES_TO
 from hotlever.materials.heat import thermal_conductivity, thermal_conductivity_of_layer
-from hotlever.materials.silicon import BOLTZMANN, intrinsic_density, minimos_mobility, mobility
+from hotlever.materials.silicon import (
+    BOLTZMANN,
+    impurity_mobility,
+    intrinsic_density,
+    minimos_mobility,
+    mobility,
+)
 
 T = np.linspace(MODES_FROM, MODES_TO, 51)
 #: Dopings of heaters (cm⁻³), and that of legs.
 HEATERS, LEGS = (3e17, 6e17), 2.2e20
 
 
+#: Where the legs of a lever are (K): a straight line is fitted there.
+LEGS_UP_TO = 600.0
+
+
 def power_and_gap(factor, power, gap_K):
     return factor * (T / 300.0) ** power * np.exp(-gap_K / T)
 
 
-#: Intrinsic densities (cm⁻³) as parameters/carrier_concentrations.py of
-#: github.com/I-use-IT/solar-cell quotes them.
+def of_gap(factor, power, gap_eV):
+    return factor * T**power * np.exp(-gap_eV / (2.0 * BOLTZMANN * T))
+
+
+def paessler():
+    """Gap (eV) of R. Pässler, Phys. Rev. B 66, 085201 (2002)."""
+    hot, spread = 2.0 * T / 446.0, 0.51
+    series = 1.0 + np.pi**2 / (3.0 * (1.0 + spread**2)) * hot**2
+    series += (3.0 * spread**2 - 1.0) / 4.0 * hot**3 + 8.0 / 3.0 * hot**4 + hot**6
+    by_phonons = (1.0 - 3.0 * spread**2) / np.expm1(446.0 / T)
+    return 1.17 - 3.23e-4 * 446.0 * (by_phonons + 1.5 * spread**2 * (series ** (1.0 / 6.0) - 1.0))
+
+
+#: The gap (eV) of Green (1990) above 300 K.
+GREEN_GAP = 1.206 - 2.73e-4 * T
+#: Intrinsic densities (cm⁻³) that were measured or evaluated, as carrier_concentrations.py of
+#: github.com/I-use-IT/solar-cell quotes them. Barber's (1967) is calculated, 6.8e9 at 300 K, which
+#: all that was measured since contradicts (9.6e9 to 10.1e9).
 CARRIERS = {
-    "Morin and Maita (1954)": np.sqrt(1.5e33 * T**3 * np.exp(-1.21 / (BOLTZMANN * T))),
-    "Putley and Mitchell (1958)": 3.0e16 * T**1.5 * np.exp(-0.603 / (BOLTZMANN * T)),
-    "Barber (1967)": 1.72e16 * T**1.5 * np.exp(-0.6025 / (BOLTZMANN * T)),
-    "Slotboom (1977)": np.sqrt(9.61e32 * T**3 * np.exp(-1.206 / (BOLTZMANN * T))),
+    "Morin and Maita (1954)": of_gap(np.sqrt(1.5e33), 1.5, 1.21),
+    "Putley and Mitchell (1958)": of_gap(3.0e16, 1.5, 1.206),
+    "Slotboom (1977)": of_gap(np.sqrt(9.61e32), 1.5, 1.206),
     "Wasserrab (1977)": power_and_gap(5.71e19, 2.365, 6733.0),
+    "Green (1990)": of_gap(np.sqrt(2.86e19 * 3.10e19) / 300.0**1.715, 1.715, GREEN_GAP),
     "Sproul and Green (1991)": power_and_gap(9.15e19, 2.0, 6880.0),
+    "Sproul and Green (1993)": of_gap(1.640e15, 1.706, GREEN_GAP),
     "Misiakos and Tsamakis (1993)": power_and_gap(5.29e19, 2.54, 6726.0),
+    "Couderc et al. (2014)": of_gap(1.541e15, 1.712, paessler()),
 }
+#: Mobilities (cm² V⁻¹ s⁻¹) of electrons in the lattice: Morin and Maita, Phys. Rev. 96, 28 (1954);
+#: Ludwig and Watters, Phys. Rev. 101, 1699 (1956); Jacoboni et al., Solid-State Electron. 20, 77
+#: (1977).
+LATTICES = (4.0e9 * T**-2.6, 2.1e9 * T**-2.5, 1.43e9 * T**-2.42)
+#: What dopants narrow the gap by in heaters (eV): 0.021 by Eq. 7, 0.022 by Slotboom and de Graaff
+#: (1976), and nothing by del Alamo et al. (1987).
+NARROWING = 0.021
 
 
 def arora(n):
@@ -47,9 +82,10 @@ def dorkel(n):
 
 
 def mobilities(n):
-    return np.stack(
-        [mobility(T, n, p=2.65)[0], dorkel(n), arora(n), minimos_mobility(T, n, p=2.0)[0]]
-    )
+    by_impurities = impurity_mobility(T, n)[0]
+    in_lattices = [1.0 / (1.0 / by_impurities + 1.0 / lattice) for lattice in LATTICES]
+    formulas = [dorkel(n), arora(n), minimos_mobility(T, n, p=2.0)[0]]
+    return np.stack([mobility(T, n, p=2.65)[0], *formulas, *in_lattices])
 
 
 def departures_of(law):
@@ -61,21 +97,30 @@ def departures_of(law):
         return [np.log(mobilities(n) / mobility(T, n, p=2.65)[0]) for n in HEATERS]
     if law == "kappa":
         film, bulk = thermal_conductivity_of_layer(T, 0.4)[0], thermal_conductivity(T)[0]
-        return [np.log(np.stack([film[0] / bulk[0] * bulk, film]) / film)]
-    # of a straight line through what is measured, which a0 and a1 are
-    resistivity = 1.0 / mobilities(LEGS)[1:]
-    lines = [np.polyval(np.polyfit(T - 300.0, row, 1), T - 300.0) for row in resistivity]
-    return [np.log(np.stack([T / T, *(resistivity / lines)]))]
+        scaled = film[0] / bulk[0] * bulk
+        return [np.log(np.stack([scaled, film]) / scaled)]
+    # of a straight line where the legs are, which a0 and a1 are
+    resistivity, there = 1.0 / mobilities(LEGS)[1:4], T <= LEGS_UP_TO
+    lines = [
+        np.polyval(np.polyfit(T[there] - 300.0, row[there], 1), T - 300.0) for row in resistivity
+    ]
+    return [np.log(np.stack([T / T, *(lines / resistivity)]))]
 
 
 @pytest.mark.parametrize("law", DEPARTURES)
-def test_a_law_is_known_no_better_than_published_formulas_agree(law):
+def test_a_law_is_known_no_better_than_published_formulas_are_near_it(law):
+    spread = DEPARTURES[law].spread(T)
     for logarithms in departures_of(law):
-        among = logarithms.std(axis=0, ddof=1)
-        hot = T > 450.0
-        assert (DEPARTURES[law].spread(T)[hot] > 0.97 * among[hot]).all()
-        # and not without reason: somewhere they differ by half as much
-        assert (among > 0.5 * DEPARTURES[law].spread(T)).any()
+        squares = np.mean(logarithms**2, axis=0)
+        if law == "n_i":
+            # half of what dopants do is not known
+            squares = squares + (0.5 * NARROWING / (2.0 * BOLTZMANN * T)) ** 2
+        away = np.sqrt(squares)
+        # colder carriers are those of the dopant
+        counts = (600.0 if law == "n_i" else 450.0) < T
+        assert (spread[counts] > 0.95 * away[counts]).all()
+        # and not without reason: where it is hot they are nearly as far
+        assert away[-1] > 0.75 * spread[-1]
 
 
 @pytest.mark.parametrize("law", DEPARTURES)
@@ -89,7 +134,7 @@ def test_modes_have_nearly_all_of_the_variance_and_published_departures(law):
     columns = np.vstack([modes, np.ones_like(T)]).T
     for row in np.concatenate(departures_of(law)):
         left = row - columns @ np.linalg.lstsq(columns, row, rcond=None)[0]
-        assert np.abs(left).max() < 0.1 * departure.spread(HOT_K)
+        assert np.abs(left).max() < 0.25 * departure.spread(HOT_K)
 
 
 @pytest.mark.parametrize("law", DEPARTURES)

@@ -1,8 +1,9 @@
 """How far nature may be from a material law: a smooth factor exp(δ(T)) of few coefficients.
 
-A law is known to within a departure δ, a Gaussian process in ln T. Its standard deviation is what
-published values of the law differ by, and grows with the temperature, where fewer were measured;
-its correlation length is that of published departures. The process is written by its first
+A law is known to within a departure δ, a Gaussian process in ln T. Its standard deviation is how
+far published values are from the law (the root of their mean square, the law itself being one of
+them), and grows with the temperature, where fewer were measured; its correlation length is that of
+published departures. The process is written by its first
 Karhunen-Loève modes (R. G. Ghanem and P. D. Spanos, Stochastic Finite Elements (1991)), whose
 coefficients are independent and normal with a standard deviation of one: parameters of the material
 like any other. So the error of a law sits in the law, and all that a lever shows stays consistent
@@ -48,8 +49,8 @@ class Departure:
     words : str
         What it is the law of.
     spread_cold, spread_hot : float
-        Standard deviation of δ at 300 K and at 1000 K, linear in T: what published values of the
-        law differ by at least.
+        Standard deviation of δ at 300 K and at 1000 K, linear in T: how far published values are
+        from the law at least.
     source : str
         Where these are from.
 
@@ -152,23 +153,25 @@ DEPARTURES = {
         Departure(
             "n_i",
             "intrinsic carrier density",
-            *(0.21, 0.32),
-            "Eq. 7, Morin and Maita (1954), Putley and Mitchell (1958), Barber (1967), Slotboom "
-            "(1977), Wasserrab (1977), Sproul and Green (1991), Misiakos and Tsamakis (1993)",
+            *(0.17, 0.18),
+            "Eq. 7, Morin and Maita (1954), Putley and Mitchell (1958), Slotboom (1977), Wasserrab "
+            "(1977), Green (1990), Sproul and Green (1991, 1993), Misiakos and Tsamakis (1993), "
+            "Couderc et al. (2014); narrowing by dopants, by half of it",
         ),
         Departure(
             "mobility",
             "mobility of the carriers in low-doped silicon",
-            *(0.06, 0.32),
+            *(0.08, 0.40),
             "Eq. 8, Dorkel and Leturcq (1981), Arora et al. (1982), MINIMOS (1990), measured up to "
-            "500 K",
+            "500 K; Eq. 9 with the lattices of Morin and Maita (1954), Ludwig and Watters (1956), "
+            "Jacoboni et al. (1977)",
         ),
         Departure(
             "legs",
             "conductivity of high-doped silicon",
             *(0.05, 0.10),
-            "bends of 1/σ at 2e20 cm⁻³ from a straight line: Dorkel and Leturcq (1981), Arora et "
-            "al. (1982), MINIMOS (1990); Chapman et al. (1963), measured up to 900 K",
+            "bends of 1/σ at 2e20 cm⁻³ from a straight line up to 600 K, where legs are: Dorkel "
+            "and Leturcq (1981), Arora et al. (1982), MINIMOS (1990); Chapman et al. (1963)",
         ),
     )
 }

@@ -37,7 +37,7 @@ from hotlever.materials.silicon import (
     minimos_mobility,
 )
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.priors import ALL_LAWS, PAPERS, default_priors, updated
+from hotlever.probe.priors import ALL_LAWS, PAPERS, UNCERTAIN, default_priors, updated
 from hotlever.probe.tip import Tip
 from hotlever.text import BAND
 from hotlever.types import Array
@@ -206,8 +206,11 @@ def judge(
     what: str = "iv",
     departures: Collection[str] = ALL,
     noise: float = NOISE,
+    laws: str = UNCERTAIN,
 ) -> xr.Dataset:
     """Simulate the lever of a number, calibrate it, and compare with its true temperature.
+
+    The calibration takes the laws of silicon to be uncertain, or the paper's (`ALL_LAWS`).
 
     Returns
     -------
@@ -231,7 +234,7 @@ def judge(
     tip, stated = off[0], off[0]
     began = time.process_time()
     try:
-        calibration = calibrate(data, probe=nominal)
+        calibration = calibrate(data, probe=nominal, priors={ALL_LAWS: laws})
     except HotleverError as error:
         refused = str(error)
     seconds = time.process_time() - began
