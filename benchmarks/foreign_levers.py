@@ -7,7 +7,8 @@ film      additional thermal resistivity, of which a share of 0 to 1 does not gr
 carriers  0 to 1 of the way from Eq. 7 to what was measured: Morin and Maita and Putley and Mitchell
           (Hall effect), Misiakos and Tsamakis (diodes)
 mobility  0 to 1 of the way from Eqs. 8 to 10 to Arora, Hauser and Roulston
-profile   0 to 5 % of the dopant has diffused up to 1.6 times as far
+profile   0 to 1 of the way from erfc to phosphorus that diffuses by vacancies, as a front, and 0 to
+          5 % of the dopant has diffused up to 1.6 times as far
 legs      resistivity bent by up to 20 % at 1000 K, either way
 chip      ends of the legs warm up by 0 to 4 K/mW of the lever's power
 
@@ -24,7 +25,7 @@ conductivity is off by 3 %. Of each `hotlever calibrate` is asked, as a user wou
 
 Sources: Asheghi et al., J. Appl. Phys. 91, 5079 (2002) and Liu and Asheghi, J. Heat Transfer 128,
 75 (2006) for films; Arora et al., IEEE Trans. Electron Devices 29, 292 (1982); Chapman et al., J.
-Appl. Phys. 34, 3291 (1963) for legs; those of carriers stand in the solver.
+Appl. Phys. 34, 3291 (1963) for legs; those of carriers and phosphorus stand in the solver.
 
     python benchmarks/foreign_levers.py [LEVERS]          14 if left out; all departures together
         [--families all|each|none|film,legs,...] [--kinds current,reader,spectra]
@@ -63,7 +64,13 @@ from problems import table
 FAMILIES = ("film", "carriers", "mobility", "profile", "legs", "chip")
 CARRIERS = ("Morin and Maita", "Misiakos and Tsamakis", "Putley and Mitchell")
 #: The law that departs in each, as priors name it.
-LAW_OF = {"film": "kappa", "carriers": "n_i", "mobility": "mobility", "legs": "legs"}
+LAW_OF = {
+    "film": "kappa",
+    "carriers": "n_i",
+    "mobility": "mobility",
+    "legs": "legs",
+    "profile": "profile",
+}
 KINDS, MEDIA = ("current", "reader", "spectra"), ("vacuum", "air")
 #: What the owner believes to have.
 NOMINAL: dict[str, dict[str, float]] = {
@@ -141,7 +148,11 @@ def foreign_lever(number: int, family: str, medium: str, fineness: float = 1.0) 
             "carriers_share": rng.uniform(0.0, 1.0),
         },
         "mobility": {"arora_share": rng.uniform(0.0, 1.0)},
-        "profile": {"tail_share": rng.uniform(0.0, 0.05), "tail_length": rng.uniform(1.0, 1.6)},
+        "profile": {
+            "tail_share": rng.uniform(0.0, 0.05),
+            "tail_length": rng.uniform(1.0, 1.6),
+            "front_share": rng.uniform(0.0, 1.0),
+        },
         "legs": {"legs_bend": rng.uniform(-0.2, 0.2)},
     }
     chip = float(rng.uniform(0.0, 4.0))

@@ -15,11 +15,12 @@ Units: µm, K, V, mA, mW, kΩ; carriers per cm³, mobilities in cm²/(V s), as t
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.linalg import solve_banded
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import LinearOperator, gmres, splu
 from scipy.special import erfc
@@ -28,6 +29,8 @@ PER_CM = 0.1  # 1 S/cm = 0.1 mA/(V µm) and 1 W/(cm K) = 0.1 mW/(µm K)
 BOLTZMANN_EV = 8.617333262e-5
 CHARGE_C = 1.6e-19
 N_HD = 2.2e20
+#: Diffusion length (µm) of published levers, of which the profile of `phosphorus` is taken to be.
+USUAL_DELTA = 0.647
 
 # --- laws --------------------------------------------------------------------------------------
 
@@ -49,6 +52,9 @@ class Laws:
         How far, by the logarithm: 0 is Eq. 7, 1 the other law.
     arora_share : float
         The same of the mobilities, from Eqs. 8 to 10 to those of Arora et al.
+    front_share : float
+        How far the dopant departs from erfc, by the logarithm: 1 is phosphorus that diffuses by
+        vacancies, faster where there is more of it (`phosphorus`).
     tail_share, tail_length : float
         Of the dopant, the share that has diffused farther, and how much farther.
     legs_bend : float
@@ -66,6 +72,7 @@ class Laws:
     carriers: str = "Misiakos and Tsamakis"
     carriers_share: float = 0.0
     arora_share: float = 0.0
+    front_share: float = 0.0
     tail_share: float = 0.0
     tail_length: float = 1.0
     legs_bend: float = 0.0
@@ -88,7 +95,12 @@ class Laws:
         share = 0.0
         for distance in distances:
             near, far = distance / self.delta, distance / (self.delta * self.tail_length)
-            share = share + 0.5 * ((1.0 - self.tail_share) * erfc(near))
+            first = 0.5 * erfc(near)
+            if self.front_share:
+                depth, diffused = phosphorus()
+                front = np.exp(np.interp(near, depth / USUAL_DELTA, np.log(diffused)))
+                first = first ** (1.0 - self.front_share) * front**self.front_share
+            share = share + (1.0 - self.tail_share) * first
             share = share + 0.5 * self.tail_share * erfc(far)
         return self.n_d + (N_HD - self.n_d) * np.minimum(share, 1.0)
 
@@ -110,6 +122,36 @@ class Laws:
         if not self.arora_share:
             return paper
         return paper * (arora(T, n, is_hole) / paper) ** self.arora_share
+
+
+@cache
+def phosphorus():
+    """Return depths (µm) and shares of the dopant beyond a border at 0, after 30 min at 1150 °C.
+
+    R. B. Fair and J. C. C. Tsai, J. Electrochem. Soc. 124, 1107 (1977): vacancies of no, one and
+    two charges, and the field of the dopant. Implicit steps, each with the diffusivity before it.
+    """
+    kT = BOLTZMANN_EV * 1423.15
+    neutral, single, double = (
+        factor * np.exp(-energy / kT)
+        for factor, energy in ((3.85, 3.66), (4.44, 4.0), (44.2, 4.37))
+    )
+    n_i = 3.87e16 * 1423.15**1.5 * np.exp(-0.605 / kT)
+    depth = np.linspace(-8.0, 6.0, 1401)
+    size, steps = 1e-4 * (depth[1] - depth[0]), 900
+    share = np.where(depth < 0.0, 1.0, 0.0)
+    for _ in range(steps):
+        n = 5e17 + N_HD * (share[1:] + share[:-1]) / 2.0
+        root = np.hypot(n, 2.0 * n_i)
+        electrons = (n + root) / (2.0 * n_i)
+        moved = (1.0 + n / root) * (neutral + single * electrons + double * electrons**2)
+        moved = moved * (1800.0 / steps) / size**2
+        bands = np.zeros((3, depth.size))
+        bands[0, 1:], bands[2, :-1] = -moved, -moved
+        bands[1, 1:-1] = 1.0 + moved[1:] + moved[:-1]
+        bands[1, [0, -1]] = 1.0 + moved[[0, -1]]
+        share = solve_banded((1, 1), bands, share)
+    return depth, np.maximum(share, 1e-12)
 
 
 def bulk_resistivity(T):

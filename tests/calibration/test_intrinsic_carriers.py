@@ -9,7 +9,7 @@ import pytest
 
 from hotlever.estimate.procedure import calibrate
 from hotlever.lever import Lever
-from hotlever.materials.departures import DEPARTURES
+from hotlever.materials.departures import FACTORS
 from hotlever.materials.silicon import intrinsic_density
 from hotlever.probe import Probe
 from synthetic_curves import measured_curve, measurement_of
@@ -63,7 +63,7 @@ def test_tip_temperatures_bring_them_up_to_date():
     assert abs(error) < 2.0 * stated
     # most of it is the thermometer's scale, 1.5 % of the rise
     assert stated < 9.0
-    law = DEPARTURES["n_i"]
+    law = FACTORS["n_i"]
     uses = [calibration.priors[name] for name in law.names]
     departed = np.array([use.posterior_value for use in uses]) @ law.modes(AT_K)
     assert departed == pytest.approx(np.log(SCALE), abs=0.5 * law.spread(AT_K))

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+from scipy.sparse import diags_array
 
-from hotlever.materials.departures import DEPARTURES, HOT_K, MODES_FROM, MODES_TO
+from hotlever.materials.departures import FACTORS, HOT_K, MODES_FROM, MODES_TO, PROFILE
+from hotlever.materials.doping import tapered_doping
 from hotlever.materials.heat import thermal_conductivity, thermal_conductivity_of_layer
 from hotlever.materials.silicon import (
     BOLTZMANN,
@@ -14,6 +18,7 @@ from hotlever.materials.silicon import (
     minimos_mobility,
     mobility,
 )
+from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S, PUBLISHED_VALUES
 
 T = np.linspace(MODES_FROM, MODES_TO, 51)
 #: Dopings of heaters (cm⁻³), and that of legs.
@@ -107,9 +112,9 @@ def departures_of(law):
     return [np.log(np.stack([T / T, *(lines / resistivity)]))]
 
 
-@pytest.mark.parametrize("law", DEPARTURES)
+@pytest.mark.parametrize("law", FACTORS)
 def test_a_law_is_known_no_better_than_published_formulas_are_near_it(law):
-    spread = DEPARTURES[law].spread(T)
+    spread = FACTORS[law].spread(T)
     for logarithms in departures_of(law):
         squares = np.mean(logarithms**2, axis=0)
         if law == "n_i":
@@ -123,9 +128,9 @@ def test_a_law_is_known_no_better_than_published_formulas_are_near_it(law):
         assert away[-1] > 0.75 * spread[-1]
 
 
-@pytest.mark.parametrize("law", DEPARTURES)
+@pytest.mark.parametrize("law", FACTORS)
 def test_modes_have_nearly_all_of_the_variance_and_published_departures(law):
-    departure = DEPARTURES[law]
+    departure = FACTORS[law]
     modes = departure.modes(T)
     assert departure.variance_left < 0.005
     kept = np.sqrt((modes**2).sum(axis=0))
@@ -137,16 +142,70 @@ def test_modes_have_nearly_all_of_the_variance_and_published_departures(law):
         assert np.abs(left).max() < 0.25 * departure.spread(HOT_K)
 
 
-@pytest.mark.parametrize("law", DEPARTURES)
+@pytest.mark.parametrize("law", FACTORS)
 def test_coefficients_of_unit_size_make_the_spread(law):
-    departure, rng = DEPARTURES[law], np.random.default_rng(1)
+    departure, rng = FACTORS[law], np.random.default_rng(1)
     drawn = [np.log(departure.departed(T, rng.normal(size=3))[0]) for _ in range(4000)]
     assert np.std(drawn, axis=0) == pytest.approx(departure.spread(T), rel=0.08)
 
 
 def test_a_law_stays_what_it_is_at_the_ends_of_the_formulas_beyond_them():
-    departure = DEPARTURES["mobility"]
+    departure = FACTORS["mobility"]
     factor, slope = departure.departed(np.array([50.0, 200.0, 1700.0, 1e5]), (1.0, -1.0, 2.0))
     assert factor[0] == factor[1]
     assert factor[2] == factor[3]
     assert slope[[0, 3]].tolist() == [0.0, 0.0]
+
+
+#: Of heaters and of what borders them (cm⁻³).
+HEATER, BORDER = 5.75e17, LEGS
+
+
+def diffused_phosphorus(kelvin, seconds):
+    """Depth (µm) and phosphorus (cm⁻³) of a step at 0 after annealing.
+
+    Diffusivity by vacancies of three charges and the field of the dopant: R. B. Fair and J. C. C.
+    Tsai, J. Electrochem. Soc. 124, 1107 (1977).
+    """
+    kT = BOLTZMANN * kelvin
+    factors, energies = np.array([3.85, 4.44, 44.2]), np.array([3.66, 4.00, 4.37])
+    neutral, single, double = factors * np.exp(-energies / kT)
+    n_i = np.sqrt(1.5e33) * kelvin**1.5 * np.exp(-1.21 / (2.0 * kT))
+    x = np.linspace(-5.0, 3.5, 601)
+    step = 1e-4 * (x[1] - x[0])
+
+    def rate(_, n):
+        between = 0.5 * (n[1:] + n[:-1])
+        root = np.sqrt(between**2 + 4.0 * n_i**2)
+        carriers = 0.5 * (between + root) / n_i
+        by_field = 1.0 + between / root
+        D = by_field * (neutral + single * carriers + double * carriers**2)
+        flux = D * np.diff(n) / step
+        return np.concatenate([[0.0], np.diff(flux) / step, [0.0]])
+
+    start = np.where(x < 0.0, BORDER, HEATER)
+    pattern = diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, 1], shape=(x.size, x.size))
+    solution = solve_ivp(
+        rate, (0.0, seconds), start, "BDF", [seconds], jac_sparsity=pattern, rtol=1e-5, atol=1e14
+    )
+    return x, solution.y[:, -1]
+
+
+def test_a_front_of_phosphorus_is_what_the_profile_departs_by():
+    x, n = diffused_phosphorus(ANNEALING_K, ANNEALING_S)
+    # what is higher doped adds nothing to the heater's resistance
+    there = (n < 50.0 * HEATER) & (n > 1.2 * HEATER)
+
+    def off(delta, front):
+        profile = tapered_doping(x[None, there], HEATER, delta, n_hd=BORDER, front=front)[0]
+        return np.log(profile / n[there])
+
+    # a front and a steeper tail are what it is
+    both = least_squares(lambda both: off(*both), [0.6, 0.0])
+    plain = least_squares(lambda delta: off(delta[0], 0.0), [0.6])
+    assert np.std(both.fun) < 0.1 * np.std(plain.fun)
+    # levers tell Δ, and what erfc of that length leaves out is the front
+    length = PUBLISHED_VALUES["option III"]["delta"]
+    [front] = least_squares(lambda front: off(length, front[0]), [0.5]).x
+    away = np.sqrt(np.mean([0.0, front**2]))
+    assert 0.95 * away < PROFILE.spread_hot < 1.1 * away

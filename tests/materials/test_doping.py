@@ -32,7 +32,7 @@ def test_between_parallel_borders_it_is_the_papers_equation(x):
     "distances", [(4.5, -0.5), (0.7, 3.3), (2.0, 2.0), (1.0, 1.5, 0.4), (1.2,)]
 )
 def test_partial_derivatives_are_exact(distances):
-    at = {"n_d": 5.75e17, "delta": 0.647, "n_hd": N_HD}
+    at = {"n_d": 5.75e17, "delta": 0.647, "n_hd": N_HD, "front": 0.4}
     _, partials = tapered_doping(distances, **at)
     assert set(partials) == {*at, "distances"}
     for name, number in at.items():
@@ -55,6 +55,12 @@ def test_where_many_borders_are_near_it_is_high_doped():
     n, partials = tapered_doping([0.01, 0.01, 0.01], 5e17, 0.65, n_hd=N_HD)
     assert n == N_HD
     assert not np.any(partials["distances"])
+
+
+def test_a_front_is_a_shift_by_diffusion_lengths():
+    moved, _ = tapered_doping([1.5, 2.0], 5e17, 0.6, n_hd=N_HD, front=0.5)
+    plain, _ = tapered_doping([1.2, 1.7], 5e17, 0.6, n_hd=N_HD)
+    assert moved == pytest.approx(plain, rel=1e-12)
 
 
 @given(st.floats(-10, 10), st.floats(1e16, 1e19), st.floats(0.05, 2))

@@ -277,7 +277,8 @@ def heater_profile(state: State, count: int = 161) -> xr.Dataset:
     position = np.linspace(-0.5, 0.5, count) * taper.length_um * (1 - 1e-9)
     points = np.reshape(taper.centre, (2, 1)) + np.outer(taper.axis, position)
     T = lever.space.elements.interpolation(points.T)[0] @ state.nodal[0]
-    n, _ = tapered_doping(taper.distances(points), silicon.n_d, silicon.delta, n_hd=beside.n_hd)
+    away, n_d, delta = taper.distances(points), silicon.n_d, silicon.delta
+    n, _ = tapered_doping(away, n_d, delta, n_hd=beside.n_hd, front=silicon.front)
     sigma, sigma_by = silicon.electrical_conductivity(T, n)
     columns = {
         "temperature": T,

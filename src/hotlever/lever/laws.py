@@ -18,7 +18,7 @@ from hotlever.lever.space import Space
 from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind, full_name
 from hotlever.materials.air import thermal_conductivity_of_air
-from hotlever.materials.departures import departure_of
+from hotlever.materials.departures import PROFILE, SmoothFactor, departure_of
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.materials.laws import Evaluated
@@ -61,10 +61,10 @@ class FilmLaws:
     ) -> None:
         self.film, self.kind, self.carrier = film, materials[film.material], carrier
         self.own = names_in_laws(film.material, self.kind)
-        self.departures = {
-            name: departing
+        self.factors = {
+            name: (departing[0], departing[1])
             for name, own in self.own.items()
-            if (departing := departure_of(own)) is not None
+            if (departing := departure_of(own)) and isinstance(departing[0], SmoothFactor)
         }
         self.thickening = {
             name: motion.thickening_um[number]
@@ -82,8 +82,12 @@ class FilmLaws:
         # what diffusion from another material leaves; a layout has no other tapers
         n_d, delta, beside = self.kind.n_d, self.kind.delta, materials[source]
         assert isinstance(beside, HighDopedSilicon)
-        self.doping, by = tapered_doping(film.distances, n_d, delta, n_hd=beside.n_hd)
-        owners = {"n_d": film.material, "delta": film.material, "n_hd": source}
+        self.doping, by = tapered_doping(
+            film.distances, n_d, delta, n_hd=beside.n_hd, front=self.kind.front
+        )
+        [coefficient] = PROFILE.names
+        by[coefficient] = PROFILE.spread_hot * by["front"]
+        owners = dict.fromkeys(("n_d", "delta", coefficient), film.material) | {"n_hd": source}
         self.doping_by = {full_name(owner, own): by[own] for own, owner in owners.items()} | {
             name: (by["distances"] * motion.distances[number]).sum(axis=0)
             for name, motion in motions.items()
@@ -98,8 +102,8 @@ class FilmLaws:
         """
         film, kind, T = self.film, self.kind, T[self.film.points]
         modes = {
-            name: (departure.law, departure.modes(T)[number])
-            for name, (departure, number) in self.departures.items()
+            name: (factor.law, factor.modes(T)[number])
+            for name, (factor, number) in self.factors.items()
             if name in by
         }
         sheet = PER_CM_TO_MILLI_PER_UM * film.counted_um

@@ -1,4 +1,6 @@
-"""How far nature may be from a material law: a smooth factor exp(δ(T)) of few coefficients.
+"""How far nature may be from a material law: departures of few coefficients.
+
+Most are a smooth factor exp(δ(T)) of a law of the temperature; that of the doping profile moves it.
 
 A law is known to within a departure δ, a Gaussian process in ln T. Its standard deviation is how
 far published values are from the law (the root of their mean square, the law itself being one of
@@ -40,7 +42,7 @@ _POINTS, _DEGREE = 40, 14
 
 @dataclass(frozen=True)
 class Departure:
-    """The departure of one law.
+    """The departure of one law, by coefficients of which 0 is the law.
 
     Attributes
     ----------
@@ -48,29 +50,45 @@ class Departure:
         Its name in ``[prior]``, after ``law.``, and of the coefficients, before ``_1``.
     words : str
         What it is the law of.
-    spread_cold, spread_hot : float
-        Standard deviation of δ at 300 K and at 1000 K, linear in T: how far published values are
-        from the law at least.
+    spread_hot : float
+        Its standard deviation, at 1000 K if it depends on the temperature: how far published
+        values are from the law at least.
     source : str
-        Where these are from.
-
-    Examples
-    --------
-    >>> kappa = DEPARTURES["kappa"]
-    >>> kappa.names, kappa.variance_left < 0.01
-    (('kappa_1', 'kappa_2', 'kappa_3'), True)
+        Where that is from.
+    count : int
+        Of coefficients, each with a standard deviation of one.
     """
 
     law: str
     words: str
-    spread_cold: float
     spread_hot: float
     source: str
+    count: int = 1
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of its coefficients."""
-        return tuple(f"{self.law}_{number + 1}" for number in range(MODES))
+        return tuple(f"{self.law}_{number + 1}" for number in range(self.count))
+
+
+@dataclass(frozen=True)
+class SmoothFactor(Departure):
+    """A factor exp(δ(T)) of a law, δ by its modes.
+
+    Attributes
+    ----------
+    spread_cold : float
+        Standard deviation of δ at 300 K, from where it is linear in T.
+
+    Examples
+    --------
+    >>> kappa = FACTORS["kappa"]
+    >>> kappa.names, kappa.variance_left < 0.01
+    (('kappa_1', 'kappa_2', 'kappa_3'), True)
+    """
+
+    spread_cold: float = 0.0
+    count: int = MODES
 
     def spread(self, T: ArrayLike) -> Array:
         """Return the standard deviation of δ at temperatures (K)."""
@@ -140,41 +158,56 @@ def _correlation(x: Array, y: Array) -> Array:
 
 #: By the name of the law. The numbers are those of published formulas, and a test holds them
 #: (tests/materials/test_departures.py).
-DEPARTURES = {
-    departure.law: departure
-    for departure in (
-        Departure(
+FACTORS = {
+    factor.law: factor
+    for factor in (
+        SmoothFactor(
             "kappa",
             "thermal conductivity of silicon",
-            *(0.07, 0.18),
-            "films of 0.4 µm between c_κ κ_Si(T) and the scattering at surfaces of Fuchs and "
-            "Sondheimer; bulk silicon to 5 %",
+            spread_cold=0.07,
+            spread_hot=0.18,
+            source="films of 0.4 µm between c_κ κ_Si(T) and the scattering at surfaces of Fuchs "
+            "and Sondheimer; bulk silicon to 5 %",
         ),
-        Departure(
+        SmoothFactor(
             "n_i",
             "intrinsic carrier density",
-            *(0.17, 0.18),
-            "Eq. 7, Morin and Maita (1954), Putley and Mitchell (1958), Slotboom (1977), Wasserrab "
-            "(1977), Green (1990), Sproul and Green (1991, 1993), Misiakos and Tsamakis (1993), "
-            "Couderc et al. (2014); narrowing by dopants, by half of it",
+            spread_cold=0.17,
+            spread_hot=0.18,
+            source="Eq. 7, Morin and Maita (1954), Putley and Mitchell (1958), Slotboom (1977), "
+            "Wasserrab (1977), Green (1990), Sproul and Green (1991, 1993), Misiakos and Tsamakis "
+            "(1993), Couderc et al. (2014); narrowing by dopants, by half of it",
         ),
-        Departure(
+        SmoothFactor(
             "mobility",
             "mobility of the carriers in low-doped silicon",
-            *(0.08, 0.40),
-            "Eq. 8, Dorkel and Leturcq (1981), Arora et al. (1982), MINIMOS (1990), measured up to "
-            "500 K; Eq. 9 with the lattices of Morin and Maita (1954), Ludwig and Watters (1956), "
-            "Jacoboni et al. (1977)",
+            spread_cold=0.08,
+            spread_hot=0.40,
+            source="Eq. 8, Dorkel and Leturcq (1981), Arora et al. (1982), MINIMOS (1990), "
+            "measured up to 500 K; Eq. 9 with the lattices of Morin and Maita (1954), Ludwig and "
+            "Watters (1956), Jacoboni et al. (1977)",
         ),
-        Departure(
+        SmoothFactor(
             "legs",
             "conductivity of high-doped silicon",
-            *(0.05, 0.10),
-            "bends of 1/σ at 2e20 cm⁻³ from a straight line up to 600 K, where legs are: Dorkel "
-            "and Leturcq (1981), Arora et al. (1982), MINIMOS (1990); Chapman et al. (1963)",
+            spread_cold=0.05,
+            spread_hot=0.10,
+            source="bends of 1/σ at 2e20 cm⁻³ from a straight line up to 600 K, where legs are: "
+            "Dorkel and Leturcq (1981), Arora et al. (1982), MINIMOS (1990); Chapman et al. (1963)",
         ),
     )
 }
+#: How far the front of the dopant has moved into a heater, over the diffusion length: its own
+#: diffusion is faster where there is much of it, so that it comes as a front.
+PROFILE = Departure(
+    "profile",
+    "doping profile",
+    spread_hot=0.5,
+    source="erfc, and phosphorus that diffuses from 2.2e20 cm⁻³ at 1150 °C by vacancies, where Δ "
+    "is that of published levers: Fair and Tsai, J. Electrochem. Soc. 124, 1107 (1977)",
+)
+#: All of them.
+DEPARTURES: dict[str, Departure] = {**FACTORS, PROFILE.law: PROFILE}
 
 
 def departure_of(name: str) -> tuple[Departure, int] | None:

@@ -16,13 +16,16 @@ from hotlever.types import Array
 _FACTOR, _ACTIVATION = 10.5, 85000.0 / 1.98720
 
 
-def tapered_doping(distances: ArrayLike, n_d: float, delta: float, *, n_hd: float) -> Evaluated:
+def tapered_doping(
+    distances: ArrayLike, n_d: float, delta: float, *, n_hd: float, front: float = 0.0
+) -> Evaluated:
     """Doping concentration (cm⁻³, from `n_d` to `n_hd`) after diffusion from a heater's borders.
 
     Every border with high-doped silicon adds its share ½ erfc(d/Δ) at the distance d. Between two
     parallel borders, at d = l_h/2 − x and l_h/2 + x, this is the paper's unnumbered equation
-    between Eqs. 4 and 5: a step profile smoothed by 1-D diffusion over the length Δ. The partial
-    derivatives are by ``n_d``, ``delta``, ``n_hd`` and, for each border, ``distances``.
+    between Eqs. 4 and 5: a step profile smoothed by 1-D diffusion over the length Δ. A dopant that
+    diffuses faster where there is more of it comes as a front, ½ erfc(d/Δ − f). The partial
+    derivatives are by ``n_d``, ``delta``, ``n_hd``, ``front`` and, for each border, ``distances``.
 
     Parameters
     ----------
@@ -32,6 +35,8 @@ def tapered_doping(distances: ArrayLike, n_d: float, delta: float, *, n_hd: floa
         Doping concentration of the undiffused heater and of the high-doped silicon (cm⁻³).
     delta : float
         Diffusion length Δ = 2 √(D t_a) (µm).
+    front : float
+        How far the front has moved from a border into the heater, over Δ; 0 in the paper.
 
     Notes
     -----
@@ -49,15 +54,17 @@ def tapered_doping(distances: ArrayLike, n_d: float, delta: float, *, n_hd: floa
     # takes longer to import than all laws, which are looked up without being used
     from scipy.special import erfc
 
-    ratio = np.asarray(distances, dtype=float) / delta
+    away = np.asarray(distances, dtype=float) / delta
+    ratio = away - front
     share = 0.5 * erfc(ratio).sum(axis=0)
     full = share >= 1.0
     bell = np.where(full, 0.0, (n_hd - n_d) / (np.sqrt(np.pi) * delta) * np.exp(-(ratio**2)))
     share = np.minimum(share, 1.0)
     return n_d + (n_hd - n_d) * share, {
         "n_d": 1.0 - share,
-        "delta": (bell * ratio).sum(axis=0),
+        "delta": (bell * away).sum(axis=0),
         "n_hd": share,
+        "front": delta * bell.sum(axis=0),
         "distances": -bell,
     }
 

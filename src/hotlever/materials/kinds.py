@@ -12,7 +12,7 @@ number for a property, a section may state a law: a table or a formula, see
 
 Laws of silicon may depart from their formulas (`hotlever.materials.departures`). With the name of
 the law as its key a property has its derivative by δ at each place, which the modes make one by the
-coefficients.
+coefficients. The profile of the dopant departs where the doping is made.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from hotlever.errors import InputError
-from hotlever.materials.departures import DEPARTURES
+from hotlever.materials.departures import FACTORS, PROFILE
 from hotlever.materials.films import (
     constant_conductivity,
     dielectric_conductivity,
@@ -113,14 +113,14 @@ class Silicon(Kind):
         value, by = evaluated
         coefficients = self._coefficients(law)
         if any(coefficients):
-            factor, slope = DEPARTURES[law].departed(T, coefficients)
+            factor, slope = FACTORS[law].departed(T, coefficients)
             value = factor * value
             by = {name: factor * partial for name, partial in by.items()}
             by["T"] = by["T"] + value * slope
         return value, {**by, law: value}
 
     def _coefficients(self, law: str) -> tuple[float, ...]:
-        return tuple(getattr(self, name) for name in DEPARTURES[law].names)
+        return tuple(getattr(self, name) for name in FACTORS[law].names)
 
     def enthalpy(self, T: Array) -> Evaluated:
         """Return the heat held (J cm⁻³), see `Kind.enthalpy`."""
@@ -149,6 +149,12 @@ class LowDopedSilicon(Silicon):
     mobility_1: float = field_of(OF_SILICON["mobility_1"])
     mobility_2: float = field_of(OF_SILICON["mobility_2"])
     mobility_3: float = field_of(OF_SILICON["mobility_3"])
+    profile_1: float = field_of(OF_SILICON["profile_1"])
+
+    @property
+    def front(self) -> float:
+        """How far the dopant's front has moved from a border into the heater, over Δ."""
+        return PROFILE.spread_hot * self.profile_1
 
     @property
     def of_carriers(self) -> dict[str, float]:
@@ -177,7 +183,7 @@ class LowDopedSilicon(Silicon):
         """Return a law of the carriers as far as their density and mobility depart."""
         coefficients, scale, slope = self._coefficients("n_i"), intrinsic_scale, None
         if any(coefficients):
-            factor, slope = DEPARTURES["n_i"].departed(T, coefficients)
+            factor, slope = FACTORS["n_i"].departed(T, coefficients)
             scale = intrinsic_scale * factor
         value, by = law(T, n, intrinsic_scale=scale, **others)
         # δ moves the logarithm of what the scale moves
