@@ -32,8 +32,10 @@ Appl. Phys. 34, 3291 (1963) for legs; those of carriers and phosphorus stand in 
         [--media vacuum,air] [--first K] [--options '--laws paper'] [--processes N]
         [--told]                beside estimates told that no other law departs
         [--fineness 0.5]        coarser elements, at a third of the price; --check prints the error
+        [--coarse]              calibrations on coarse meshes, in this process, at two thirds of it
         [--results FILE]        append a line for each, and go on with those that are not there
     python benchmarks/foreign_levers.py --check           levers without departures, beside hotlever
+    python benchmarks/foreign_levers.py --paper           the paper's lever, beside its Eq. 12
     python benchmarks/foreign_levers.py --write DIR ...   data and probe files instead
 """
 
@@ -54,6 +56,7 @@ from itertools import pairwise, product
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from scipy.special import ndtri
@@ -222,16 +225,57 @@ def owners_probe(shape: str, medium: str) -> str:
     )
 
 
-def judge(levers: list[Task], options: list[str], fineness: float) -> list[dict[str, Any]]:
+def judge(
+    levers: list[Task], options: list[str], fineness: float, coarse: bool
+) -> list[dict[str, Any]]:
     """Solve the lever that some tasks share, calibrate it by each, and compare with the truth."""
     number, family, medium = levers[0].number, levers[0].family, levers[0].medium
     lever = foreign_lever(number, family, medium, fineness)
     hottest = np.random.default_rng((number, 2)).uniform(*ENDS_K)
     sweep = lever.sweep(hottest, HIGHEST_V[medium])
-    return [judged(task, lever, sweep, options) for task in levers]
+    return [judged(task, lever, sweep, options, coarse) for task in levers]
 
 
-def judged(task: Task, lever: Lever, sweep: Sweep, options: list[str]) -> dict[str, Any]:
+def by_command(folder: Path, options: list[str]) -> tuple[dict[str, Any] | None, str]:
+    """Return the calibration of a folder's files, or why there is none."""
+    words = ["calibrate", "iv.csv", "--probe", "probe.toml", "-o", "out.json", *options]
+    command = [sys.executable, "-m", "hotlever", *words]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    if done.returncode and not Path(folder, "out.json").exists():
+        return None, done.stderr.strip().rpartition("\n")[2]
+    return json.loads(Path(folder, "out.json").read_text()), ""
+
+
+def here_on_coarse_meshes(folder: Path, options: list[str]) -> tuple[dict[str, Any] | None, str]:
+    """Return the same of levers on coarse meshes, without a process of its own."""
+    from hotlever import Lever as OurLever
+    from hotlever.errors import HotleverError
+    from hotlever.estimate.procedure import calibrate
+    from hotlever.lever.lever import COARSE
+
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--prior", action="append", default=[])
+    parser.add_argument("--laws", default=[], type=lambda text: [f"laws={text}"])
+    told = parser.parse_args(options)
+    priors = dict(text.split("=") for text in told.prior) | (
+        {"laws": told.laws} if told.laws else {}
+    )
+    plain = OurLever.__init__
+
+    def on_coarse_mesh(self: Any, probe: Any, mesh: Any = None, **others: Any) -> None:
+        plain(self, probe, mesh or COARSE, **others)
+
+    with patch.object(OurLever, "__init__", on_coarse_mesh):
+        try:
+            found = calibrate(folder / "iv.csv", probe=folder / "probe.toml", priors=priors or None)
+        except HotleverError as error:
+            return None, str(error)
+    return json.loads(found.to_json()), ""
+
+
+def judged(
+    task: Task, lever: Lever, sweep: Sweep, options: list[str], coarse: bool
+) -> dict[str, Any]:
     """Calibrate a lever that is solved; return what can be written as JSON.
 
     By range of the true temperature: ``inside``, the share of rows in the band, and mean squares of
@@ -243,16 +287,11 @@ def judged(task: Task, lever: Lever, sweep: Sweep, options: list[str]) -> dict[s
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "iv.csv").write_text(text)
         Path(folder, "probe.toml").write_text(owners_probe(lever.shape, task.medium))
-        words = ["calibrate", "iv.csv", "--probe", "probe.toml", "-o", "out.json"]
-        words += [*task.options, *options]
-        done = subprocess.run(
-            [sys.executable, "-m", "hotlever", *words], cwd=folder, capture_output=True, text=True
-        )
+        calibrated = here_on_coarse_meshes if coarse else by_command
+        found, reason = calibrated(Path(folder), [*task.options, *options])
         record["seconds"] = round(time.perf_counter() - began, 1)
-        if done.returncode:
-            reason = done.stderr.strip().rpartition("\n")[2]
+        if found is None:
             return record | {"outcome": "refused", "reason": reason}
-        found = json.loads(Path(folder, "out.json").read_text())
     outcomes = {True: "described", False: "not described", None: "not converged"}
     record |= {"outcome": outcomes[found["describes_data"]], "reason": found["reason"]}
     rows = [r for r in found["table"] if r["tip_K"] is not None and r["tip_low_K"] is not None]
@@ -357,6 +396,44 @@ def check(fineness: float) -> None:
     table(heads, rows)
 
 
+def the_papers(options: list[str]) -> None:
+    """Print what calibrations say of the paper's lever, beside its measured law, Eq. 12.
+
+    Its current and reader's voltage are those that the parameters of option II describe.
+    """
+    from hotlever import Lever as OurLever
+    from hotlever import Probe
+    from hotlever.estimate.power_law import EQ12
+    from hotlever.spieser2017 import POWER_LAW_SPREAD_K, PUBLISHED_VALUES
+
+    lever = OurLever(Probe.reference().with_(**PUBLISHED_VALUES["option II"]))
+    ramp = lever.sweep(np.linspace(0.1, 11.0, 110))
+    end = np.interp(4.2, ramp.power_mW.values, ramp.bias.values)
+    shown = lever.sweep(np.linspace(end / ROWS, end, ROWS))
+    columns = (shown[name].values for name in ("bias", "current_mA", "reader_V"))
+    lines = [",".join(f"{cell:.7g}" for cell in row) for row in zip(*columns, strict=True)]
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "iv.csv").write_text("\n".join(["V_b (V),I_h (mA),V_r (V)", *lines]))
+        words = ["calibrate", "iv.csv", "-o", "out.json", *options]
+        subprocess.run([sys.executable, "-m", "hotlever", *words], cwd=folder, check=False)
+        table_ = json.loads(Path(folder, "out.json").read_text())["table"]
+    power, tip, low, high = (
+        np.array([row[name] for row in table_], dtype=float)
+        for name in ("power_mW", "tip_K", "tip_low_K", "tip_high_K")
+    )
+    for mW in (1.0, 2.0, 3.0, 4.0):
+        T, down, up = (float(np.interp(mW, power, each)) for each in (tip, low, high))
+        law = float(EQ12.tip_temperature(mW))
+        stated = (T - down if law < T else up - T) / BAND
+        own = np.hypot(stated, POWER_LAW_SPREAD_K)
+        rows.append(
+            [f"{mW:g}", f"{law:.0f}", f"{T:.0f}", f"{stated:.0f}", f"{(T - law) / own:+.1f}"]
+        )
+    heads = ["P_l (mW)", "Eq. 12 (K)", "calibrated (K)", "stated (K)"]
+    table([*heads, f"off, in stated and ± {POWER_LAW_SPREAD_K:g} K"], rows)
+
+
 def of_record(record: dict[str, Any]) -> tuple[Any, ...]:
     """Return the fields of the task that a record is of."""
     return tuple(record[name] for name in Task.__dataclass_fields__)
@@ -372,13 +449,17 @@ def main() -> None:
     parser.add_argument("--options", default="", help="more words for hotlever calibrate")
     parser.add_argument("--fineness", type=float, default=1.0)
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--coarse", action="store_true")
     parser.add_argument("--told", action="store_true")
     parser.add_argument("--results", type=Path)
     parser.add_argument("--write", type=Path, metavar="DIR")
     parser.add_argument("--check", action="store_true")
+    parser.add_argument("--paper", action="store_true")
     told = parser.parse_args()
     if told.check:
         return check(told.fineness)
+    if told.paper:
+        return the_papers(shlex.split(told.options))
     families = FAMILIES if told.families == "each" else told.families.split(",")
     tasks = [
         Task(number, family, medium, kind, knows)
@@ -400,7 +481,8 @@ def main() -> None:
     if told.write:
         return write(told.write, list(groups.values()))
     with ProcessPoolExecutor(told.processes, get_context("spawn")) as pool:
-        judged_so = partial(judge, options=shlex.split(told.options), fineness=told.fineness)
+        how = {"fineness": told.fineness, "coarse": told.coarse}
+        judged_so = partial(judge, options=shlex.split(told.options), **how)
         for found in pool.map(judged_so, groups.values()):
             records += found
             for record in found:

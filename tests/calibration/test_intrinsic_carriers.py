@@ -67,4 +67,4 @@ def test_tip_temperatures_bring_them_up_to_date():
     uses = [calibration.priors[name] for name in law.names]
     departed = np.array([use.posterior_value for use in uses]) @ law.modes(AT_K)
     assert departed == pytest.approx(np.log(SCALE), abs=0.5 * law.spread(AT_K))
-    assert uses[0].spread_ratio < 0.7
+    assert uses[0].spread_ratio < 0.8
