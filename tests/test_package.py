@@ -34,7 +34,7 @@ PACKAGES = {f"hotlever.{path.parent.name}" for path in SOURCE.glob("*/__init__.p
 #: From the ground up: what stands on a floor imports of those below it, and nothing beside it but
 #: on the floors of single modules.
 FLOORS = {
-    "ground": ("colours", "errors", "memory", "plotting", "threads", "types"),
+    "ground": ("colours", "errors", "memory", "threads", "types"),
     "numbers and files": (
         "files",
         "piecewise",

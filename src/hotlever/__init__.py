@@ -22,11 +22,8 @@ help(hotlever.Lever) explains one. On the command line all of this is
 
 from __future__ import annotations
 
-from functools import partial
 from importlib import import_module
 from typing import Any
-
-from hotlever import plotting
 
 __version__ = "2.0.0"
 
@@ -48,13 +45,12 @@ _MODULES = {
     "hotlever.errors": ("HotleverError", "InputError", "ComputationError", "BranchEndError"),
     "hotlever.figures": ("save_figure",),
 }
-plotting.figures = partial(import_module, "hotlever.figures")
 _PUBLIC = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
     if name == "figures":
-        return plotting.figures()
+        return import_module("hotlever.figures")
     if name not in _PUBLIC:
         raise AttributeError(f"module 'hotlever' has no attribute {name!r}")
     return getattr(import_module(_PUBLIC[name]), name)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hotlever import __version__, plotting
+import hotlever
+from hotlever import __version__
 from hotlever.errors import InputError
 from hotlever.files import whole_file, write_text
 from hotlever.quantities import QUANTITIES
@@ -86,7 +87,7 @@ class Plots:
         >>> len(sweep.hotlever.plot().axes)
         4
         """
-        figure: Figure = plotting.figures().figure_of(self._data)
+        figure: Figure = hotlever.figures.figure_of(self._data)
         return figure
 
 

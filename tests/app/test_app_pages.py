@@ -19,7 +19,7 @@ from nicegui import ui
 from nicegui.testing import User, user_simulation
 from PIL import Image
 
-from hotlever.app import approaching, live, probe_fields, showing, touching
+from hotlever.app import live
 from hotlever.app.jobs import Jobs, Task
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.server import add_pages
@@ -49,12 +49,9 @@ class Here(Report):
     def send(self, kind: str, content: Any) -> None:
         self.sent.append((kind, content))
 
-    async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
-        modules = {"live": live, "probe_fields": probe_fields, "showing": showing}
-        modules |= {"touching": touching, "approaching": approaching}
-        module = modules[function.split(":")[0].split(".")[-1]]
+    async def call(self, function: Callable[..., Any], *arguments: Any, heard: Any = None) -> Any:
         self.sent = []
-        result = getattr(module, function.split(":")[1])(self, *arguments)
+        result = function(self, *arguments)
         for kind, content in self.sent:
             if heard is not None:
                 heard(kind, content)
@@ -134,7 +131,7 @@ def test_simulate_shows_the_numbers_of_the_sweep(tmp_path: Path, run: Run) -> No
             assert text_of(user, f"data-number={key}") == form.format(float(row[key]))
         answer = await session.ask(
             "full",
-            "live:answer",
+            live.answer,
             Task("sweep", (), {"set": ["n_d=5e17"]}),
             *(8.0, 12.0, False),
         )
@@ -248,10 +245,10 @@ def test_commands_run_in_processes_that_can_be_ended(tmp_path: Path) -> None:
         # an answer that nobody waits for any more is not the next one's
         worker = jobs._spare
         assert worker is not None
-        first = asyncio.create_task(worker.call("hotlever.app.live:described", ""))
+        first = asyncio.create_task(worker.call(live.described, ""))
         await asyncio.sleep(0.05)
         first.cancel()
-        assert await worker.call("builtins:isinstance", object) is True
+        assert await worker.call(isinstance, object) is True
         worker.kill()
 
     asyncio.run(story())

@@ -7,6 +7,7 @@ import csv
 import re
 import shlex
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +144,9 @@ def test_questions_of_the_gallery_open_pages_or_scripts(tmp_path: Path) -> None:
 
 def test_a_page_that_waits_for_a_busy_process_is_shown(tmp_path: Path) -> None:
     class Busy(Here):
-        async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
+        async def call(
+            self, function: Callable[..., Any], *arguments: Any, heard: Any = None
+        ) -> Any:
             await asyncio.sleep(3.5)  # longer than a page may take
             return await super().call(function, *arguments, heard=heard)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -308,7 +309,7 @@ def test_the_lever_that_is_chosen_on_one_page_is_that_of_all(tmp_path: Path) -> 
 class Resting(Here):
     """Solves no lever."""
 
-    async def call(self, function: str, *arguments: Any, heard: Any = None) -> Any:
-        if function.endswith(":answer"):
+    async def call(self, function: Callable[..., Any], *arguments: Any, heard: Any = None) -> Any:
+        if function.__name__ == "answer":
             await asyncio.sleep(60.0)
         return await super().call(function, *arguments, heard=heard)

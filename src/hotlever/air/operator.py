@@ -135,7 +135,9 @@ def air_operator(
     operator = PanelledAir(
         layout, surroundings, base_temperature_K, refinement, progress
     ).operator()
-    store_arrays(path, {name: np.asarray(value) for name, value in vars(operator).items()})
+    store_arrays(
+        path, {each.name: np.asarray(getattr(operator, each.name)) for each in fields(operator)}
+    )
     return operator
 
 

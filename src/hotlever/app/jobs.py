@@ -219,7 +219,7 @@ class Jobs:
 
     async def _run(self, page: str, job: Job, worker: Worker) -> None:
         try:
-            await worker.call("hotlever.app.jobs:run", job.task, heard=job.hear)
+            await worker.call(run, job.task, heard=job.hear)
             job.end("failed" if job.message else "done")
         except HotleverError as error:
             # what was reached may be written; the message says where it stopped

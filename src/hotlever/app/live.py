@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import os
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -127,7 +127,7 @@ class LiveLever:
             "current_mA": observables["current_mA"],
             "power_mW": observables["lever_V"] * observables["current_mA"],
             "tip_K": self.branch.tip_K(u),
-            "knee": None if knee is None else vars(knee),
+            "knee": None if knee is None else asdict(knee),
         }
 
     @property

@@ -81,14 +81,17 @@ class Session:
         return self.workers[name]
 
     async def ask(
-        self, worker: str, function: str, *arguments: Any, heard: Heard | None = None
+        self,
+        worker: str,
+        function: Callable[..., Any],
+        *arguments: Any,
+        heard: Heard | None = None,
     ) -> Any:
-        """Call ``module:function`` of the app in a process.
+        """Call a function of a `Report` and some arguments in a process.
 
         Raises
         ------
         HotleverError
             As the function says, or if the process died.
         """
-        name = f"hotlever.app.{function}"
-        return await self._worker(worker).call(name, *arguments, heard=heard)
+        return await self._worker(worker).call(function, *arguments, heard=heard)

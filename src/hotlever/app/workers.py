@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import atexit
 import gc
-import importlib
 import io
 import multiprocessing
 import os
@@ -36,11 +35,6 @@ _ANY = 0
 _TIDY_S = 0.6
 #: Seconds without a call after which a process gives back the memory that its last calls freed.
 _REST_S = 1.0
-#: Modules that a process imports before it is asked for anything, so that it then answers at once.
-_READY = (
-    *("hotlever.tasks.estimating", "hotlever.tasks.simulating", "hotlever.tasks.sweeping"),
-    *("hotlever.figures", "hotlever.lever", "hotlever.report.fit_pages", "hotlever.raman"),
-)
 _LOST = (
     "the process that worked on this died (too little memory?); what was written before is there, "
     "please try again"
@@ -83,8 +77,18 @@ class Worker:
         self._loop: asyncio.AbstractEventLoop | None = None
         threading.Thread(target=self._read, args=(self._connection,), daemon=True).start()
 
-    async def call(self, function: str, *arguments: Any, heard: Heard | None = None) -> Any:
-        """Call ``module:function`` of the process, and wait for its turn and answer.
+    async def call(
+        self, function: Callable[..., Any], *arguments: Any, heard: Heard | None = None
+    ) -> Any:
+        """Call a function in the process, and wait for its turn and answer.
+
+        Parameters
+        ----------
+        function : callable
+            Of a module. Given a `Report`, by which it tells of its progress, and the arguments.
+        *arguments
+        heard : callable, optional
+            Told what it tells.
 
         Raises
         ------
@@ -216,7 +220,7 @@ class Report:
 
 
 #: A call: its number, the function, and its arguments.
-_Call = tuple[int, str, tuple[Any, ...]]
+_Call = tuple[int, Callable[..., Any], tuple[Any, ...]]
 
 
 def serve(connection: Connection, folder: Path) -> None:
@@ -226,24 +230,34 @@ def serve(connection: Connection, folder: Path) -> None:
     calls: queue.Queue[_Call] = queue.Queue()
     threading.Thread(target=_listen, args=(connection, calls), daemon=True).start()
     with suppress(KeyboardInterrupt):
-        for name in _READY:
-            importlib.import_module(name)
+        _import_all()
         report = Report(connection)
         while True:
             _answer(report, *_next(calls))
 
 
-def _answer(report: Report, number: int, name: str, arguments: tuple[Any, ...]) -> None:
+def _import_all() -> None:
+    """Import what commands import when they are called, so that the first is done at once."""
+    from hotlever import estimate, figures, lever, raman  # noqa: F401
+    from hotlever.estimate import batch, procedure  # noqa: F401
+    from hotlever.lever import fields, set_points, transient  # noqa: F401
+    from hotlever.report import fit_pages  # noqa: F401
+
+
+def _answer(
+    report: Report, number: int, function: Callable[..., Any], arguments: tuple[Any, ...]
+) -> None:
     report.number = number
-    module, _, function = name.partition(":")
     try:
-        report.send("done", getattr(importlib.import_module(module), function)(report, *arguments))
+        report.send("done", function(report, *arguments))
     except HotleverError as error:
         report.send("failed", str(error))
     except MemoryError:
         report.send("failed", "there is too little memory for this")
     except Exception as error:
-        report.send("failed", unforeseen_error(error, ["app", name]))
+        report.send(
+            "failed", unforeseen_error(error, ["app", f"{function.__module__}.{function.__name__}"])
+        )
 
 
 def _next(calls: queue.Queue[_Call]) -> _Call:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -227,8 +227,8 @@ class Measurement:
 
     def part(self, rows: Mask) -> Measurement:
         """Return some rows, (n,) of bool, as a measurement."""
-        arrays = {name: v for name, v in vars(self).items() if isinstance(v, np.ndarray)}
-        columns: Any = {name: values[rows] for name, values in arrays.items()}
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        columns: Any = {name: v[rows] for name, v in own.items() if isinstance(v, np.ndarray)}
         return replace(self, **columns)
 
     @property

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hotlever import plotting
+import hotlever
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import write_text
 from hotlever.materials import Kind
@@ -229,5 +229,5 @@ class Probe(ProbeParts):
 
     def draw(self, title: str = "") -> Figure:
         """Return a figure of the probe from above, with its heater, terminals and tip."""
-        figure: Figure = plotting.figures().probe_drawing(self.layout(), title)
+        figure: Figure = hotlever.figures.probe_drawing(self.layout(), title)
         return figure

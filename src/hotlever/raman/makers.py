@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import importlib
 import io
 import logging
 import re
@@ -15,7 +14,6 @@ from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -47,9 +45,8 @@ class Format:
     """A maker's format, and who reads it."""
 
     name: str
-    read: Callable[[bytes, Any], list[Spectrum]]
-    module: str = ""  #: of an optional library, handed to `read`
-    package: str = ""  #: that it comes in
+    read: Callable[[bytes], list[Spectrum]]
+    package: str = ""  #: an optional library that `read` imports
 
 
 def read_makers(kind: str, file: Path, raw: bytes) -> list[Spectrum]:
@@ -62,19 +59,17 @@ def read_makers(kind: str, file: Path, raw: bytes) -> list[Spectrum]:
     """
     maker = MAKERS[kind]
     try:
-        library = importlib.import_module(maker.module) if maker.module else None
-    except ImportError as error:
-        raise InputError(
-            f"{file}: reading {file.suffix or 'this format'} needs the package {maker.package}; "
-            "install it with: pip install 'hotlever[raman]'"
-        ) from error
-    try:
-        spectra = maker.read(raw, library)
+        spectra = maker.read(raw)
         for spectrum in spectra:
             _require_numbers(spectrum)
         if all(np.ptp(spectrum.y) == 0.0 for spectrum in spectra):
             raise ValueError("all its intensities are alike")
         return spectra
+    except ImportError as error:
+        raise InputError(
+            f"{file}: reading {file.suffix or 'this format'} needs the package {maker.package}; "
+            "install it with: pip install 'hotlever[raman]'"
+        ) from error
     except Exception as error:
         reason = excerpt(" ".join(str(error).split()), 160) or type(error).__name__
         raise InputError(f"{file}: not a readable {maker.name} file ({reason})") from error
@@ -92,8 +87,10 @@ def _require_numbers(spectrum: Spectrum) -> None:
         raise ValueError("its axis neither rises nor falls all the way")
 
 
-def _spc(raw: bytes, spc_io: Any) -> list[Spectrum]:
+def _spc(raw: bytes) -> list[Spectrum]:
     """All subfiles."""
+    import spc_io
+
     if len(raw) < _SPC.size:
         raise ValueError(f"{len(raw)} bytes, less than its header")
     flags, version, exponent, samples, count, log = _SPC.unpack_from(raw)
@@ -118,8 +115,10 @@ def _spc(raw: bytes, spc_io: Any) -> list[Spectrum]:
     return [Spectrum(x, y, label) for (x, y), label in zip(pairs, labels, strict=True)]
 
 
-def _jcamp(raw: bytes, jcamp: Any) -> list[Spectrum]:
+def _jcamp(raw: bytes) -> list[Spectrum]:
     """The blocks of a compound file, or the only one."""
+    import jcamp
+
     text = raw.decode(errors="ignore")
     # what is stated or repeated must be about as long as the file, else memory runs out
     if sum(int(count[:18]) for count in _NPOINTS.findall(text)) > len(raw):
@@ -272,7 +271,7 @@ def refuse_labspec(file: Path, suffix: str, raw: bytes, is_text: bool) -> None:
 
 #: By suffix.
 MAKERS = {
-    ".wdf": Format("WiRE", lambda raw, _: read_wdf(raw)),
-    ".spc": Format("SPC", _spc, "spc_io", "spc-io"),
-    ".jdx": Format("JCAMP-DX", _jcamp, "jcamp", "jcamp"),
+    ".wdf": Format("WiRE", read_wdf),
+    ".spc": Format("SPC", _spc, "spc-io"),
+    ".jdx": Format("JCAMP-DX", _jcamp, "jcamp"),
 }

@@ -13,7 +13,6 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from importlib import import_module
 from itertools import islice, zip_longest
 from typing import Any
 
@@ -88,14 +87,12 @@ def _read(
 ) -> list[str]:
     """Return what is read by a library, whose errors become those of the input."""
     try:
-        import_module(package.lower())
+        return read(raw, where)
     except ImportError:
         raise InputError(
             f"{where}: reading a {what} needs the package {package}; install it with: "
             f"pip install 'hotlever[{extra}]'"
         ) from None
-    try:
-        return read(raw, where)
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes the library raise

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from nicegui import ui
 
+from hotlever.app import touching
 from hotlever.app.jobs import Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import caption, flat_button
@@ -220,7 +221,8 @@ class SampleLayers:
 class ContactPage(LivePage):
     """One tab of the page."""
 
-    name, live, plots_of = "contact", "touching", ContactPlots
+    name, plots_of = "contact", ContactPlots
+    live: ClassVar = touching
     #: What is None or empty is what the probe file says, or what is usual.
     first: ClassVar = {
         "medium": "",

@@ -12,6 +12,7 @@ from typing import Any
 
 from nicegui import events, ui
 
+from hotlever.app import showing
 from hotlever.app.project import LARGEST_FILE
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
@@ -165,7 +166,7 @@ async def say_refused(
     session: Session, banner: ErrorBanner, names: list[str], *, spectra: bool
 ) -> None:
     """Say which of some files are no measurements, or no spectra; they stay in the folder."""
-    lines = await session.ask("full", "showing:refused", names, spectra)
+    lines = await session.ask("full", showing.refused, names, spectra)
     more = f"\nand {len(lines) - _REFUSED} more such files" if len(lines) > _REFUSED else ""
     banner.say("\n".join(lines[:_REFUSED]) + more)
 

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from nicegui import ui
 
+from hotlever.app import probe_fields
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
     FIGURE_FILES,
@@ -128,7 +129,7 @@ class LeverPage(Page):
             self._holds.set_visibility(probe == self._held_for)
         with self.banner.caught():
             edited = self.chosen["edited"].get(probe)
-            sections = edited or await self.session.ask("quick", "probe_fields:opened", probe)
+            sections = edited or await self.session.ask("quick", probe_fields.opened, probe)
             if probe == self.probe:
                 self._sections = sections
                 await self._draw()
@@ -145,7 +146,7 @@ class LeverPage(Page):
         turn, drawn, sections = self._turn, None, self._sections
         title, mesh = self._name.value or "lever", self.chosen["mesh"]
         try:
-            request = "probe_fields:drawn", sections, title, mesh
+            request = probe_fields.drawn, sections, title, mesh
             drawn = await self.session.ask("quick", *request)
             fault = drawn["fault"]
         except HotleverError as error:
@@ -244,7 +245,7 @@ class LeverPage(Page):
         with self.banner.caught():
             name = safe_name(self._name.value or "")
             name = name if name.endswith(".toml") else f"{name}.toml"
-            text = await self.session.ask("quick", "probe_fields:written", self._sections, name)
+            text = await self.session.ask("quick", probe_fields.written, self._sections, name)
             self.session.project.write(name, text)
             del self.chosen["edited"][self.probe]
             self._take(name)
@@ -260,7 +261,7 @@ class LeverPage(Page):
     async def _give(self, suffix: str) -> None:
         with self.banner.caught():
             name, mesh = self._name.value or "lever", self.chosen["mesh"]
-            request = "probe_fields:drawn_file", self._sections, name, mesh, suffix
+            request = probe_fields.drawn_file, self._sections, name, mesh, suffix
             await hand_over(self.session.ask("quick", *request), f"{Path(name).stem}{suffix}")
 
 
@@ -293,7 +294,7 @@ class ProbeFields:
         self._turn += 1
         turn, is_own = self._turn, sections is self._sections
         self._sections = sections
-        settable = await self._session.ask("quick", "probe_fields:settable", sections)
+        settable = await self._session.ask("quick", probe_fields.settable, sections)
         if turn != self._turn or self._column.is_deleted:
             return
         cards, rows = settable.get("cards", []), settable.get("layers", [])

@@ -7,6 +7,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import partial
+from types import ModuleType
 from typing import Any, ClassVar
 
 from nicegui import background_tasks, ui
@@ -93,7 +94,7 @@ class LivePage(Page):
     """
 
     #: The module that answers, what draws the answers, and what is shown of ``now`` in them.
-    live: ClassVar[str]
+    live: ClassVar[ModuleType]
     plots_of: ClassVar[type[Any]]
     numbers: ClassVar[Numbers]
     #: What is chosen of a state, beside the task, in the order in which it is asked for.
@@ -121,8 +122,7 @@ class LivePage(Page):
 
     async def described(self) -> dict[str, Any]:
         """Return what the probe's file says."""
-        described = f"{self.live}:described"
-        answer: dict[str, Any] = await self.session.ask("quick", described, self.probe)
+        answer: dict[str, Any] = await self.session.ask("quick", self.live.described, self.probe)
         return answer
 
     @abstractmethod
@@ -267,8 +267,8 @@ class LivePage(Page):
 
         arguments = lever, *at, quick, *self.also_asked()
         try:
-            worker, function = "quick" if quick else "full", f"{self.live}:answer"
-            answer = await self.session.ask(worker, function, *arguments, heard=heard)
+            worker = "quick" if quick else "full"
+            answer = await self.session.ask(worker, self.live.answer, *arguments, heard=heard)
         except HotleverError as error:
             if not self.is_gone and is_wanted():
                 self.blank()

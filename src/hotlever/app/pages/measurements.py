@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from nicegui import ui
 
+from hotlever.app import showing
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.columns import ColumnPicker
 from hotlever.app.pages.frame import (
@@ -154,7 +155,7 @@ class MeasurementsPage(Page):
         if self.chosen["data"] is None:
             self.chosen["data"] = []
             names = self.session.project.data
-            latest = await self.session.ask("full", "showing:measurements", names, 1)
+            latest = await self.session.ask("full", showing.measurements, names, 1)
             if latest and not self.chosen["data"]:
                 self._select.set_value(latest)  # which reads it
                 return
@@ -281,7 +282,7 @@ class MeasurementsPage(Page):
     async def _take_all(self) -> None:
         """Choose all measurements of levers that lie in the folder."""
         names = self.session.project.data
-        self._take(await self.session.ask("full", "showing:measurements", names, len(names)))
+        self._take(await self.session.ask("full", showing.measurements, names, len(names)))
 
     async def _dropped(self, names: list[str]) -> None:
         unknown = [name for name in names if name not in self.session.project.data]
@@ -311,12 +312,12 @@ class MeasurementsPage(Page):
             self._waveform.set_value(self._metadata(name)["waveform"])
             metadata |= {**self._metadata(name), "medium": self.chosen["medium"]}
             with suppress(HotleverError):
-                groups = await self.session.ask("full", "showing:groups", name)
-                columns = await self.session.ask("full", "showing:columns", name, metadata)
+                groups = await self.session.ask("full", showing.groups, name)
+                columns = await self.session.ask("full", showing.columns, name, metadata)
         if name or not self.data:
             try:
                 file = name or str(EXAMPLES / _EXAMPLE)
-                understood = await self.session.ask("full", "showing:understood", file, metadata)
+                understood = await self.session.ask("full", showing.understood, file, metadata)
             except HotleverError as error:
                 if turn == self._reads:
                     self.banner.say(str(error))
@@ -401,7 +402,7 @@ class MeasurementsPage(Page):
         waiting = ui.spinner(size="lg").props('aria-label="Being drawn"')
         container = ui.column().classes("w-full gap-2")
         with self.banner.caught():
-            result = await self.session.ask("full", "showing:result", name)
+            result = await self.session.ask("full", showing.result, name)
             if turn == self._shows and not container.is_deleted:
                 with container:
                     if self.chosen["opened"]:
@@ -423,7 +424,7 @@ class MeasurementsPage(Page):
         folder, report = job.task.options["output"], job.task.options["report"]
         path = self.session.project.path(folder)
         names = [f"{folder}/{file.name}" for file in sorted(path.glob("*.json"))]
-        levers = await self.session.ask("full", "showing:levers", names)
+        levers = await self.session.ask("full", showing.levers, names)
         if turn != self._shows:
             return
         page = ui.column().classes("w-full gap-2")

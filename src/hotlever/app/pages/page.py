@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from nicegui import ui
 
+from hotlever.app import showing
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
     ErrorBanner,
@@ -258,7 +259,7 @@ class Page:
         if path.is_dir():
             new = sorted(path.iterdir())
             if len(new) > 1:
-                packed = self.session.ask("full", "showing:packed", new)
+                packed = self.session.ask("full", showing.packed, new)
                 await hand_over(packed, f"{path.name}.zip")
                 return
             path = new[0]

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 from nicegui import ui
 
+from hotlever.app import showing
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import (
@@ -239,7 +240,7 @@ class OneSpectrum:
 
     async def look(self, folders: list[str]) -> None:
         """Offer the spectra of some folders, and show the one that was chosen last."""
-        names = await self._page.session.ask("full", "showing:spectra", folders)
+        names = await self._page.session.ask("full", showing.spectra, folders)
         if self._all.is_deleted:
             return
         self._all.set_visibility(bool(names))
@@ -313,7 +314,7 @@ class OneSpectrum:
         try:
             corrections = self._page.chosen["corrections"]
             arguments = name, self._page.task(), corrections
-            spectrum = await self._page.session.ask("full", "showing:spectrum", *arguments)
+            spectrum = await self._page.session.ask("full", showing.spectrum, *arguments)
         except HotleverError as error:
             if not self._all.is_deleted:
                 self._text.set_text(str(error).replace(f"{self._page.session.project.folder}/", ""))

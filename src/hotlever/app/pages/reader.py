@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from nicegui import ui
 
+from hotlever.app import approaching
 from hotlever.app.jobs import Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import caption
@@ -114,7 +115,8 @@ class ReaderPlots:
 class ReaderPage(LivePage):
     """One tab of the page."""
 
-    name, live, plots_of = "reader", "approaching", ReaderPlots
+    name, plots_of = "reader", ReaderPlots
+    live: ClassVar = approaching
     # each distance is another lever
     solved_once = False
     first: ClassVar = {
@@ -151,7 +153,7 @@ class ReaderPage(LivePage):
     async def described(self) -> dict[str, Any]:
         """Return which distances there are, and what the file says of the surroundings."""
         self._coarse, self._jump_K = {}, None
-        request = "approaching:described", self.probe, self.chosen["tilt_deg"]
+        request = approaching.described, self.probe, self.chosen["tilt_deg"]
         answer: dict[str, Any] = await self.session.ask("quick", *request)
         nearest, farthest = answer["nearest_um"], answer["farthest_um"]
         self.chosen["distance_um"] = min(max(self.chosen["distance_um"], nearest), farthest)
@@ -202,7 +204,7 @@ class ReaderPage(LivePage):
             return
         self._jump_K, wanted = jump_K, (self.of_lever(), at)
         with self.banner.caught():
-            request = "approaching:answer", *wanted[:1], *at, True, jump_K
+            request = approaching.answer, *wanted[:1], *at, True, jump_K
             coarse = await self.session.ask("quick", *request)
             if not self.is_gone and self._follower.last == wanted:
                 self.draw({**self.completed(coarse, True), **self._full}, False)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
 from nicegui import ui
 
+from hotlever.app import showing
 from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import (
     FIGURE_FILES,
@@ -41,15 +43,15 @@ async def show_result(session: Session, banner: ErrorBanner, name: str, result: 
     """Show what a fit or a calibration file says, as `hotlever.app.showing.result` has it."""
     stem = Path(name).name.split(".")[0]
 
-    async def give(function: str, file: str, *arguments: str) -> None:
+    async def give(function: Callable[..., Any], file: str, *arguments: str) -> None:
         with banner.caught():
-            await hand_over(session.ask("full", f"showing:{function}", name, *arguments), file)
+            await hand_over(session.ask("full", function, name, *arguments), file)
 
     with ui.row().classes("items-center"):
         ui.label(name).classes("text-lg text-bold")
         download_button(session, name, f"{result['kind'].capitalize()} (JSON)")
         if result["kind"] == "calibration":
-            budget = partial(give, "budget", f"{stem}-budget.html")
+            budget = partial(give, showing.budget, f"{stem}-budget.html")
             small_button("Uncertainty budget (one sheet)", budget, icon="print")
     questions = []
     if result["kind"] == "calibration":
@@ -80,7 +82,9 @@ async def show_result(session: Session, banner: ErrorBanner, name: str, result: 
                         caption(block["caption"]).classes("remark caption col")
                         for suffix in FIGURE_FILES:
                             own, kind = block["name"], suffix[1:].upper()
-                            click = partial(give, "drawn", f"{stem}-{own}{suffix}", own, suffix)
+                            click = partial(
+                                give, showing.drawn, f"{stem}-{own}{suffix}", own, suffix
+                            )
                             flat_button(kind, click, label=f"{own} as {kind}").props("size=sm")
 
 
@@ -105,7 +109,7 @@ class _Question:
             self._targets[self._along] = value
             try:
                 arguments = self._name, self._along, value
-                row = await self._session.ask("full", "showing:settings", *arguments)
+                row = await self._session.ask("full", showing.settings, *arguments)
                 text = (
                     "outside of what was calibrated, or in a jump" if row is None else _answer(row)
                 )

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from nicegui import ui
 
+from hotlever.app import live
 from hotlever.app.jobs import Task
 from hotlever.app.pages.chosen_lever import (
     NOW,
@@ -55,7 +56,8 @@ _GROUPS = {"material": "Material", "dimensions": "Dimensions", "circuit": "Circu
 class SimulatePage(LivePage):
     """One tab of the page."""
 
-    name, live, plots_of = "simulate", "live", LivePlots
+    name, plots_of = "simulate", LivePlots
+    live: ClassVar = live
     first: ClassVar = {
         "probe": "",
         "changes": {},
@@ -121,7 +123,7 @@ class SimulatePage(LivePage):
         """Return what the probe's file says of all that can be moved."""
         if self.chosen["probe"] != self.probe:  # what was changed is of another one
             self.chosen |= {"probe": self.probe, "changes": {}}
-        probe = await self.session.ask("quick", "live:described", self.probe)
+        probe = await self.session.ask("quick", live.described, self.probe)
         self._of_probe = probe
         values = {name: value for group in _GROUPS for name, value, *_ in probe["sliders"][group]}
         of_material = {name for name, *_ in probe["sliders"]["material"]}
@@ -194,7 +196,7 @@ class SimulatePage(LivePage):
             text = f"Dashed: {beside_in_words(self.chosen)}"
             try:
                 arguments = sweep_of(lever), *at, False
-                answer = await self.session.ask("beside", "live:answer", *arguments)
+                answer = await self.session.ask("beside", live.answer, *arguments)
                 texts = texts_of(answer["now"], _NUMBERS)
                 text += ": " + ", ".join(f"{_NUMBERS[key][0]} {texts[key]}" for key in texts)
             except HotleverError as error:
@@ -218,7 +220,7 @@ class SimulatePage(LivePage):
         reduced[geometry] = False
         task = sweep_of({"probe": geometry[0], "changes": around})
         with suppress(HotleverError):
-            reduced[geometry] = await self.session.ask("making", "live:prepare", task)
+            reduced[geometry] = await self.session.ask("making", live.prepare, task)
 
     # --- the table --------------------------------------------------------------------------------
 

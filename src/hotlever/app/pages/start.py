@@ -10,6 +10,7 @@ from typing import Any
 
 from nicegui import app, ui
 
+from hotlever.app import live, showing
 from hotlever.app.pages.frame import (
     PAGES,
     ErrorBanner,
@@ -179,15 +180,15 @@ class StartPage(Page):
         """Bring dropped files to the page that they belong to."""
         name, session = names[-1], self.session
         if name.lower().endswith(".toml"):
-            await session.ask("quick", "live:described", name)
+            await session.ask("quick", live.described, name)
         elif name.lower().endswith(".json"):
             self.banner.say(f"{name}: kept in the folder; the page Measurements finds it there")
             return
         elif not name.lower().endswith(DRAWINGS):
             try:
-                await session.ask("full", "showing:understood", name, {})
+                await session.ask("full", showing.understood, name, {})
             except HotleverError:
-                if await session.ask("full", "showing:refused", [name], True):
+                if await session.ask("full", showing.refused, [name], True):
                     raise
                 self.banner.say(
                     f"{name} is a spectrum: please drop it on the page Raman, as tip or plate"
