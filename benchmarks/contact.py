@@ -62,8 +62,8 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.mesh import face_of
-from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.priors import METERS
+from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.probe.tip import OUT_OF_CONTACT
 from hotlever.quantities import FITTED
 from problems import table

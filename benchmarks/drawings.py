@@ -40,7 +40,7 @@ from hotlever.materials import LOW_DOPED
 from hotlever.materials.heat import STEP
 from hotlever.probe import Layout, MeshOptions, Probe, mesh_layout
 from hotlever.probe.drawing import Drawing
-from hotlever.probe.drawing.layout_builder import build_layout
+from hotlever.probe.drawing.shape import build_layout
 from hotlever.probe.shapes import ThreeLeg
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K

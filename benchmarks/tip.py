@@ -19,7 +19,7 @@ from hotlever.lever.air_fields import AirFields
 from hotlever.lever3d import SolidLever
 from hotlever.probe import MeshOptions, Probe, Tip
 from hotlever.spieser2017 import KNEE_MEASURED_K, KNEE_PREDICTED_K
-from hotlever.studies.knee import SIZES, TALL, tip_effects
+from hotlever.studies.knee_study import SIZES, TALL, tip_effects
 from problems import table
 
 #: What is printed of each tip: heading and format.

@@ -14,7 +14,7 @@ from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.similar import SimilarLevers
-from hotlever.probe.parameters import usual_parameters
+from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.types import Array
 
 

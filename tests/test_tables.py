@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.tables import find_tables, read_table, reading
+from hotlever.tables import find_tables, read_table
+from hotlever.tables import text_tables as reading
 from hotlever.tables.table import number, text_lines
 from hotlever.units import conversion
 

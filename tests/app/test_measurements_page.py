@@ -19,7 +19,7 @@ from test_pages_at_work import at_once, understood
 
 from hotlever.app import showing
 from hotlever.app.jobs import Job, Task
-from hotlever.app.pages.page import MEDIA
+from hotlever.app.pages.task_page import MEDIA
 from hotlever.app.project import EXAMPLES
 from hotlever.app.session import Session
 from hotlever.estimate.power_law import EQ12

@@ -13,7 +13,7 @@ from nicegui.testing import User
 from test_app_pages import text_of, until, visit
 
 from hotlever.app import approaching
-from hotlever.app.pages import reader
+from hotlever.app.pages import reader_page as reader
 from hotlever.app.session import Session
 from hotlever.probe import Probe
 

@@ -16,8 +16,8 @@ from hotlever.estimate.sampling import predictive_band, sample_posterior
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from hotlever.probe.parameters import of_materials, usual_parameters
 from hotlever.probe.priors import Prior, default_priors
+from hotlever.probe.probe_parameters import of_materials, usual_parameters
 from of_materials import of_named_silicon, p_type_probe, strip_probe
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")

@@ -15,7 +15,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import given_measurement
 from hotlever.probe import MeshOptions
-from hotlever.probe.parameters import usual_parameters
+from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import observables_of
 
 BIAS = np.array([-7.5, -4.0, 0.0, 1.0, 5.0, 8.0])

@@ -25,7 +25,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import read_measurement
 from hotlever.measurement.rows import averaged
-from hotlever.probe.parameters import usual_parameters
+from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import FITTED
 
 TIP = {"tip.height_um": 0.7, "tip.half_angle_deg": 20.0, "tip.apex_radius_um": 0.05}

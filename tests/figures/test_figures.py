@@ -22,7 +22,7 @@ from hotlever.lever import read_sweep, write_sweep
 from hotlever.lever.fields import heater_profile, seen_from_above
 from hotlever.lever.transient import pulse, simulate, spectrum, time_constants
 from hotlever.probe import Probe
-from hotlever.report.page import Page
+from hotlever.report.report_page import Page
 
 STORED = Path(__file__).parents[1] / "stored" / "1.0.0"
 

@@ -10,7 +10,7 @@ from hotlever.lever import Lever
 from hotlever.lever.equations import LeverEquations
 from hotlever.materials.departures import DEPARTURES, departure_of
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of
+from hotlever.probe.probe_parameters import parameters_of
 from of_materials import p_type_probe
 
 STEPS = (0.4, 0.2, 0.1)

@@ -14,7 +14,7 @@ from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import heat as heat_laws
 from hotlever.probe import Probe
-from hotlever.probe.parameters import dimensions_of, nuisances
+from hotlever.probe.probe_parameters import dimensions_of, nuisances
 from hotlever.probe.tip import Tip
 
 REACH = Reach(Probe.reference().circuit, 6.0)

@@ -26,8 +26,8 @@ from hotlever.materials import LOW_DOPED, Material, Parameter
 from hotlever.materials.kinds import Dielectric, HighDopedSilicon, MetalFilm, NSilicon
 from hotlever.materials.parameters import field_of, parameter_named
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of, usual_parameters
 from hotlever.probe.priors import default_priors, priors_of
+from hotlever.probe.probe_parameters import parameters_of, usual_parameters
 from hotlever.studies.simulation_based_calibration import MinimosMaterial
 from of_materials import metal_film_probe
 

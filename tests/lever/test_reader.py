@@ -27,7 +27,7 @@ from hotlever.lever.noise import (
 from hotlever.lever.reader import Reader, at_distance, best_bias, over_surface, rows_of
 from hotlever.lever.space import TIP
 from hotlever.lever.transient.modes import slowest_modes
-from hotlever.studies.thermoelectric_strip import strip_of
+from hotlever.studies.thermoelectric_shift import strip_of
 
 #: What a difference of the distance is told by must not be the panels of other operators.
 MESH = replace(COARSE, panels=0.2)

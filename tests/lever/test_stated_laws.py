@@ -16,7 +16,7 @@ from hotlever.lever.transient import pulse, simulate
 from hotlever.materials.films import dielectric_conductivity, metal_conductivity
 from hotlever.materials.kinds import Dielectric, MetalFilm
 from hotlever.probe import Probe
-from hotlever.probe.parameters import usual_parameters
+from hotlever.probe.probe_parameters import usual_parameters
 from of_materials import FILM, NITRIDE, metal_film_probe, metal_film_sections
 
 BIAS = [0.2, 0.4, 0.6]

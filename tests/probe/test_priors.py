@@ -9,13 +9,13 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.probe import Probe
-from hotlever.probe.parameters import nuisances, parameter_of, parameters_of
 from hotlever.probe.priors import (
     Prior,
     default_priors,
     known_beforehand,
     priors_of,
 )
+from hotlever.probe.probe_parameters import nuisances, parameter_of, parameters_of
 
 PROBE = Probe.reference()
 LOG_3 = math.log(3.0)

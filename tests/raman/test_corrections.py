@@ -10,7 +10,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.raman import Correction, PeakOptions, fit_peak, lineshape, read_corrections
-from hotlever.raman.tables import corrections_text
+from hotlever.raman.spectrum_tables import corrections_text
 
 X = np.arange(440.0, 600.0, 0.5)
 HEAD = "file,start_cm-1,from_cm-1,to_cm-1,use\n"

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.raman.reading import read_file
 from hotlever.raman.series import measure
 from hotlever.raman.spectrum import Spectrum
+from hotlever.raman.spectrum_reading import read_file
 from limits import time_limit
 from spectrometer_files import jcamp_bytes, spc_bytes, wdf_bytes
 

@@ -10,7 +10,7 @@ from hotlever.errors import InputError
 from hotlever.estimate.noise import errors_of_scales
 from hotlever.measurement import read_measurement
 from hotlever.probe.priors import THERMOMETER
-from hotlever.raman.tables import join, read_bias_log
+from hotlever.raman.spectrum_tables import join, read_bias_log
 
 
 def read(*spectra):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.raman.reading import read_file, read_spectrum
+from hotlever.raman.spectrum_reading import read_file, read_spectrum
 from spectrometer_files import jcamp_bytes, spc_bytes, wdf_bytes
 
 

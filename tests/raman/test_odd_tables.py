@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.raman.fit import fit_peak
+from hotlever.raman.line_fit import fit_peak
 from hotlever.raman.lineshape import NoSiliconLine
-from hotlever.raman.reading import read_spectrum
+from hotlever.raman.spectrum_reading import read_spectrum
 
 
 def columns(x, y):

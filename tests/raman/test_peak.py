@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 import synthetic_spectra as synthetic
 from hotlever.errors import InputError
-from hotlever.raman import lineshape, noise
-from hotlever.raman.fit import fit_peak
+from hotlever.raman import detector_noise as noise
+from hotlever.raman import lineshape
+from hotlever.raman.line_fit import fit_peak
 from hotlever.raman.lineshape import NoSiliconLine, PeakOptions
 from synthetic_spectra import Instrument
 

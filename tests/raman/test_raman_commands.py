@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 import synthetic_spectra as synthetic
-from hotlever.figures import raman as figures
-from hotlever.raman.calibration import published_raman_calibration
-from hotlever.raman.reading import read_spectra
+from hotlever.figures import raman_figures as figures
+from hotlever.raman.raman_calibration import published_raman_calibration
 from hotlever.raman.series import (
     COLUMNS,
     DIGITS,
@@ -24,6 +23,7 @@ from hotlever.raman.series import (
     to_csv,
 )
 from hotlever.raman.spectrum import Spectrum
+from hotlever.raman.spectrum_reading import read_spectra
 from hotlever.raman.thermometer import Thermometer
 from hotlever.tasks.commands import spread_option
 

@@ -11,10 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hotlever.errors import InputError
-from hotlever.raman.fit import fit_peak
-from hotlever.raman.reading import read_file, read_spectra, read_spectrum, spectrum_files
+from hotlever.raman.line_fit import fit_peak
 from hotlever.raman.series import measure
 from hotlever.raman.spectrum import temperature_in_metadata, temperature_in_name
+from hotlever.raman.spectrum_reading import read_file, read_spectra, read_spectrum, spectrum_files
 from hotlever.tables import find_tables
 
 

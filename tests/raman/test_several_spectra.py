@@ -10,8 +10,8 @@ import pytest
 
 import synthetic_spectra as synthetic
 from hotlever.errors import InputError
-from hotlever.raman.fit import fit_peak
-from hotlever.raman.reading import read_file
+from hotlever.raman.line_fit import fit_peak
+from hotlever.raman.spectrum_reading import read_file
 from spectrometer_files import wdf_bytes
 
 TEMPERATURES = (296.0, 500.0, 800.0, 1137.0)

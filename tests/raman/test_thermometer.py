@@ -12,18 +12,18 @@ from hypothesis import strategies as st
 import synthetic_spectra as synthetic
 from hotlever.errors import InputError
 from hotlever.raman import anharmonic, lineshape
-from hotlever.raman.calibration import (
+from hotlever.raman.line_fit import fit_peak
+from hotlever.raman.lineshape import PeakOptions
+from hotlever.raman.raman_calibration import (
     Point,
     calibrate_raman,
     published_raman_calibration,
     read_raman_calibration,
 )
-from hotlever.raman.fit import fit_peak
-from hotlever.raman.lineshape import PeakOptions
-from hotlever.raman.reading import read_spectra
 from hotlever.raman.series import calibrate_from, measure, read_lines
 from hotlever.raman.spectrum import Spectrum
-from hotlever.raman.tables import read_temperatures
+from hotlever.raman.spectrum_reading import read_spectra
+from hotlever.raman.spectrum_tables import read_temperatures
 from hotlever.raman.thermometer import Thermometer, laser_heating
 from hotlever.spieser2017 import HEATER_STRESS_MPA, RAMAN_CONSTANT_K, RAMAN_SLOPE_K_CM
 

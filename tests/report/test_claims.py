@@ -7,7 +7,8 @@ import pytest
 
 from hotlever.datasets import labelled
 from hotlever.materials import PARAMETERS
-from hotlever.report.reproduce import air, claims
+from hotlever.report.reproduce import air_sections as air
+from hotlever.report.reproduce import claim_sections as claims
 from hotlever.report.reproduce.findings import Findings
 from hotlever.studies.parameter_consistency import FREE, HELD
 

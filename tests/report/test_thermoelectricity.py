@@ -7,7 +7,8 @@ import pytest
 
 from hotlever import figures
 from hotlever.datasets import labelled
-from hotlever.report.reproduce import LONG_SECTIONS, claims
+from hotlever.report.reproduce import LONG_SECTIONS
+from hotlever.report.reproduce import claim_sections as claims
 from hotlever.report.reproduce.findings import Findings
 from hotlever.studies.thermoelectric_shift import HEATS, POLARITIES, SIDES
 

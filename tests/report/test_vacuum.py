@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from hotlever.report.reproduce import air, vacuum
+from hotlever.report.reproduce import air_sections as air
+from hotlever.report.reproduce import paper_sections as vacuum
 from hotlever.report.reproduce.findings import Findings
 
 

@@ -9,8 +9,8 @@ from hotlever import Lever, Probe, figures, fit
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import Measurement
 from hotlever.spieser2017 import RAMP
-from hotlever.studies import knee
-from hotlever.studies.knee import (
+from hotlever.studies import knee_study as knee
+from hotlever.studies.knee_study import (
     AWAY,
     IN_AIR,
     RAMAN,

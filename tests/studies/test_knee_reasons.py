@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hotlever.errors import ComputationError
-from hotlever.studies.knee import reasons_of_the_knee, steps_to_the_knee
+from hotlever.studies.knee_study import reasons_of_the_knee, steps_to_the_knee
 
 
 def test_reasons_for_the_knee_add_up(coarse):

@@ -9,7 +9,7 @@ from beyond_the_paper import largest
 from hotlever.lever import Lever
 from hotlever.materials import LOW_DOPED, REFERENCE
 from hotlever.materials.kinds import LowDopedSilicon, NSilicon, PSilicon
-from hotlever.studies.thermoelectric_strip import self_heated, strip_of
+from hotlever.studies.thermoelectric_shift import self_heated, strip_of
 
 #: Ends of a strip that differ by so much (K), at a current (mA) that hardly heats it, from a supply
 #: that is as good as one of a current (Ω).

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hotlever.probe import Probe
-from hotlever.studies.knee import tip_effects
+from hotlever.studies.knee_study import tip_effects
 
 ONE = ((0.7, 20.0),)
 

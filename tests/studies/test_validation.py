@@ -12,7 +12,7 @@ from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
-from hotlever.studies.validation.case import Case, cases, sought
+from hotlever.studies.validation.case import QUANTITIES, Case, cases, johnson_noise, sought
 from hotlever.studies.validation.prediction import (
     OUTSIDE,
     Prediction,
@@ -20,7 +20,6 @@ from hotlever.studies.validation.prediction import (
     computed,
     predict,
 )
-from hotlever.studies.validation.quantities import QUANTITIES, johnson_noise
 
 HEAD = """quantity = "{quantity}"
 group = "a group"

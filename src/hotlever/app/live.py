@@ -34,7 +34,7 @@ from hotlever.lever.streamline import current_path
 from hotlever.materials.departures import departure_of
 from hotlever.materials.parameters import own_name
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.parameters import of_materials
+from hotlever.probe.probe_parameters import of_materials
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.common_steps import make_lever

@@ -15,11 +15,11 @@ from fastapi.requests import HTTPConnection
 from fastapi.responses import HTMLResponse, PlainTextResponse, Response
 from nicegui import app, background_tasks, ui
 
-from hotlever.app.pages.contact import ContactPage
-from hotlever.app.pages.lever import LeverPage
+from hotlever.app.pages.contact_page import ContactPage
+from hotlever.app.pages.lever_page import LeverPage
 from hotlever.app.pages.measurements import MeasurementsPage
-from hotlever.app.pages.raman import RamanPage
-from hotlever.app.pages.reader import ReaderPage
+from hotlever.app.pages.raman_page import RamanPage
+from hotlever.app.pages.reader_page import ReaderPage
 from hotlever.app.pages.simulate import SimulatePage
 from hotlever.app.pages.start import StartPage, serve_pictures
 from hotlever.app.project import LARGEST_FILE, Project

@@ -41,13 +41,13 @@ from hotlever.measurement import (
 from hotlever.quantities import FITTED
 from hotlever.raman import Correction, measure, read_lines, read_spectra
 from hotlever.raman.lineshape import WINDOW, in_window
-from hotlever.raman.reading import read_file, spectrum_files
 from hotlever.raman.series import Line
 from hotlever.raman.spectrum import Spectrum
-from hotlever.raman.tables import corrections_text
+from hotlever.raman.spectrum_reading import read_file, spectrum_files
+from hotlever.raman.spectrum_tables import corrections_text
 from hotlever.report.calibration_pages import budget_page, calibration_page
 from hotlever.report.fit_pages import fit_page
-from hotlever.report.page import Page
+from hotlever.report.report_page import Page
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.reporter import Silence
 from hotlever.tasks.spectra import ThermometerOptions, set_up

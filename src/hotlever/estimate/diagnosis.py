@@ -26,8 +26,8 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
 from hotlever.measurement.data import noise_about_neighbours
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import Prior, known_beforehand
+from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.types import Array
 

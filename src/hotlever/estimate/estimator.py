@@ -23,8 +23,8 @@ from hotlever.estimate.posterior import standard_errors
 from hotlever.estimate.result import Fit, band_dataset
 from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
-from hotlever.probe.parameters import of_materials, parameters_of
 from hotlever.probe.priors import priors_of
+from hotlever.probe.probe_parameters import of_materials, parameters_of
 from hotlever.probe.surroundings import Medium
 from hotlever.text import NOT_DETERMINED, value_with_error, with_unit
 from hotlever.types import Array, Progress

@@ -5,8 +5,8 @@ lever that is fast, and can be corrected by the full one at the probe of a predi
 
 At rest the fast lever is a reduced one where the geometry has been reduced before, or else the same
 lever on a coarse mesh. Where the full lever is solved too, the difference of the two branches is
-added to the fast one's from then on. Parameters are what `hotlever.probe.parameters` names: of the
-material, dimensions, the series resistance.
+added to the fast one's from then on. Parameters are what `hotlever.probe.probe_parameters` names:
+of the material, dimensions, the series resistance.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, kn
 from hotlever.lever.similar import SimilarLevers
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
-from hotlever.probe.parameters import usual_parameters
+from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import FITTED
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress

@@ -25,8 +25,8 @@ from hotlever.materials.parameters import (
     scale_of,
     scaled_unit,
 )
-from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import PriorUse
+from hotlever.probe.probe_parameters import parameters_of
 from hotlever.text import NOT_DETERMINED, aligned, value_with_error
 
 #: A prior is named as leaned on where its data narrow it to no less than this share, and as moved

@@ -36,7 +36,6 @@ from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.priors import (
     SCALES,
     THERMOMETER,
@@ -48,6 +47,7 @@ from hotlever.probe.priors import (
     published_material,
     updated,
 )
+from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.types import Array, Progress

@@ -40,7 +40,6 @@ from hotlever.measurement.data import check_sample
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
 from hotlever.probe.chip import CHIP
-from hotlever.probe.parameters import dimensions_of, parameters_of
 from hotlever.probe.priors import (
     ALL_DIMENSIONS,
     Prior,
@@ -51,6 +50,7 @@ from hotlever.probe.priors import (
     priors_of,
     updated,
 )
+from hotlever.probe.probe_parameters import dimensions_of, parameters_of
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.types import Array, Progress
 

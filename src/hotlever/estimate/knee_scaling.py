@@ -33,8 +33,8 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
-from hotlever.probe.parameters import RESISTANCE
 from hotlever.probe.priors import METERS, default_priors
+from hotlever.probe.probe_parameters import RESISTANCE
 from hotlever.text import value_with_error
 from hotlever.types import Array
 

@@ -9,8 +9,13 @@ from typing import Any, Literal, cast, get_args
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from hotlever.probe.parameters import heat_capacities, of_materials, parameter_of, usual_parameters
 from hotlever.probe.priors import SCALES, Prior
+from hotlever.probe.probe_parameters import (
+    heat_capacities,
+    of_materials,
+    parameter_of,
+    usual_parameters,
+)
 from hotlever.probe.surroundings import Medium
 from hotlever.quantities import FITTED
 
@@ -50,7 +55,7 @@ class FitOptions:
         What else is varied, beside what usually is.
     usual : sequence of str
         What usually is: by default the six parameters of the paper's lever. A fit takes what its
-        probe is made of (`hotlever.probe.parameters.usual_parameters`), and one of what was
+        probe is made of (`hotlever.probe.probe_parameters.usual_parameters`), and one of what was
         measured in time the scales of the heat capacities.
 
     Raises

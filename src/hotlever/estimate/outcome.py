@@ -30,8 +30,8 @@ from hotlever.lever.transient.waveform import Polyline, Sine
 from hotlever.measurement import MEASURED, Measurement
 from hotlever.measurement.data import OPTIONAL
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import SCALES, PriorUse
+from hotlever.probe.probe_parameters import parameters_of
 from hotlever.probe.surroundings import Medium
 from hotlever.records import Number, explained, stored_as
 from hotlever.types import Array

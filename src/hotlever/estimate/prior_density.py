@@ -17,8 +17,8 @@ from scipy.linalg import block_diag
 
 from hotlever.materials.parameters import Parameter
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import SCALES, Prior
+from hotlever.probe.probe_parameters import parameters_of
 from hotlever.types import Array
 
 

@@ -32,8 +32,8 @@ from hotlever.measurement import Measurement, given_measurement, with_measured_c
 from hotlever.measurement.contents import colder_than_base
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import Prior, as_known, known_beforehand
+from hotlever.probe.probe_parameters import parameters_of
 from hotlever.types import Progress
 
 #: The resistance of a cold lever is within this factor of its model's.

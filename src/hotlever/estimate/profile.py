@@ -22,7 +22,7 @@ from hotlever.estimate.optimiser import Optimiser
 from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.posterior import Posterior
 from hotlever.estimate.result import Fit
-from hotlever.probe.parameters import parameter_of, usual_parameters
+from hotlever.probe.probe_parameters import parameter_of, usual_parameters
 from hotlever.text import BAND
 from hotlever.types import Array, Index
 

@@ -47,8 +47,8 @@ from hotlever.lever.transient import simulate
 from hotlever.materials import full_name
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameter_of, parameters_of, usual_parameters
 from hotlever.probe.priors import Prior, PriorUse, priors_of
+from hotlever.probe.probe_parameters import parameter_of, parameters_of, usual_parameters
 from hotlever.quantities import FITTED, OF_A_CONTACT, Observable
 from hotlever.records import Number, stored_as
 from hotlever.text import value_with_error, with_unit

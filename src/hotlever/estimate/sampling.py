@@ -37,7 +37,7 @@ from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import full_name
 from hotlever.materials.parameters import INVERSION
 from hotlever.probe import Probe
-from hotlever.probe.parameters import parameters_of, usual_parameters
+from hotlever.probe.probe_parameters import parameters_of, usual_parameters
 from hotlever.steps import each
 from hotlever.text import BAND
 from hotlever.types import Array, Progress

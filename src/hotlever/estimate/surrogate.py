@@ -27,7 +27,7 @@ from hotlever.lever.observables import Linearised, at_fixed_bias, observed, obse
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.piecewise import Piecewise, crossing, spline_through
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.parameters import parameters_of
+from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import OBSERVABLES
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index

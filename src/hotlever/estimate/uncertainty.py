@@ -17,7 +17,7 @@ from hotlever.estimate.result import Fit
 from hotlever.estimate.sampling import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.files import json_text
 from hotlever.materials.parameters import heading, scale_of
-from hotlever.probe.parameters import parameters_of
+from hotlever.probe.probe_parameters import parameters_of
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.text import BAND, aligned, with_unit
 from hotlever.types import Array, Progress

@@ -27,8 +27,8 @@ from hotlever.estimate.surrogate import Rows
 from hotlever.estimate.tip_table import BUDGETS, budgets_of
 from hotlever.materials.departures import DEPARTURES, departure_of
 from hotlever.materials.parameters import own_name
-from hotlever.probe.parameters import parameters_of
 from hotlever.probe.priors import SCALES, PriorUse
+from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import FITTED, OBSERVABLES
 from hotlever.records import Number
 from hotlever.text import BAND

@@ -17,13 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever.errors import InputError
-from hotlever.figures.calibration import (
-    calibrated_levers,
-    calibration_curves,
-    judged_calibrations,
-    planned_measurements,
-)
-from hotlever.figures.claims import (
+from hotlever.figures.claim_figures import (
     disc_between_planes,
     knee_discrepancy,
     linear_branches,
@@ -34,24 +28,29 @@ from hotlever.figures.claims import (
     scale_factor,
     thermoelectric_shift,
 )
-from hotlever.figures.contact import contact_overview, reader_overview
-from hotlever.figures.design import design_optimum, design_study
-from hotlever.figures.drawing import outlines_drawing, probe_drawing
-from hotlever.figures.fit import (
+from hotlever.figures.design_figures import design_optimum, design_study
+from hotlever.figures.estimate_figures import (
+    calibrated_levers,
+    calibration_curves,
     correlation_matrix,
     data_and_model,
+    judged_calibrations,
     lever_parameters,
+    planned_measurements,
     posterior_corner,
     profile_curves,
     tip_band,
 )
-from hotlever.figures.lever import (
+from hotlever.figures.lever_figures import (
     doping_profile,
+    harmonics,
     heater_profiles,
     held_states,
+    history_overview,
     iv_curves,
     material_curves,
     resistances,
+    small_signals,
     sweep_overview,
     temperature_power,
 )
@@ -63,9 +62,10 @@ from hotlever.figures.maps import (
     temperature_map,
     temperature_slices,
 )
-from hotlever.figures.raman import one_spectrum, raman_check, thermometry
+from hotlever.figures.probe_figures import outlines_drawing, probe_drawing
+from hotlever.figures.raman_figures import one_spectrum, raman_check, thermometry
 from hotlever.figures.style import COLOURS, entitle, figure, save_figure
-from hotlever.figures.transient import harmonics, history_overview, small_signals
+from hotlever.figures.surface_figures import contact_overview, reader_overview
 from hotlever.lever import probe_of
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from PIL import Image
 from hotlever.air.panels import Panels
 from hotlever.colours import BLACK, HEAT, VERMILION
 from hotlever.errors import InputError
-from hotlever.figures.drawing import outlines
+from hotlever.figures.probe_figures import outlines
 from hotlever.figures.style import (
     COLOURS,
     STYLE,

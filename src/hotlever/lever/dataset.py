@@ -36,8 +36,8 @@ from hotlever.lever.observables import with_bridge
 from hotlever.materials import Kind
 from hotlever.materials.sections import LAWS
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.parameters import usual_parameters
 from hotlever.probe.parts import SECTIONS
+from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import OBSERVABLES
 from hotlever.types import Array, Mask
 

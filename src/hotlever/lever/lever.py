@@ -26,7 +26,7 @@ from hotlever.lever.readings import Reading, there_and_back
 from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP, Constraint
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.parameters import usual_parameters
+from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 

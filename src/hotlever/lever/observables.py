@@ -101,7 +101,7 @@ def at_fixed_bias(
         Derivatives of V_l, I_h, V_r and the rise of the tip, see
         `by_parameter`.
     of_circuit : ndarray, shape (n, p)
-        Derivatives of the bias for a given state, see `hotlever.probe.circuit.SweptSupply.bias_by`.
+        Derivatives of the bias for a given state, see `hotlever.probe.circuit.Circuit.bias_by`.
 
     Returns
     -------

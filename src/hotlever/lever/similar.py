@@ -22,7 +22,7 @@ from hotlever.lever.transport import Motion
 from hotlever.probe import Probe
 from hotlever.probe.layout import BorderTaper, Layout, Taper
 from hotlever.probe.moving import Movement, MovingMesh
-from hotlever.probe.parameters import dimensions_of, usual_parameters
+from hotlever.probe.probe_parameters import dimensions_of, usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
@@ -119,8 +119,8 @@ class SimilarLevers:
         near : Linearised, optional
             Of a similar probe on this mesh, to start from.
         names : tuple of str
-            Parameters of the derivatives, see `hotlever.probe.parameters`; by default what a fit
-            usually varies.
+            Parameters of the derivatives, see `hotlever.probe.probe_parameters`; by default what a
+            fit usually varies.
 
         Raises
         ------

@@ -2,7 +2,7 @@
 
 A new parameter of a material is a row here and a field of its kinds (`hotlever.materials.kinds`),
 made of the row by `field_of`; whatever asks for parameters meets it then. Probes add their
-dimensions, circuit and gas (`hotlever.probe.parameters`), and texts and axes ask here how a
+dimensions, circuit and gas (`hotlever.probe.probe_parameters`), and texts and axes ask here how a
 parameter is named.
 """
 

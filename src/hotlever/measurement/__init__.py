@@ -8,7 +8,7 @@ together.
 
 from hotlever.measurement.columns import parse_columns
 from hotlever.measurement.data import MEASURED, Measurement, with_measured_circuit
-from hotlever.measurement.reading import (
+from hotlever.measurement.measurement_file import (
     FileColumn,
     file_columns,
     file_groups,

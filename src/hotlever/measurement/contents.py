@@ -258,7 +258,7 @@ def _pressure(text: str, where: str) -> float | None:
 
 @dataclass
 class Contents:
-    """Rows and settings of a file, which `hotlever.measurement.bias` completes.
+    """Rows and settings of a file, which `hotlever.measurement.measurement_file` completes.
 
     Attributes
     ----------

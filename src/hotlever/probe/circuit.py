@@ -44,111 +44,6 @@ def _of_bridge(meaning: str) -> Any:
     return Field(default=None, ge=_LEAST_OHM, le=_MOST_OHM, description=f"of a bridge, {meaning}")
 
 
-class SweptSupply(Record):
-    """What drives a lever: V_b = V_l + R_s I_h, and what a bridge shows of it."""
-
-    series_resistance_ohm: float = resistance("between the bias source and the lever, R_s", 5600.0)
-    base_temperature_K: float = Field(
-        default=BASE_TEMPERATURE_K, ge=250, le=1000, description="of the leg ends"
-    )
-    chip_K_per_mW: float = Field(
-        default=0.0,
-        ge=0,
-        le=1000,
-        description="by which leg ends get warmer for the heat that enters the chip by them",
-    )
-    bridge_upper_ohm: float | None = _of_bridge("from the bias source to what V_l is compared with")
-    bridge_lower_ohm: float | None = _of_bridge("from there to ground")
-    bridge_gain: float | None = Field(
-        default=None,
-        ge=-_MOST_GAIN,
-        le=_MOST_GAIN,
-        description="of the bridge's amplifier; 1 if left out",
-    )
-    bridge_offset_V: float = Field(
-        default=0.0,
-        ge=-MOST_OFFSET_V,
-        le=MOST_OFFSET_V,
-        description="that the bridge's amplifier shows of no voltage",
-    )
-
-    @model_validator(mode="after")
-    def _bridge_is_whole(self) -> Self:
-        arms = {name: getattr(self, name) for name in ("bridge_upper_ohm", "bridge_lower_ohm")}
-        missing = [name for name, ohm in arms.items() if ohm is None]
-        amplified = self.bridge_gain is not None or self.bridge_offset_V != 0.0
-        if len(missing) == 1 or (missing and amplified):
-            raise ValueError(f"a bridge needs {missing[0]}")
-        if not missing and not self.series_resistance_ohm:
-            raise ValueError(
-                "series_resistance_ohm = 0: a bridge needs a resistor in series with the lever, "
-                "for without one V_l is V_b"
-            )
-        if self.bridge_gain == 0.0:
-            raise ValueError("bridge_gain = 0: expected the gain of an amplifier")
-        return self
-
-    @property
-    def series_kohm(self) -> float:
-        """R_s in kΩ, which makes volts of milliamperes."""
-        return self.series_resistance_ohm / 1000.0
-
-    def bias(self, lever_V: Any, current_mA: Any) -> Any:
-        """Return the bias V_b (V) of a lever voltage (V) and a current (mA), or its change."""
-        return lever_V + self.series_kohm * current_mA
-
-    def bias_by(self, name: str, current_mA: Any) -> Any:
-        """Return how the bias (V) changes with a value of the circuit, the lever being the same."""
-        return current_mA / 1000.0 if name == "series_resistance_ohm" else 0.0 * current_mA
-
-    def lever_voltage(self, bias_V: Any, current_mA: Any) -> Any:
-        """Return the lever voltage V_l (V) of a bias (V) and a current (mA)."""
-        return bias_V - self.series_kohm * current_mA
-
-    def power(self, bias_V: Any, current_mA: Any) -> Any:
-        """Return the power P_l = V_l I_h (mW) of a bias (V) and a current (mA)."""
-        return self.lever_voltage(bias_V, current_mA) * current_mA
-
-    @property
-    def has_bridge(self) -> bool:
-        """Whether the lever is part of a Wheatstone bridge."""
-        return self.bridge_upper_ohm is not None
-
-    @property
-    def _arms(self) -> tuple[float, float, float]:
-        """Gain, and upper and lower resistor of the divider (Ω), NaN without a bridge."""
-        upper, lower = self.bridge_upper_ohm, self.bridge_lower_ohm
-        if upper is None or lower is None:
-            return (float("nan"),) * 3
-        return 1.0 if self.bridge_gain is None else self.bridge_gain, upper, lower
-
-    def bridge_voltage(self, lever_V: Any, bias_V: Any) -> Any:
-        """Return the voltage V_bridge (V) of a lever voltage and a bias (V); NaN without one."""
-        return self.bridge_change(lever_V, bias_V) + self.bridge_offset_V
-
-    def bridge_change(self, lever_V: Any, bias_V: Any) -> Any:
-        """Return how V_bridge (V) changes where the lever voltage and the bias change (V)."""
-        gain, upper, lower = self._arms
-        return gain * (lever_V - lower / (upper + lower) * bias_V)
-
-    def bridge_by(self, name: str, bias_V: Array) -> Array:
-        """Return how V_bridge (V) changes with a value of the circuit, V_l and V_b being the same.
-
-        The gain is no such value: its error is that of the scale of what is shown.
-        """
-        gain, upper, lower = self._arms
-        if name == "bridge_offset_V":
-            return np.full_like(bias_V, 1.0)
-        by = {"bridge_upper_ohm": lower, "bridge_lower_ohm": -upper}.get(name, 0.0)
-        return np.asarray(gain * by / (upper + lower) ** 2 * bias_V)
-
-    def current_of_bridge(self, bridge_V: Array, bias_V: Array) -> Array:
-        """Return the current I_h (mA) at which the bridge shows a voltage (V); NaN without one."""
-        gain, upper, lower = self._arms
-        difference_V = (bridge_V - self.bridge_offset_V) / gain
-        return np.asarray((upper / (upper + lower) * bias_V - difference_V) / self.series_kohm)
-
-
 class Contact(Record):
     """What is wired to one terminal (section ``[circuit.NAME]`` of a probe file).
 
@@ -238,7 +133,7 @@ class Wiring:
         return (*self.grounds, *self.held)
 
 
-class Circuit(SweptSupply):
+class Circuit(Record):
     """The measuring circuit (section ``[circuit]`` of a probe file).
 
     The bias V_b drives the heater current I_h through the series resistor R_s and the lever,
@@ -254,8 +149,48 @@ class Circuit(SweptSupply):
     8.268
     """
 
+    series_resistance_ohm: float = resistance("between the bias source and the lever, R_s", 5600.0)
+    base_temperature_K: float = Field(
+        default=BASE_TEMPERATURE_K, ge=250, le=1000, description="of the leg ends"
+    )
+    chip_K_per_mW: float = Field(
+        default=0.0,
+        ge=0,
+        le=1000,
+        description="by which leg ends get warmer for the heat that enters the chip by them",
+    )
+    bridge_upper_ohm: float | None = _of_bridge("from the bias source to what V_l is compared with")
+    bridge_lower_ohm: float | None = _of_bridge("from there to ground")
+    bridge_gain: float | None = Field(
+        default=None,
+        ge=-_MOST_GAIN,
+        le=_MOST_GAIN,
+        description="of the bridge's amplifier; 1 if left out",
+    )
+    bridge_offset_V: float = Field(
+        default=0.0,
+        ge=-MOST_OFFSET_V,
+        le=MOST_OFFSET_V,
+        description="that the bridge's amplifier shows of no voltage",
+    )
     swept: str = Field(default="supply", description="terminal of the supply that is swept")
     contacts: dict[str, Contact] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _bridge_is_whole(self) -> Self:
+        arms = {name: getattr(self, name) for name in ("bridge_upper_ohm", "bridge_lower_ohm")}
+        missing = [name for name, ohm in arms.items() if ohm is None]
+        amplified = self.bridge_gain is not None or self.bridge_offset_V != 0.0
+        if len(missing) == 1 or (missing and amplified):
+            raise ValueError(f"a bridge needs {missing[0]}")
+        if not missing and not self.series_resistance_ohm:
+            raise ValueError(
+                "series_resistance_ohm = 0: a bridge needs a resistor in series with the lever, "
+                "for without one V_l is V_b"
+            )
+        if self.bridge_gain == 0.0:
+            raise ValueError("bridge_gain = 0: expected the gain of an amplifier")
+        return self
 
     @classmethod
     def from_values(cls, values: dict[str, Any], where: str) -> Self:
@@ -400,6 +335,68 @@ class Circuit(SweptSupply):
                     f"[circuit.{name}]: {what} takes a lever that only the swept supply heats, "
                     f"found {'a held supply' if contact.norton[1] else 'a warmer leg end'}"
                 )
+
+    # --- the swept supply and its bridge ----------------------------------------------------------
+
+    @property
+    def series_kohm(self) -> float:
+        """R_s in kΩ, which makes volts of milliamperes."""
+        return self.series_resistance_ohm / 1000.0
+
+    def bias(self, lever_V: Any, current_mA: Any) -> Any:
+        """Return the bias V_b (V) of a lever voltage (V) and a current (mA), or its change."""
+        return lever_V + self.series_kohm * current_mA
+
+    def bias_by(self, name: str, current_mA: Any) -> Any:
+        """Return how the bias (V) changes with a value of the circuit, the lever being the same."""
+        return current_mA / 1000.0 if name == "series_resistance_ohm" else 0.0 * current_mA
+
+    def lever_voltage(self, bias_V: Any, current_mA: Any) -> Any:
+        """Return the lever voltage V_l (V) of a bias (V) and a current (mA)."""
+        return bias_V - self.series_kohm * current_mA
+
+    def power(self, bias_V: Any, current_mA: Any) -> Any:
+        """Return the power P_l = V_l I_h (mW) of a bias (V) and a current (mA)."""
+        return self.lever_voltage(bias_V, current_mA) * current_mA
+
+    @property
+    def has_bridge(self) -> bool:
+        """Whether the lever is part of a Wheatstone bridge."""
+        return self.bridge_upper_ohm is not None
+
+    @property
+    def _arms(self) -> tuple[float, float, float]:
+        """Gain, and upper and lower resistor of the divider (Ω), NaN without a bridge."""
+        upper, lower = self.bridge_upper_ohm, self.bridge_lower_ohm
+        if upper is None or lower is None:
+            return (float("nan"),) * 3
+        return 1.0 if self.bridge_gain is None else self.bridge_gain, upper, lower
+
+    def bridge_voltage(self, lever_V: Any, bias_V: Any) -> Any:
+        """Return the voltage V_bridge (V) of a lever voltage and a bias (V); NaN without one."""
+        return self.bridge_change(lever_V, bias_V) + self.bridge_offset_V
+
+    def bridge_change(self, lever_V: Any, bias_V: Any) -> Any:
+        """Return how V_bridge (V) changes where the lever voltage and the bias change (V)."""
+        gain, upper, lower = self._arms
+        return gain * (lever_V - lower / (upper + lower) * bias_V)
+
+    def bridge_by(self, name: str, bias_V: Array) -> Array:
+        """Return how V_bridge (V) changes with a value of the circuit, V_l and V_b being the same.
+
+        The gain is no such value: its error is that of the scale of what is shown.
+        """
+        gain, upper, lower = self._arms
+        if name == "bridge_offset_V":
+            return np.full_like(bias_V, 1.0)
+        by = {"bridge_upper_ohm": lower, "bridge_lower_ohm": -upper}.get(name, 0.0)
+        return np.asarray(gain * by / (upper + lower) ** 2 * bias_V)
+
+    def current_of_bridge(self, bridge_V: Array, bias_V: Array) -> Array:
+        """Return the current I_h (mA) at which the bridge shows a voltage (V); NaN without one."""
+        gain, upper, lower = self._arms
+        difference_V = (bridge_V - self.bridge_offset_V) / gain
+        return np.asarray((upper / (upper + lower) * bias_V - difference_V) / self.series_kohm)
 
 
 def _contacts_of(values: Mapping[str, Any]) -> dict[str, Any]:

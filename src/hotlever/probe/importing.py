@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import itertools
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import shapely
+from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
 
-from hotlever.errors import InputError
-from hotlever.probe.drawing.layer_inference import FILM, Drawn, LayerInference, infer_layers
+from hotlever.errors import InputError, counted
+from hotlever.probe.drawing.edges import outline_edges, terminal_edges
 from hotlever.probe.drawing.layers import BODY, DRAWN, HEATER, REQUIRED, SILICON, terminal_part
-from hotlever.probe.drawing.outlines import DrawingError, Ring, polygons, together
+from hotlever.probe.drawing.outlines import (
+    DrawingError,
+    Ring,
+    healed,
+    parts_of,
+    polygons,
+    snapped,
+    together,
+)
+from hotlever.probe.drawing.partition import Partition, partitioned
 from hotlever.probe.drawing.shape import TOLERANCE_UM, relative
 from hotlever.probe.drawing.sheet import (
     UNITS,
+    Layer,
     Sheet,
     doubt,
     extent_of,
@@ -24,11 +38,357 @@ from hotlever.probe.drawing.sheet import (
     sensible_unit,
 )
 from hotlever.probe.file_sections import other_sections, section_lines
-from hotlever.probe.layout import ring_area
+from hotlever.probe.layout import Point, ring_area
 from hotlever.probe.parts import MATERIAL
 from hotlever.probe.probe import Probe
 from hotlever.probe.shapes import DRAWING
 from hotlever.text import aligned, as_toml
+
+SUPPLY, GROUND, READER = "supply", "ground", "reader"
+#: A film that is heater and legs in one, on a body that is not of silicon.
+FILM = "film"
+#: Share of the silicon that a low-doped layer does not exceed.
+_LARGEST_SHARE = 0.6
+#: Of a film's greatest distance from the terminals, the share from which on its tip may be.
+_FAR = 0.95
+
+#: A layer by its name, or outlines.
+Drawn = str | tuple[Ring, ...]
+
+
+@dataclass
+class LayerInference:
+    """What is what in a drawing.
+
+    Attributes
+    ----------
+    layers, terminals : dict of str to layer's name or rings
+    tip : tuple of float or None
+    reasons : dict of str to str
+        By the names that parts have in errors, and for the ``tip``.
+    doubts : list of str
+        What could not be told.
+    """
+
+    layers: dict[str, Drawn] = field(default_factory=dict)
+    terminals: dict[str, Drawn] = field(default_factory=dict)
+    tip: Point | None = None
+    reasons: dict[str, str] = field(default_factory=dict)
+    doubts: list[str] = field(default_factory=list)
+
+
+def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
+    """Say which layer of a drawing is what, and why."""
+    inferred = LayerInference()
+    shapes = _shapes(sheet, tolerance, inferred.doubts)
+    judged = [_Silicon(name, sheet, shapes, tolerance) for name in shapes]
+    best = max(judged, key=lambda candidate: candidate.merit, default=None)
+    if best is None:
+        inferred.doubts.append("no layer holds a closed outline")
+        return inferred
+    best, film = _body_and_film(best, judged)
+    body = SILICON if film is None else BODY
+    inferred.layers[body] = best.name
+    touched = len(best.cutters) + len(best.touching)
+    verbs = ("lies", "touches") if touched == 1 else ("lie", "touch")
+    inferred.reasons[body] = (
+        f"{best.shape.area:.4g} µm²; {counted(touched, 'other layer')} {verbs[0]} across it or "
+        f"{verbs[1]} its outline"
+    )
+    if len(best.pieces) > 1:
+        inferred.doubts.append(
+            f"layer {best.name} has {len(best.pieces)} pieces that do not touch; a lever is one"
+        )
+    if film is None:
+        _low_doped(best, inferred)
+    else:
+        inferred.layers[FILM] = film.name
+        inferred.reasons[FILM] = "it lies on the body, and no layer lies across it"
+        inferred.doubts.append(
+            f"layer {film.name} is taken for a film that is heater and legs in one; its thickness, "
+            "and what it and the body are made of, the drawing does not say"
+        )
+    _terminals(best, sheet, inferred)
+    _tip(best, sheet, shapes, inferred)
+    return inferred
+
+
+def _shapes(sheet: Sheet, tolerance: float, doubts: list[str]) -> dict[str, BaseGeometry]:
+    """Return the healed area of each layer that has one."""
+    shapes = {}
+    for name, layer in sheet.layers.items():
+        if not layer.rings:
+            continue
+        try:
+            areas = polygons(name, sheet.rings(layer), tolerance)
+            shapes[name] = healed(name, areas, tolerance)
+        except DrawingError as error:
+            doubts.append(f"layer {error}")
+    return {name: shape for name, shape in shapes.items() if not shape.is_empty}
+
+
+class _Silicon:
+    """A layer, seen as the silicon of the lever.
+
+    Attributes
+    ----------
+    cutters : list of str
+        Layers that lie across it so that it falls apart without them, or inside it.
+    touching : list of str
+        Layers that touch its outline along an edge.
+    merit : tuple
+        The larger, the likelier it is the silicon.
+    """
+
+    def __init__(
+        self, name: str, sheet: Sheet, shapes: dict[str, BaseGeometry], tolerance: float
+    ) -> None:
+        self.name, self.tolerance = name, tolerance
+        self.pieces = sorted(parts_of(shapes[name]), key=lambda piece: -piece.area)
+        self.shape: Polygon = self.pieces[0]
+        self.areas = shapes
+        self.cutters: list[str] = []
+        self.touching: list[str] = []
+        for other, layer in sheet.layers.items():
+            if other == name:
+                continue
+            if other in shapes and self._is_cut_by(shapes[other]):
+                self.cutters.append(other)
+            elif not self._is_within(shapes.get(other)) and self.ends_of(other, sheet, layer):
+                self.touching.append(other)
+        self.merit = (bool(self.cutters), min(len(self.touching), 2), self.shape.area)
+
+    def _is_cut_by(self, other: BaseGeometry) -> bool:
+        """Whether the silicon falls apart, or has one more hole, without another layer."""
+        inside = self._sizable(self.shape.intersection(other))
+        area = sum(piece.area for piece in inside)
+        if not 0 < area < _LARGEST_SHARE * self.shape.area:
+            return False
+        rest = self._sizable(self.shape.difference(other.buffer(self.tolerance)))
+        holes = sum(len(piece.interiors) for piece in rest)
+        return len(rest) > 1 or holes > len(self.shape.interiors)
+
+    def lies_on(self, other: str) -> bool:
+        """Whether another layer is below all of it, and beyond."""
+        below = self.areas[other]
+        return below.area > self.shape.area and self._is_within(below)
+
+    def _is_within(self, other: BaseGeometry | None) -> bool:
+        """Whether another layer covers all of it, as a frame does, and so marks no end of it."""
+        return other is not None and bool(other.buffer(self.tolerance).covers(self.shape))
+
+    def _sizable(self, shape: BaseGeometry) -> list[Polygon]:
+        return [
+            piece for piece in parts_of(shape) if piece.area > 10 * self.tolerance * piece.length
+        ]
+
+    def ends_of(self, name: str, sheet: Sheet, layer: Layer) -> bool:
+        """Whether a layer touches the outline along an edge."""
+        try:
+            return bool(
+                terminal_edges(self.shape, {name: sheet.rings(layer, lines=True)}, self.tolerance)
+            )
+        except DrawingError:
+            return False
+
+
+def _body_and_film(best: _Silicon, judged: list[_Silicon]) -> tuple[_Silicon, _Silicon | None]:
+    """Return the body of a lever, and the film on it where no layer lies across the silicon."""
+    if best.cutters:
+        return best, None
+    below = [other for other in judged if best.lies_on(other.name)]
+    if below:
+        return max(below, key=lambda other: other.shape.area), best
+    above = [
+        other for other in judged if other.lies_on(best.name) and other.name not in best.touching
+    ]
+    return best, max(above, key=lambda other: other.shape.area, default=None)
+
+
+# --- low-doped parts ---------------------------------------------------------------------------
+
+
+def _low_doped(best: _Silicon, inferred: LayerInference) -> None:
+    """Tell the heater among the layers that cut the silicon, and name the others."""
+    if not best.cutters:
+        inferred.doubts.append(
+            "no layer lies across the silicon so that current has to pass it: the heater is missing"
+        )
+        return
+    heater = _hinted(best.cutters, ("heat", "htr")) or _farthest(best)
+    reason = "the silicon falls apart without it"
+    if len(best.cutters) > 1:
+        reason += "; of such layers the farthest from the terminals"
+    inferred.layers[HEATER], inferred.reasons[HEATER] = heater, reason
+    rest = [name for name in best.cutters if name != heater]
+    for number, name in enumerate(rest, start=1):
+        part = READER if len(rest) == 1 else f"low-doped-{number}"
+        inferred.layers[part] = name
+        inferred.reasons[part] = "the silicon falls apart without it too, nearer to the terminals"
+
+
+def _hinted(names: Iterable[str], words: tuple[str, ...]) -> str | None:
+    """Return the one layer whose name says what it is, None if not one does."""
+    hits = [name for name in names if any(word in name.lower() for word in words)]
+    return hits[0] if len(hits) == 1 else None
+
+
+def _farthest(best: _Silicon) -> str:
+    """Return the layer across the silicon that is farthest from where the terminals are."""
+    ends = [best.areas[name] for name in best.touching if name in best.areas]
+    if not ends:
+        base = _base(best.shape, best.areas[best.cutters[0]])
+        ends = [LineString(edge) for edge in base] or [best.shape.centroid]
+    near = shapely.union_all(ends).centroid
+    return max(
+        best.cutters, key=lambda name: near.distance(best.areas[name].intersection(best.shape))
+    )
+
+
+# --- terminals ---------------------------------------------------------------------------------
+
+
+def _terminals(best: _Silicon, sheet: Sheet, inferred: LayerInference) -> None:
+    """Tell supply, ground and reader by what lies between them."""
+    candidates: dict[str, Drawn] = {name: name for name in best.touching}
+    if len(candidates) == 1:
+        (only,) = candidates
+        rings = sheet.rings(sheet.layers[only], lines=True)
+        if len(rings) > 1:
+            # several contacts on one layer
+            candidates = {
+                f"polygon {n} of {only}": (ring,) for n, ring in enumerate(rings, start=1)
+            }
+    why = "it touches the outline along an edge"
+    if len(candidates) < 2:
+        heater = inferred.layers.get(HEATER)
+        middle = best.areas[heater] if isinstance(heater, str) else best.shape.centroid
+        base = _base(best.shape, middle)
+        candidates = {f"edge {number}": (edge,) for number, edge in enumerate(base, start=1)}
+        why = "one of the edges in a line far from the heater; no layer marks a terminal"
+    if len(candidates) < 2:
+        inferred.doubts.append("no edges that could be terminals: supply and ground are missing")
+        return
+    rings_by = {
+        name: sheet.rings(sheet.layers[drawn], lines=True) if isinstance(drawn, str) else drawn
+        for name, drawn in candidates.items()
+    }
+    try:
+        named = _named(best, inferred, rings_by)
+    except DrawingError as error:
+        inferred.doubts.append(f"terminals cannot be told apart ({error.what})")
+        named = {
+            role: (name, "")
+            for role, name in zip((SUPPLY, GROUND, READER), candidates, strict=False)
+        }
+    for role, (name, reason) in named.items():
+        inferred.terminals[role] = candidates[name]
+        inferred.reasons[terminal_part(role)] = "; ".join(filter(None, (why, reason)))
+
+
+def _named(
+    best: _Silicon, inferred: LayerInference, rings: dict[str, tuple[Ring, ...]]
+) -> dict[str, tuple[str, str]]:
+    """Return the terminal for each role, and why."""
+    parts = {
+        part: snapped(best.areas[name], best.shape, 1.5 * best.tolerance)
+        for part, name in inferred.layers.items()
+        if part not in (SILICON, BODY, FILM) and isinstance(name, str)
+    }
+    partition = partitioned((SILICON, best.shape), parts)
+    ends = terminal_edges(best.shape, rings, best.tolerance)
+    at = partition.touched_by(ends, best.tolerance)
+    heaters = {number for number, piece in enumerate(partition.pieces) if HEATER in piece.layers}
+    sides = _grouped(partition, at, heaters)
+    alone = next((side for side in sides if len(side) == 1), sides[0])
+    others = [name for side in sides if side is not alone for name in side] or alone[1:]
+    supply = _hinted(at, ("supply", "bias", "v+", "vdd")) or alone[0]
+    rest = [name for name in (*others, *alone) if name != supply]
+    named = {SUPPLY: (supply, "alone on its side of the heater" if len(at) > 2 else "")}
+    if not rest:
+        return named
+    # terminals that reach the heater through another low-doped part only
+    low = {number for number, piece in enumerate(partition.pieces) if SILICON not in piece.layers}
+    around = {name: partition.reached(at[name], low) for name in rest}
+    behind = [
+        name
+        for name, numbers in around.items()
+        if not any(partition.neighbours(number) & heaters for number in numbers)
+    ]
+    ground = _hinted(rest, ("ground", "gnd")) or next(
+        (name for name in rest if name not in behind), rest[0]
+    )
+    reason = "on the other side of the heater" if heaters else "at the other end"
+    if len(rest) > 1 and not behind:
+        reason += "; which of the terminals there is ground, the drawing does not say"
+    named[GROUND] = (ground, reason)
+    rest = [name for name in rest if name != ground]
+    for number, name in enumerate(rest):
+        role = READER if number == 0 else f"end-{number}"
+        reason = "behind another low-doped part" if name in behind else "carries no current"
+        named[role] = (name, reason)
+    return named
+
+
+def _grouped(partition: Partition, at: dict[str, set[int]], heaters: set[int]) -> list[list[str]]:
+    """Return the terminals in groups that are connected other than through a heater."""
+    groups: list[list[str]] = []
+    for name in at:
+        reached = partition.reached(at[name], heaters)
+        group = next((others for others in groups if at[others[0]] & reached), None)
+        if group is None:
+            groups.append([name])
+        else:
+            group.append(name)
+    return groups
+
+
+def _base(silicon: Polygon, heater: BaseGeometry) -> list[tuple[Point, Point]]:
+    """Return the edges that lie in one line on the hull, the line farthest from the heater."""
+    edges = outline_edges(silicon)
+    hull = np.array(silicon.convex_hull.exterior.coords)
+    best: tuple[float, list[tuple[Point, Point]]] = (0.0, [])
+    for start, end in itertools.pairwise(hull):
+        side = LineString([start, end]).buffer(1e-3)
+        here = [edge for edge in edges if side.covers(LineString(edge))]
+        away = heater.distance(LineString([start, end]))
+        if len(here) > 1 and away > best[0]:
+            best = (away, here)
+    return sorted(best[1])
+
+
+# --- tip ---------------------------------------------------------------------------------------
+
+
+def _tip(
+    best: _Silicon, sheet: Sheet, shapes: dict[str, BaseGeometry], inferred: LayerInference
+) -> None:
+    """Find the place of the tip."""
+    for _, text, point in sheet.labels:
+        if "tip" in text.lower() and best.shape.contains(shapely.Point(point)):
+            inferred.tip = (round(point[0], 6) + 0.0, round(point[1], 6) + 0.0)  # no -0
+            inferred.reasons["tip"] = f"the text '{text.strip()[:20]}' stands there"
+            return
+    heater, film = (inferred.layers.get(part) for part in (HEATER, FILM))
+    if isinstance(heater, str):
+        area, why = shapes[heater].intersection(best.shape), "the middle of the heater"
+    elif isinstance(film, str):
+        drawn = [inferred.terminals[end] for end in (SUPPLY, GROUND) if end in inferred.terminals]
+        ends = [
+            shapes.get(end, best.shape) if isinstance(end, str) else shapely.MultiPoint(end[0])
+            for end in drawn
+        ]
+        near = shapely.union_all(ends or [best.shape]).centroid
+        reach = shapely.hausdorff_distance(near, shapes[film].boundary)
+        area = shapes[film].difference(near.buffer(_FAR * reach))
+        why = "where the film is farthest from the terminals"
+    else:
+        return
+    inside = max(parts_of(area), key=lambda piece: piece.area)
+    middle = inside.centroid if inside.contains(inside.centroid) else inside.point_on_surface()
+    inferred.tip = (round(middle.x, 6) + 0.0, round(middle.y, 6) + 0.0)
+    inferred.reasons["tip"] = f"{why}; no text in the drawing says 'tip'"
+
 
 #: Layers that are listed, and notes on how the file is read.
 _MOST_LISTED = 60

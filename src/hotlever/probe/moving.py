@@ -20,8 +20,8 @@ from scipy.sparse.linalg import splu
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import BorderTaper, Layout, Point, Region
 from hotlever.probe.mesh import ProbeMesh, doubled_areas, on_line
-from hotlever.probe.parameters import OF_THE_TIP
 from hotlever.probe.parts import ProbeParts
+from hotlever.probe.probe_parameters import OF_THE_TIP
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
 

@@ -16,7 +16,7 @@ from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.materials.sections import LAWS
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Layout
-from hotlever.probe.monitors import Monitor, Monitors
+from hotlever.probe.monitor_sections import Monitor, Monitors
 from hotlever.probe.shapes import SHAPE_SECTIONS, Shape
 from hotlever.probe.surroundings import THE_PAPERS, Physics, Surroundings
 from hotlever.probe.tip import SampleContact, Tip

@@ -28,8 +28,8 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.materials.departures import DEPARTURES
 from hotlever.materials.parameters import Parameter, own_name
 from hotlever.probe.chip import on_usual_chip
-from hotlever.probe.parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.parts import ProbeParts
+from hotlever.probe.probe_parameters import nuisances, of_materials, parameters_of
 from hotlever.records import StandardError
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 from hotlever.text import with_unit
@@ -211,9 +211,9 @@ def default_priors(
 ) -> dict[str, Prior]:
     """Return what is known of a lever of which nothing but the probe file is known.
 
-    That are the spreads of `hotlever.materials.parameters` and `hotlever.probe.parameters` about
-    the probe's values, materials first, and what is known in the parameter's unit last. What is
-    known of the material instead may be given; what the probe file states wins.
+    That are the spreads of `hotlever.materials.parameters` and `hotlever.probe.probe_parameters`
+    about the probe's values, materials first, and what is known in the parameter's unit last. What
+    is known of the material instead may be given; what the probe file states wins.
     """
     materials, table = of_materials(probe), parameters_of(probe)
     priors = {

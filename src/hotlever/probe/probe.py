@@ -19,7 +19,7 @@ from hotlever.probe.file_sections import (
     parts_of,
     read_sections,
 )
-from hotlever.probe.monitors import Monitor, Monitors
+from hotlever.probe.monitor_sections import Monitor, Monitors
 from hotlever.probe.parts import MATERIAL, MATERIALS, ProbeParts
 from hotlever.probe.shapes import ThreeLeg, UShape
 from hotlever.records import Record

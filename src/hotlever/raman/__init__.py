@@ -7,17 +7,17 @@ what is said of it by hand (`tables`); a hot-plate series (`series`) gives a cal
 """
 # ruff: noqa: F401 (what is imported here is what the package offers)
 
-from hotlever.raman.calibration import (
+from hotlever.raman.line_fit import fit_peak
+from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
+from hotlever.raman.raman_calibration import (
     Point,
     RamanCalibration,
     calibrate_raman,
     published_raman_calibration,
     read_raman_calibration,
 )
-from hotlever.raman.fit import fit_peak
-from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
-from hotlever.raman.reading import read_spectra, read_spectrum
 from hotlever.raman.series import calibrate_from, measure, read_lines
 from hotlever.raman.spectrum import Spectrum
-from hotlever.raman.tables import Correction, read_corrections
+from hotlever.raman.spectrum_reading import read_spectra, read_spectrum
+from hotlever.raman.spectrum_tables import Correction, read_corrections
 from hotlever.raman.thermometer import Thermometer, laser_heating

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman import anharmonic
-from hotlever.raman.calibration import RamanCalibration
 from hotlever.raman.lineshape import Peak
+from hotlever.raman.raman_calibration import RamanCalibration
 from hotlever.spieser2017 import ABSORBED_SHARE, STRESS_SHIFT
 from hotlever.types import Array
 
@@ -36,7 +36,7 @@ class Thermometer:
 
     Examples
     --------
-    >>> from hotlever.raman.calibration import published_raman_calibration
+    >>> from hotlever.raman.raman_calibration import published_raman_calibration
     >>> thermometer = Thermometer(published_raman_calibration(), law="linear", reference=520.7)
     >>> reading = thermometer.read([520.7 - 10.0], [0.05])
     >>> reading.temperature.round(1).tolist()

@@ -19,7 +19,7 @@ from hotlever.estimate.uncertainty_budget import TemperatureBudget
 from hotlever.materials.parameters import sentence
 from hotlever.quantities import QUANTITIES
 from hotlever.report.fit_pages import add_remarks
-from hotlever.report.page import Block, Page
+from hotlever.report.report_page import Block, Page
 from hotlever.text import significant, with_unit
 from hotlever.types import Array
 

@@ -21,7 +21,7 @@ from hotlever.estimate.result import Fit
 from hotlever.estimate.uncertainty import Uncertainty
 from hotlever.lever import Lever
 from hotlever.materials.parameters import INVERSION
-from hotlever.report.page import Block, Page
+from hotlever.report.report_page import Block, Page
 
 #: Points of a curve without visible corners.
 _POINTS = 110

@@ -13,7 +13,7 @@ from hotlever.lever.transient import pulse, rise_times, simulate, spectrum, step
 from hotlever.lever.transient.frequency_domain import harmonics
 from hotlever.lever.transient.modes import Source
 from hotlever.materials.parameters import sentence
-from hotlever.report.page import Page
+from hotlever.report.report_page import Page
 from hotlever.steps import each
 from hotlever.types import Progress
 

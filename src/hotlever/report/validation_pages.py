@@ -16,7 +16,7 @@ from hotlever.estimate.calibration import rms
 from hotlever.estimate.calibration_summary import calibration_parts
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes
-from hotlever.report.page import Page
+from hotlever.report.report_page import Page
 from hotlever.studies.validation.case import Case, cases, sought
 from hotlever.studies.validation.prediction import (
     DRAWS,

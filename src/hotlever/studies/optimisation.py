@@ -21,7 +21,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.file_sections import field_of
-from hotlever.probe.parameters import parameters_of
+from hotlever.probe.probe_parameters import parameters_of
 from hotlever.studies.working_point import (
     OF_THE_READER,
     QUANTITIES,
@@ -106,8 +106,8 @@ def optimise(
         One of `hotlever.studies.working_point.QUANTITIES`.
     point : WorkingPoint
     bounds : mapping of str to tuple of float
-        From and to, of numbers of the design, see `hotlever.probe.parameters`, of which there must
-        be one, and of quantities, where either may be None.
+        From and to, of numbers of the design, see `hotlever.probe.probe_parameters`, of which there
+        must be one, and of quantities, where either may be None.
     greatest : bool
     progress : callable, optional
         Called with the designs tried and how many there may be.

@@ -19,7 +19,7 @@ from hotlever.lever.equations import BALANCES, balance_columns
 from hotlever.materials.heat import sheet_emissivity
 from hotlever.materials.kinds import LowDopedSilicon
 from hotlever.probe import Probe
-from hotlever.probe.parameters import of_materials
+from hotlever.probe.probe_parameters import of_materials
 
 
 def radiated_heat(probe: Probe, tip_K: ArrayLike, emissivity: float | None = None) -> xr.Dataset:

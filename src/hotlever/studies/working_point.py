@@ -101,7 +101,7 @@ class SolvedDesign:
     probe : Probe
     point : WorkingPoint
     names : sequence of str
-        Parameters of the derivatives, see `hotlever.probe.parameters`.
+        Parameters of the derivatives, see `hotlever.probe.probe_parameters`.
 
     Raises
     ------

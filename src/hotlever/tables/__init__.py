@@ -6,7 +6,7 @@ where a line that is no row is an error; `find_tables` for files with numbers an
 """
 
 from hotlever.tables.binary import groups_in
-from hotlever.tables.reading import find_tables, read_table
 from hotlever.tables.table import TextTable
+from hotlever.tables.text_tables import find_tables, read_table
 
 __all__ = ["TextTable", "find_tables", "groups_in", "read_table"]

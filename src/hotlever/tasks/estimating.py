@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from hotlever.estimate.uncertainty import Uncertainty
     from hotlever.measurement import Measurement
     from hotlever.probe import Probe
-    from hotlever.report.page import Page
+    from hotlever.report.report_page import Page
 
 #: Points of a curve that is shown while a fit goes on.
 _DRAWN = 200

@@ -35,11 +35,11 @@ from hotlever.tasks.reporter import Listener, Reporter
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hotlever.raman.calibration import RamanCalibration
     from hotlever.raman.lineshape import PeakOptions
+    from hotlever.raman.raman_calibration import RamanCalibration
     from hotlever.raman.series import Line
     from hotlever.raman.spectrum import Spectrum
-    from hotlever.raman.tables import Correction
+    from hotlever.raman.spectrum_tables import Correction
     from hotlever.raman.thermometer import Thermometer
 
 #: What stands for the published laws in place of a calibration file.
@@ -138,7 +138,7 @@ def join_spectra(
     A spectrum belongs to the row that names it in a 'file' column, or has the bias in its name
     (tip_5.25V.txt); else spectra and rows are paired in order.
     """
-    from hotlever.raman.tables import join, read_bias_log
+    from hotlever.raman.spectrum_tables import join, read_bias_log
 
     log = read_bias_log(bias_log)
     setup = set_up(
@@ -221,7 +221,7 @@ class Thermometry:
             If one cannot be read, none is left to use, or none has a silicon line.
         """
         from hotlever.raman import series
-        from hotlever.raman.tables import check_corrections
+        from hotlever.raman.spectrum_tables import check_corrections
 
         spectra = _read(self.listener, paths)
         table = self.corrected_by
@@ -247,8 +247,8 @@ def _note_some(listener: Listener, texts: Sequence[str]) -> None:
 
 def _read(listener: Listener, paths: Sequence[Path]) -> list[Spectrum]:
     """Read spectra; what a folder holds beside them is noted."""
-    from hotlever.raman.reading import read_spectra
     from hotlever.raman.spectrum import file_and_label
+    from hotlever.raman.spectrum_reading import read_spectra
 
     skipped: list[str] = []
     with listener.progress("reading") as update:
@@ -284,7 +284,7 @@ def _measure(
 
 def calibration_named(name: str | None) -> RamanCalibration | None:
     """Return the published calibration, the one in a file, or none."""
-    from hotlever.raman.calibration import published_raman_calibration, read_raman_calibration
+    from hotlever.raman.raman_calibration import published_raman_calibration, read_raman_calibration
 
     if name is None:
         return None
@@ -300,7 +300,7 @@ def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
         If a file is at fault, or these do not go together.
     """
     from hotlever.raman import series
-    from hotlever.raman.tables import read_corrections, read_temperatures
+    from hotlever.raman.spectrum_tables import read_corrections, read_temperatures
     from hotlever.raman.thermometer import Law, Thermometer, laser_heating
 
     if asked.law not in get_args(Law):

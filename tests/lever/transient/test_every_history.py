@@ -12,7 +12,7 @@ from hotlever.lever.transient import Waveform, pulse, ramp, simulate, sine, step
 from hotlever.materials import PARAMETERS
 from hotlever.materials.silicon import MELTING_POINT
 from hotlever.probe import Probe
-from hotlever.probe.parameters import dimensions_of
+from hotlever.probe.probe_parameters import dimensions_of
 
 #: Random ones that the usual run has, of all.
 _FEW, _ALL = 6, 200

@@ -19,8 +19,8 @@ from hotlever.app.pages.chosen_lever import (
     settings,
 )
 from hotlever.app.pages.frame import ErrorBanner, caption, figure
-from hotlever.app.pages.page import FILM, KINDS, DrawnPage, Work
 from hotlever.app.pages.plots import compare_histories
+from hotlever.app.pages.task_page import FILM, KINDS, DrawnPage, Work
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 

@@ -14,8 +14,8 @@ from nicegui import background_tasks, ui
 
 from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import ErrorBanner, caption, number_shown, two_columns
-from hotlever.app.pages.page import Page, Work
 from hotlever.app.pages.plots import redraw
+from hotlever.app.pages.task_page import Page, Work
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 

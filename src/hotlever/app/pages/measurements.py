@@ -12,7 +12,7 @@ from nicegui import ui
 
 from hotlever.app import showing
 from hotlever.app.jobs import Job, Task
-from hotlever.app.pages.columns import ColumnPicker
+from hotlever.app.pages.column_choice import ColumnPicker
 from hotlever.app.pages.frame import (
     ErrorBanner,
     caption,
@@ -24,9 +24,9 @@ from hotlever.app.pages.frame import (
     table,
     two_columns,
 )
-from hotlever.app.pages.page import MEDIA, Page, Work, several
 from hotlever.app.pages.plots import MeasuredPlots
 from hotlever.app.pages.results import show_result
+from hotlever.app.pages.task_page import MEDIA, Page, Work, several
 from hotlever.app.project import CALIBRATIONS, DATA, EXAMPLES, FIT, FITS
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError

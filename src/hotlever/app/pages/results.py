@@ -23,7 +23,7 @@ from hotlever.app.pages.frame import (
     table,
     text_shown,
 )
-from hotlever.app.pages.page import DrawnPage
+from hotlever.app.pages.task_page import DrawnPage
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 from hotlever.materials.parameters import sentence

@@ -20,8 +20,8 @@ from hotlever.app.pages.chosen_lever import (
 from hotlever.app.pages.driven import Pulses, SmallSignals
 from hotlever.app.pages.frame import flat_button
 from hotlever.app.pages.live_page import LivePage, texts_of
-from hotlever.app.pages.page import KINDS
 from hotlever.app.pages.plots import LivePlots, redraw
+from hotlever.app.pages.task_page import KINDS
 from hotlever.errors import HotleverError, InputError
 from hotlever.lever.set_points import HELD
 from hotlever.materials.parameters import label

@@ -20,10 +20,10 @@ from hotlever.app.pages.frame import (
     opened_dialog,
     small_button,
 )
-from hotlever.app.pages.lever import LeverPage, proposal
+from hotlever.app.pages.lever_page import LeverPage, proposal
 from hotlever.app.pages.measurements import MeasurementsPage
-from hotlever.app.pages.page import Page
 from hotlever.app.pages.simulate import SimulatePage
+from hotlever.app.pages.task_page import Page
 from hotlever.app.project import DRAWINGS, EXAMPLES
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError

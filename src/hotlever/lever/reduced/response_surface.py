@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from hotlever.lever.equations import ELECTRICAL_OUTPUTS
 from hotlever.probe import Probe
-from hotlever.probe.parameters import of_materials, usual_parameters
 from hotlever.probe.priors import default_priors
+from hotlever.probe.probe_parameters import of_materials, usual_parameters
 from hotlever.types import Array
 
 #: Those of the paper's silicon, which levers of any such probe share.

@@ -17,7 +17,7 @@ from hotlever.lever.reduced.response_surface import C_KAPPA, ParameterDomain, Re
 from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.materials import full_name
 from hotlever.probe import Probe
-from hotlever.probe.parameters import of_materials
+from hotlever.probe.probe_parameters import of_materials
 from hotlever.steps import each
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress

@@ -24,7 +24,7 @@ from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import INSTANT_RATE, METHOD, LinearSolver, Step
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.probe import Probe
-from hotlever.probe.parameters import dimensions_of, parameters_of
+from hotlever.probe.probe_parameters import dimensions_of, parameters_of
 from hotlever.quantities import OBSERVABLES
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array

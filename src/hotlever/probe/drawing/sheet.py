@@ -20,8 +20,8 @@ from shapely import LineString
 
 from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.files import read_bytes
+from hotlever.probe.drawing.drawing_formats import WARNS
 from hotlever.probe.drawing.outlines import Ring, rings_of, united, without_nested
-from hotlever.probe.drawing.reader import WARNS
 from hotlever.probe.layout import Point
 
 #: Bytes that a file may have, and of memory and seconds that reading it may take.
@@ -188,7 +188,7 @@ def read_sheet(
 def _read_apart(
     content: bytes, path: str, cell: str | None, unit_um: float | None, tolerance_um: float
 ) -> dict[str, Any]:
-    """Read a file in a process of its own, see `hotlever.probe.drawing.reader`."""
+    """Read a file in a process of its own, see `hotlever.probe.drawing.drawing_formats`."""
     options = {
         "cell": cell,
         "unit_um": unit_um,

@@ -7,8 +7,11 @@ from collections.abc import Callable
 from hotlever.lever import Lever
 from hotlever.materials import published
 from hotlever.probe import Probe
-from hotlever.report.page import Page
-from hotlever.report.reproduce import air, claims, inference, vacuum
+from hotlever.report.report_page import Page
+from hotlever.report.reproduce import air_sections as air
+from hotlever.report.reproduce import claim_sections as claims
+from hotlever.report.reproduce import paper_sections as inference
+from hotlever.report.reproduce import paper_sections as vacuum
 from hotlever.report.reproduce.findings import Findings
 from hotlever.steps import each
 from hotlever.types import Progress

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from hotlever import spieser2017 as paper
 from hotlever.estimate import Fit, Measurement, fit, read_measurement
 from hotlever.lever import Lever
-from hotlever.report.page import Page
+from hotlever.report.report_page import Page
 from hotlever.types import Progress
 
 #: Biases (V) of a curve without visible corners.

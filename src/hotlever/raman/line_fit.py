@@ -22,7 +22,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.special import expit
 
-from hotlever.raman import noise
+from hotlever.raman import detector_noise as noise
 from hotlever.raman.lineshape import (
     LINE_RANGE,
     MIN_SAMPLES,

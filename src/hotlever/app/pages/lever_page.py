@@ -25,7 +25,7 @@ from hotlever.app.pages.frame import (
     table,
     two_columns,
 )
-from hotlever.app.pages.page import Page, Work
+from hotlever.app.pages.task_page import Page, Work
 from hotlever.app.probe_fields import (
     FILM,
     TERMINALS,

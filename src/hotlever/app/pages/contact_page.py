@@ -15,7 +15,7 @@ from hotlever.app.jobs import Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import caption, flat_button
 from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage, slider
-from hotlever.app.pages.page import MEDIA
+from hotlever.app.pages.task_page import MEDIA
 from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 from hotlever.errors import InputError

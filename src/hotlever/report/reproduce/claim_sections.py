@@ -14,8 +14,8 @@ from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe.priors import default_priors
 from hotlever.report.reproduce.findings import Findings, example
-from hotlever.report.reproduce.vacuum import published_biases
-from hotlever.studies.knee import described_without
+from hotlever.report.reproduce.paper_sections import published_biases
+from hotlever.studies.knee_study import described_without
 from hotlever.studies.linear_branch import (
     SPAN_K,
     WITHIN_K,
@@ -34,8 +34,7 @@ from hotlever.studies.parameter_consistency import (
 )
 from hotlever.studies.radiation import radiated_heat, sheet_emissivities
 from hotlever.studies.simulation_based_calibration import NOISE, RAMAN
-from hotlever.studies.thermoelectric_shift import of_p_silicon, shift_by_heat
-from hotlever.studies.thermoelectric_strip import self_heated
+from hotlever.studies.thermoelectric_shift import of_p_silicon, self_heated, shift_by_heat
 
 #: Of the quick form: every so many levers, the first geometries, and errors of the model.
 _EVERY, _FIRST, _FEW_ERRORS = 5, 3, ("none", "all")

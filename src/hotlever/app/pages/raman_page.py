@@ -26,13 +26,13 @@ from hotlever.app.pages.frame import (
     table,
     two_columns,
 )
-from hotlever.app.pages.page import DrawnPage
+from hotlever.app.pages.task_page import DrawnPage
 from hotlever.app.project import CORRECTIONS
 from hotlever.app.session import Session
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
 from hotlever.raman import Correction, read_corrections
-from hotlever.raman.tables import corrections_text
+from hotlever.raman.spectrum_tables import corrections_text
 
 _TIP, _PLATE = "tip", "hot-plate"
 _LAWS = {"anharmonic": "anharmonic", "linear": "linear, as in the paper"}

@@ -17,7 +17,7 @@ from hotlever.materials.heat import thermal_conductivity
 from hotlever.report.reproduce.findings import MANY, Findings
 from hotlever.studies import air_scaling
 from hotlever.studies.air_scaling import COLD, GAPS_UM, HOT
-from hotlever.studies.knee import tip_effects
+from hotlever.studies.knee_study import tip_effects
 
 #: Gaps to the surface (µm) of the quick form.
 _FEW_GAPS_UM = (1.0, 10.0, np.inf)

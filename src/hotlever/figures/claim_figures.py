@@ -185,7 +185,7 @@ def knee_discrepancy(studies: Mapping[str, xr.Dataset]) -> Figure:
     Parameters
     ----------
     studies : mapping of str to xarray.Dataset
-        Of `hotlever.studies.knee.compare_suspects`, by medium.
+        Of `hotlever.studies.knee_study.compare_suspects`, by medium.
     """
     first = next(iter(studies.values()))
     names = [*map(str, first.suspect.values), "what remains"]

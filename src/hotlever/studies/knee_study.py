@@ -37,8 +37,8 @@ from hotlever.lever import Branch, Lever, OperatingPoint
 from hotlever.lever.lever import COARSE
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import Probe, Tip
-from hotlever.probe.parameters import nuisances, parameters_of
-from hotlever.raman.calibration import published_raman_calibration
+from hotlever.probe.probe_parameters import nuisances, parameters_of
+from hotlever.raman.raman_calibration import published_raman_calibration
 from hotlever.steps import each
 from hotlever.types import Array, Progress
 

@@ -15,16 +15,16 @@ import numpy as np
 
 from hotlever.errors import InputError
 from hotlever.files import LARGEST_TEXT, read_bytes
-from hotlever.raman.layout import pick_spectra, require_line
+from hotlever.raman.detector_noise import zeros
 from hotlever.raman.lineshape import in_window
 from hotlever.raman.makers import MAKERS, WDF_SIGNATURE, read_makers, refuse_labspec
-from hotlever.raman.noise import zeros
 from hotlever.raman.spectrum import (
     Spectrum,
     names_in_file,
     temperature_in_metadata,
     temperature_in_name,
 )
+from hotlever.raman.text_layout import pick_spectra, require_line
 from hotlever.steps import each
 from hotlever.tables import find_tables
 from hotlever.types import Array, Progress

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from hotlever.colours import BLUE, GREEN, ORANGE, PURPLE, VERMILION
-from hotlever.figures.drawing import filled_regions
+from hotlever.figures.probe_figures import filled_regions
 from hotlever.figures.style import axis_label, entitle, figure
 from hotlever.studies.design import label_of
 
