@@ -11,6 +11,8 @@ from hotlever.materials.air import (
     temperature_from_kirchhoff,
     thermal_conductivity_of_air,
 )
+from hotlever.probe import Probe
+from hotlever.probe.parameters import parameters_of
 
 
 @pytest.mark.parametrize("T", [210.0, 293.0, 500.0, 900.0, 1300.0, 1690.0, 1750.0])
@@ -34,3 +36,17 @@ def test_the_kirchhoff_variable_rises_for_any_temperature_and_has_an_inverse():
     theta, _ = kirchhoff_variable(T, 293.0)
     assert np.all(np.diff(theta) > 0)
     assert temperature_from_kirchhoff(theta, 293.0) == pytest.approx(T, abs=1e-6)
+
+
+def test_a_newer_formula_differs_by_far_less_than_what_a_lever_has_around_it():
+    """E. W. Lemmon and R. T. Jacobsen, Int. J. Thermophys. 25, 21 (2004), of dilute air."""
+    T = np.linspace(293.0, 1300.0, 60)
+    collisions = np.polyval([-0.00331, 0.005341, 0.08406, -0.4623, 0.431], np.log(T / 103.3))
+    viscosity = 0.0266958 * np.sqrt(28.9586 * T) / (0.36**2 * np.exp(collisions))  # µPa s
+    cold = 132.6312 / T
+    newer = 1e-5 * (1.308 * viscosity + 1.405 * cold**-1.1 - 1.036 * cold**-0.3)  # W/(cm K)
+    away = np.log(newer / thermal_conductivity_of_air(T)[0])
+    spread = parameters_of(Probe.reference().in_medium("air"))["gas_conductivity"].spread
+    assert np.abs(away).max() < 0.15 * spread
+    # the shape by less still
+    assert np.std(away) < 0.06 * spread
