@@ -204,7 +204,7 @@ def _read_apart(
             "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
             "XDG_CACHE_HOME": folder,
         }
-        script = str(Path(__file__).with_name("reader.py"))
+        script = str(Path(__file__).with_name("drawing_formats.py"))
         try:
             done = subprocess.run(
                 [sys.executable, "-P", script, str(copy), json.dumps(options)],
