@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from hotlever.estimate import Calibration, calibrate
+from hotlever.estimate import Estimate, calibrate
 from hotlever.files import write_text
 from hotlever.lever import Lever
 from hotlever.measurement import read_measurement
@@ -165,7 +165,7 @@ def noisy(values: np.ndarray, share: float, rng: np.random.Generator) -> np.ndar
     return np.asarray(values * (1.0 + share * rng.standard_normal(len(values))))
 
 
-def compared(name: str) -> tuple[Calibration, xr.Dataset]:
+def compared(name: str) -> tuple[Estimate, xr.Dataset]:
     """Return an example's calibration, and what it says at true tip temperatures (K).
 
     Both read the power that the true lever takes at that temperature.

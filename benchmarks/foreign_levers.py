@@ -250,7 +250,7 @@ def here_on_coarse_meshes(folder: Path, options: list[str]) -> tuple[dict[str, A
     """Return the same of levers on coarse meshes, without a process of its own."""
     from hotlever import Lever as OurLever
     from hotlever.errors import HotleverError
-    from hotlever.estimate.procedure import calibrate
+    from hotlever.estimate import calibrate
     from hotlever.lever.lever import COARSE
 
     parser = argparse.ArgumentParser()

@@ -27,8 +27,8 @@ from statistics import median
 import numpy as np
 import psutil
 
-from hotlever.estimate.batch import fit_many
 from hotlever.estimate.experiment import experiment_of
+from hotlever.estimate.many import fit_many
 from hotlever.materials import PUBLISHED
 from hotlever.probe import Probe
 from problems import BIAS, processor_time, table

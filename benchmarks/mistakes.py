@@ -28,8 +28,7 @@ import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.errors import HotleverError
-from hotlever.estimate import Measurement
-from hotlever.estimate.procedure import calibrate
+from hotlever.estimate import Measurement, calibrate
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import ALL, draw, measure
 from hotlever.types import Array

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from hotlever.errors import BranchEndError, HotleverError
-from hotlever.estimate import Calibration, Measurement, calibrate, plan_next
+from hotlever.estimate import Estimate, Measurement, calibrate, plan_next
 from hotlever.estimate.linearised_lever import LinearisedLever
 from hotlever.lever import Lever
 from hotlever.probe import Probe
@@ -102,7 +102,7 @@ def together(first: Measurement | None, second: Measurement) -> Measurement:
     return replace(first, **columns)
 
 
-def stated(calibration: Calibration, bias: float) -> tuple[float, float]:
+def stated(calibration: Estimate, bias: float) -> tuple[float, float]:
     """Return the tip temperature at a bias (V), and its standard error at `AT_K` (K)."""
     rows = calibration.table
     # beyond the measured rows a calibration says nothing, but what it knows does

@@ -45,8 +45,7 @@ import xarray as xr
 from numpy.random import Generator
 
 from hotlever.errors import HotleverError, InputError
-from hotlever.estimate import Measurement
-from hotlever.estimate.procedure import calibrate
+from hotlever.estimate import Measurement, calibrate
 from hotlever.lever import Branch, Lever
 from hotlever.lever.discretisation import chosen_space, energy_between_degrees, making
 from hotlever.lever.full_space import FullSpace

@@ -22,14 +22,18 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from hotlever.estimate.inverse_problem import Estimate
 from numpy.random import Generator
 
 from hotlever.errors import HotleverError
+from hotlever.estimate import FitOptions
+from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.experiment import TIP, Predictor
-from hotlever.estimate.inference import calibrated_by_estimate, estimate_lever
-from hotlever.estimate.inverse_problem import Estimate
 from hotlever.estimate.objective import Objective
 from hotlever.estimate.optimiser import Optimiser, SearchOptions
+from hotlever.estimate.problem import Problem
+from hotlever.estimate.search import Solution, solve
+from hotlever.estimate.verdict import verdict_on
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import draw, measure
@@ -65,7 +69,7 @@ class _OfDrawnErrors(Objective):
         return super().residual(values, point) + self.errors
 
 
-def re_estimated(estimate: Estimate, bias_V: float, draws: int, rng: Generator) -> Array:
+def re_estimated(estimate: Solution, bias_V: float, draws: int, rng: Generator) -> Array:
     """Return changes of the tip (K) by drawn errors: linear ones and estimates anew, (draws, 2)."""
     bias, own = np.array([bias_V]), estimate.objective
     predicted = estimate.predicted(bias)
@@ -106,8 +110,8 @@ def judged(number: int, draws: int, known: bool, always: bool) -> tuple[str, ...
     """Return a row of the table; the referee is asked `always`, or where linear is said."""
     rng = np.random.default_rng(number)
     measurement, nominal, tip_K = lever_of(number, known)
-    estimate, stated = estimate_lever(measurement, nominal)
-    calibration = calibrated_by_estimate(measurement, estimate, stated, "probe")
+    estimate = solve(Problem.of(measurement, nominal, FitOptions(usual_priors=True)))
+    calibration = calibrated(estimate, Estimate.of(estimate, *verdict_on(estimate)), measurement)
     gum = calibration.gum
     if gum is None:
         return str(number), "not described", *[""] * 6

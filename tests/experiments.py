@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from hotlever.estimate import Fit, fit
+from hotlever.estimate import Estimate, fit
 from hotlever.estimate.experiment import ExperimentAtRest
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -44,7 +44,7 @@ def on_coarse_meshes() -> Iterator[None]:
         yield
 
 
-def coarse_fit(*arguments: Any, **options: Any) -> Fit:
+def coarse_fit(*arguments: Any, **options: Any) -> Estimate:
     """Fit on coarse meshes, in the worker processes of a batch too."""
     with on_coarse_meshes():
         return fit(*arguments, **options)

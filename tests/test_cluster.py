@@ -10,7 +10,7 @@ from distributed import LocalCluster, Security
 
 from hotlever.cluster import cluster_executor
 from hotlever.errors import InputError
-from hotlever.estimate.batch import fit_many
+from hotlever.estimate.many import fit_many
 from hotlever.processes import run_all
 
 

@@ -22,8 +22,8 @@ from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.task_page import MEDIA
 from hotlever.app.project import EXAMPLES
 from hotlever.app.session import Session
+from hotlever.estimate import calibrate
 from hotlever.estimate.power_law import EQ12
-from hotlever.estimate.procedure import calibrate
 from hotlever.files import CALIBRATION, TABLE
 from hotlever.probe import Probe
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.estimate import fit
-from hotlever.estimate.procedure import calibrate
+from hotlever.estimate import calibrate, fit
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, default_priors

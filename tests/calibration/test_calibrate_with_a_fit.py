@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hotlever.estimate import fit, read_fit
-from hotlever.estimate.inference import _before
-from hotlever.estimate.procedure import calibrate
+from hotlever.estimate import calibrate, fit, read_fit
+from hotlever.estimate.estimator import known_before_a_fit
 from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import Prior, published_material
 
@@ -90,11 +89,13 @@ def test_a_file_without_current_is_refused(run, tmp_path):
 def test_what_was_known_before_a_fit_is_not_what_it_found(shared_fit):
     """The published levers, the probe file, what the fit was asked and what is asked now."""
     fitted = read_fit(shared_fit)
-    usual = _before(fitted, None)
+    usual = known_before_a_fit(fitted, None)
     assert usual["n_d"] == published_material()["n_d"]
     stated = {"n_d": "3e17 ± 10%", "p": "2.7 ± 1%"}
     probe = fitted.probe.model_copy(update={"prior": PriorTexts.from_values(stated, "here")})
-    of_file = _before(replace(fitted, probe=probe), None)
+    of_file = known_before_a_fit(replace(fitted, probe=probe), None)
     assert (of_file["n_d"], of_file["p"]) == (Prior(3e17, 0.1), Prior(2.7, 0.01))
-    assert _before(replace(fitted, probe=probe), {"p": "2.8 ± 1%"})["p"] == Prior(2.8, 0.01)
-    assert _before(fitted, {}) == {}
+    assert known_before_a_fit(replace(fitted, probe=probe), {"p": "2.8 ± 1%"})["p"] == Prior(
+        2.8, 0.01
+    )
+    assert known_before_a_fit(fitted, {}) == {}

@@ -9,10 +9,10 @@ import pytest
 
 from hotlever import Lever, Probe
 from hotlever.errors import InputError
-from hotlever.estimate import Calibration, Measurement, calibrate, read_calibration, read_power_law
+from hotlever.estimate import Estimate, Measurement, calibrate, read_calibration, read_power_law
 from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.power_law import EQ12
-from hotlever.estimate.pulses import PulseTiming
+from hotlever.estimate.tip_table import PulseTiming
 from hotlever.lever.lever import COARSE
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
@@ -35,11 +35,11 @@ def measured(truth) -> Measurement:
 
 
 @pytest.fixture(scope="module")
-def calibration(measured) -> Calibration:
+def calibration(measured) -> Estimate:
     return calibrate(measured, probe=PROBE, priors={})
 
 
-def read(calibration: Calibration, column: str, bias: np.ndarray) -> np.ndarray:
+def read(calibration: Estimate, column: str, bias: np.ndarray) -> np.ndarray:
     return np.interp(bias, calibration.table.bias_V, calibration.table[column])
 
 

@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimate import Measurement, fit
-from hotlever.estimate.estimator import in_medium
-from hotlever.estimate.procedure import calibrate
+from hotlever.estimate import Measurement, calibrate, estimator, fit
 from hotlever.estimate.residuals import Residuals
 from synthetic_curves import measured_curve, measurement_of
 
@@ -111,10 +109,12 @@ class Answer:
 def likelier(of: dict[str, tuple[str, float] | Exception]) -> Any:
     """The answer in an unknown medium, with both media in its name if it is of either."""
 
-    def of_either(first: Answer, second: Answer) -> Answer:
+    def either(first: Answer, second: Answer) -> Answer:
         return replace(first, medium=f"{first.medium} or {second.medium}")
 
-    return in_medium("unknown", answers(of), of_either)[1]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(estimator, "_either", either)
+        return estimator.in_medium("unknown", answers(of))[1]
 
 
 def test_a_described_answer_comes_before_a_likelier_one():

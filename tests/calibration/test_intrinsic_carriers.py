@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.estimate.procedure import calibrate
+from hotlever.estimate import calibrate
 from hotlever.lever import Lever
 from hotlever.materials.departures import FACTORS
 from hotlever.materials.silicon import intrinsic_density

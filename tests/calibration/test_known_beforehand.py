@@ -7,9 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.estimate import fit
-from hotlever.estimate.calibration import read_calibration
-from hotlever.estimate.procedure import calibrate
+from hotlever.estimate import calibrate, fit, read_calibration
 from hotlever.lever import Lever
 from hotlever.probe import Circuit, Probe
 from synthetic_curves import measured_curve, measurement_of

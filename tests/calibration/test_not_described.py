@@ -16,8 +16,7 @@ from hotlever import figures
 from hotlever.app import showing
 from hotlever.cli import main
 from hotlever.errors import InputError
-from hotlever.estimate import inference
-from hotlever.estimate.calibration import Calibration, read_calibration
+from hotlever.estimate import Estimate, estimator, read_calibration
 from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.files import json_text
@@ -60,7 +59,7 @@ def folder(
     options = [word for key, name in files.items() for word in (key, str(folder / name))]
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "said":
-            patch.setattr(inference, "_verdict", lambda *_: (True, "current differs by 5 %"))
+            patch.setattr(estimator, "verdict_on", lambda *_: (True, "current differs by 5 %"))
             patch.setattr(Diagnosis, "named", lambda *_: "is the current clipped?")
         with pytest.raises(SystemExit) as ended:
             main(["calibrate", str(folder / "saturated.csv"), *options, "--pulse", "5us"])
@@ -69,14 +68,15 @@ def folder(
 
 
 @pytest.fixture(scope="module")
-def refused(folder: Path, saturated: Measurement) -> Calibration:
+def refused(folder: Path, saturated: Measurement) -> Estimate:
     return replace(read_calibration(folder / "cal.json"), measurement=saturated)
 
 
 def numbers(content: Any, key: str) -> list[Any]:
     """Return the values of all entries of a name."""
     if isinstance(content, dict):
-        here = [content[key]] if key in content else []
+        here = content.get(key, [])
+        here = here if isinstance(here, list) else [here]
         return here + [number for value in content.values() for number in numbers(value, key)]
     if isinstance(content, list):
         return [number for value in content for number in numbers(value, key)]

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimate import Measurement
+from hotlever.estimate import Measurement, calibrate
+from hotlever.estimate.calibration import what_data_lack
 from hotlever.estimate.diagnosis import Diagnosis, _Curve
-from hotlever.estimate.inference import what_data_lack
 from hotlever.estimate.knee import IVCurve
-from hotlever.estimate.procedure import calibrate
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe

@@ -10,10 +10,9 @@ import pytest
 
 from hotlever import figures
 from hotlever.errors import InputError
-from hotlever.estimate.calibration import Calibration, read_calibration
+from hotlever.estimate import Estimate, calibrate, read_calibration
 from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.knee import IVCurve
-from hotlever.estimate.procedure import calibrate
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
@@ -45,7 +44,7 @@ def branch() -> Branch:
 
 
 @pytest.fixture(scope="module")
-def calibrated(branch: Branch) -> Calibration:
+def calibrated(branch: Branch) -> Estimate:
     bias = np.linspace(1.0, 15.5, 40)
     current = branch.electrical_outputs(branch.read(PROBE.circuit, bias).u)["current_mA"]
     current *= 1.0 + 0.002 * np.random.default_rng(0).standard_normal(bias.size)

@@ -12,7 +12,7 @@ from hotlever.estimate import calibrate, read_calibration
 from hotlever.estimate import pulses as module
 from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.power_law import EQ12
-from hotlever.estimate.pulses import PULSE_COLUMNS, PulseTiming
+from hotlever.estimate.tip_table import PULSE_COLUMNS, PulseTiming
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse, simulate

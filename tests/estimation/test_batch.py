@@ -18,7 +18,7 @@ import pytest
 import experiments
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimate import FitOptions
-from hotlever.estimate.batch import Batch, fit_many, lever_names
+from hotlever.estimate.many import Batch, fit_many, lever_names
 from hotlever.lever import Lever
 from hotlever.processes import Patience
 
@@ -40,7 +40,7 @@ pytestmark = pytest.mark.usefixtures("coarse_meshes", "fits_on_coarse_meshes")
 def fits_on_coarse_meshes() -> Iterator[None]:
     """Let worker processes fit on coarse meshes as this one does."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("hotlever.estimate.batch.fit", experiments.coarse_fit)
+        patch.setattr("hotlever.estimate.many.fit", experiments.coarse_fit)
         yield
 
 
@@ -269,7 +269,7 @@ def test_what_fails_for_one_lever_is_a_failure_of_its_own(levers, texts, tmp_pat
         path.write_text(text)
 
     monkeypatch.setattr(Lever, "__init__", fail)
-    monkeypatch.setattr("hotlever.estimate.outcome.write_text", full)
+    monkeypatch.setattr("hotlever.estimate.estimate.write_text", full)
     batch = fit_many(levers, tmp_path / "out", None, OPTIONS, processes=1)
     assert list(batch.results) == ["lever-2"]
     assert batch.exit_status == 1

@@ -10,7 +10,8 @@ from fit_twins import twin
 
 from experiments import reduced_experiment
 from hotlever.estimate import FitOptions, fit
-from hotlever.estimate.inverse_problem import estimate
+from hotlever.estimate.problem import Problem
+from hotlever.estimate.search import solve
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def drifting(coarse):
 
 
 def test_the_fit_says_that_the_zero_drifts(coarse, model, drifting):
-    estimated = estimate(drifting, coarse.probe, FitOptions(), model=model)
+    estimated = solve(Problem.of(drifting, coarse.probe, FitOptions(), model=model))
     at, slopes = estimated.prediction, estimated.posterior.slopes
     notes = estimated.residuals.drifting_zeros(at.values, slopes)
     assert any(text.startswith("current: the zero seems to go from") for text in notes)

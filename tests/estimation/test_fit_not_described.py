@@ -12,7 +12,7 @@ import pytest
 
 from hotlever import figures
 from hotlever.errors import InputError
-from hotlever.estimate import Fit, fit, read_fit
+from hotlever.estimate import Estimate, fit, read_fit
 from hotlever.estimate.estimator import undetermined
 from hotlever.estimate.fit_summary import NEAREST, fit_text, parameter_rows
 from hotlever.estimate.profile import profile_likelihood
@@ -25,13 +25,13 @@ FIXED = {"a1": None, "p": None, "delta": None, "a0": None}
 
 
 @pytest.fixture(scope="module")
-def good() -> Fit:
+def good() -> Estimate:
     """A fit that describes its data, with priors."""
     return fit(EXAMPLE, fixed=FIXED, observables=["current"], priors={"n_d": "4.6e17 ± 30%"})
 
 
 @pytest.fixture(scope="module")
-def refused(good: Fit) -> Fit:
+def refused(good: Estimate) -> Estimate:
     return replace(good, reason="current differs by 3%")
 
 
@@ -121,6 +121,6 @@ def test_how_sure_it_is_cannot_be_asked(refused):
             ask(refused)
 
 
-def _again(found: Fit, folder: Path) -> Fit:
+def _again(found: Estimate, folder: Path) -> Estimate:
     found.write(folder / "fit.json")
     return read_fit(folder / "fit.json")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimate import Fit, FitOptions, Measurement, fit, read_fit
+from hotlever.estimate import Estimate, FitOptions, Measurement, fit, read_fit
 from hotlever.estimate.fit_summary import compare_levers
 from hotlever.estimate.profile import profile_likelihood
 from hotlever.estimate.sampling import predictive_band, sample_posterior
@@ -37,7 +37,7 @@ def of_film() -> Measurement:
 
 
 @pytest.fixture(scope="module")
-def found(of_film) -> Fit:
+def found(of_film) -> Estimate:
     return fit(of_film, strip_probe())
 
 

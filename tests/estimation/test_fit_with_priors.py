@@ -15,10 +15,11 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, estimator, fit, read_fit
 from hotlever.estimate.fit_summary import fit_text
-from hotlever.estimate.inverse_problem import estimate
 from hotlever.estimate.noise import CommonError, errors_of_scales
 from hotlever.estimate.options import FitOptions
+from hotlever.estimate.problem import Problem
 from hotlever.estimate.residuals import Residuals
+from hotlever.estimate.search import solve
 from hotlever.estimate.tip_temperature import tip_by_bias
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -45,14 +46,14 @@ def data():
 @pytest.fixture(scope="module")
 def solved(data):
     """A fit with what is usually known, as the problem that it solves."""
-    return estimate(data[0], NOMINAL, FitOptions(priors=default_priors(NOMINAL)))
+    return solve(Problem.of(data[0], NOMINAL, FitOptions(priors=default_priors(NOMINAL))))
 
 
 @pytest.fixture(scope="module")
 def found(data, solved):
     """The same as users are given it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(estimator, "estimate", lambda *_, **__: solved)
+        patch.setattr(estimator, "solve", lambda *_, **__: solved)
         return fit(data[0], NOMINAL, priors=default_priors(NOMINAL))
 
 
@@ -152,7 +153,7 @@ def test_how_far_a_prior_is_pulled_is_what_the_others_gain_without_it(solved):
         step = np.linalg.lstsq(jacobian[rows], residual[rows])[0]
         return np.sum((residual[rows] - jacobian[rows] @ step) ** 2)
 
-    every, count = np.arange(residual.size), len(one.options.varied)
+    every, count = np.arange(residual.size), len(one.problem.options.varied)
     for row, name in enumerate(one.options.varied, start=residual.size - count):
         gained = least(every) - least(np.delete(every, row))
         assert one.posterior.shifts[name].pull ** 2 == pytest.approx(gained, rel=0.05, abs=0.05), (
@@ -202,7 +203,7 @@ def test_scales_are_as_uncertain_as_priors_say(data):
     """The thermometer is known to 1.5 %, whatever is stated of each temperature."""
     tip = data[1].tip_K.values
     warm = replace(data[0], tip_K=tip, tip_error_K=0.03 * np.maximum(tip - 293.0, 100.0))
-    one = estimate(warm, NOMINAL, FitOptions(priors=default_priors(NOMINAL)))
+    one = solve(Problem.of(warm, NOMINAL, FitOptions(priors=default_priors(NOMINAL))))
     shares = {common.name: common.share for common in one.residuals.common}
     assert shares == {"current_scale": 1e-3, "raman_scale": 0.015}
     of_file = replace(warm, raman_scale=0.03)
@@ -213,7 +214,7 @@ def test_scales_are_as_uncertain_as_priors_say(data):
     raman = errors_of_scales(of_file, ["tip"], known, base)[0]
     np.testing.assert_allclose(raman.errors, 0.005 * (tip - base))
     # what the data tell of the scale is said as of any other prior
-    use = one.priors(default_priors(NOMINAL))["raman_scale"]
+    use = one.priors["raman_scale"]
     assert (use.value, use.spread) == (1.0, shares["raman_scale"])
     assert 0 < use.posterior_spread < use.spread
     assert abs(use.posterior_value - 1.0) < 3.0 * use.spread
@@ -259,4 +260,4 @@ def test_priors_of_files_that_say_no_distribution_are_read(found, tmp_path):
 def test_a_prior_that_does_not_count_is_said_to_have_no_effect(data):
     priors = {"n_d": default_priors(NOMINAL)["n_d"], "gas_conductivity": Prior(1.0, 0.1)}
     note = "priors that do not count in vacuum, and have no effect: gas_conductivity"
-    assert note in estimate(data[0], NOMINAL, FitOptions(priors=priors)).notes
+    assert note in Problem.of(data[0], NOMINAL, FitOptions(priors=priors)).notes

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimate.batch import Batch
 from hotlever.estimate.fit_summary import (
     INVERSION,
     compare_levers,
@@ -17,6 +16,7 @@ from hotlever.estimate.fit_summary import (
     levers_csv,
     statements,
 )
+from hotlever.estimate.many import Batch
 from hotlever.materials import PARAMETERS, PUBLISHED
 from made_up import fit_of
 

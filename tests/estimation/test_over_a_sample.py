@@ -12,13 +12,15 @@ from experiments import on_coarse_meshes
 from hotlever import Measurement, Probe, fit, read_calibration
 from hotlever.contact.law import INTERFACE
 from hotlever.errors import InputError
-from hotlever.estimate import FitOptions
+from hotlever.estimate import Estimate, FitOptions
+from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.estimate.experiment import ExperimentAtRest
-from hotlever.estimate.inference import calibrated_by_estimate
-from hotlever.estimate.inverse_problem import estimate
 from hotlever.estimate.over_a_sample import with_distances
+from hotlever.estimate.problem import Problem
+from hotlever.estimate.search import solve
+from hotlever.estimate.verdict import verdict_on
 from hotlever.lever import Lever
 from hotlever.lever.contact import out_of_contact, sweep_in_contact
 from hotlever.lever.lever import COARSE
@@ -132,9 +134,9 @@ def calibration(probe, measured):
     known = {INTERFACE: "×/ 10", "apex_radius_um": "± 2%", "c_kappa": "± 2%"}
     held = dict.fromkeys(name for name in usual_parameters(probe) if name not in known)
     with on_coarse_meshes():
-        found = estimate(measured, probe, FitOptions(fixed=held, priors=known))
-        of_apex = {"at_V": 8.0, "of": "apex"}
-        return calibrated_by_estimate(measured, found, found.options.priors, "probe", **of_apex)
+        found = solve(Problem.of(measured, probe, FitOptions(fixed=held, priors=known)))
+        one = Estimate.of(found, *verdict_on(found))
+        return calibrated(found, one, measured, at_V=8.0, budget_of="apex")
 
 
 def test_the_apex_joins_the_calibration_with_its_error_by_source(calibration, touching):

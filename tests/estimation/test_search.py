@@ -17,12 +17,13 @@ from hotlever.errors import InputError
 from hotlever.estimate import Measurement, calibrate, fit
 from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.estimate.experiment import ExperimentAtRest, Predictor
-from hotlever.estimate.inverse_problem import estimate
 from hotlever.estimate.objective import Objective
 from hotlever.estimate.optimiser import Optimiser, SearchOptions
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.posterior import standard_errors
+from hotlever.estimate.problem import Problem
 from hotlever.estimate.residuals import Residuals
+from hotlever.estimate.search import solve
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.materials import PARAMETERS
@@ -62,7 +63,7 @@ def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
     def model(probe: Probe, bias: np.ndarray) -> ExperimentAtRest:
         return full_experiment(Lever(probe, COARSE), bias)
 
-    found = estimate(reference_curve, Probe.u_shape(), FitOptions(), model=model)
+    found = solve(Problem.of(reference_curve, Probe.u_shape(), FitOptions(), model=model))
     objective, at = found.objective, found.prediction
     least, optimum = objective.squares(at), objective.point(at.probe)
     noise = found.residuals.errors.noise_squares(found.residuals.difference(at.values))
@@ -90,7 +91,8 @@ def test_a_fit_of_data_below_the_knee_ends_though_they_leave_a_valley_open(n_d, 
     def model(probe: Probe, bias: np.ndarray) -> ExperimentAtRest:
         return full_experiment(Lever(probe, COARSE), bias)
 
-    found = estimate(data, true.with_(n_d=known, c_kappa=0.8), FitOptions(), model=model)
+    nominal = true.with_(n_d=known, c_kappa=0.8)
+    found = solve(Problem.of(data, nominal, FitOptions(), model=model))
     truth = found.predictor.experiment.predict(true, found.prediction)
     noise = found.residuals.errors.noise_squares(found.residuals.difference(truth.values))
     least = found.objective.squares(found.prediction)

@@ -64,6 +64,9 @@ def test_what_is_written_again_is_the_same(folder):
         before = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
         after = read(folder / f"{name}.json").content()
         before.get("options", {}).pop("drift", None)  # zeros drift no more
+        # those of calibrations stand beside the data, and so do now those of fits
+        weights = before["data"].pop("weights", [])
+        assert weights == list(after["weights"].values() if weights else [])
         for key in before.keys() - {"software", "tip_temperature_uncertainty_K"}:
             if key in ("correlation", "priors", "parameters"):
                 continue  # the same to rounding, with more said of each

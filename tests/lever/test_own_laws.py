@@ -16,8 +16,8 @@ from documents import ROOT, blocks
 from experiments import on_coarse_meshes
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.errors import InputError
-from hotlever.estimate import FitOptions, Measurement, batch, fit, read_fit
-from hotlever.estimate.batch import fit_many
+from hotlever.estimate import FitOptions, Measurement, fit, many, read_fit
+from hotlever.estimate.many import fit_many
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.training import cached_reduction
@@ -294,8 +294,8 @@ def test_nothing_is_kept_of_a_class_whose_code_may_change(monkeypatch, tmp_path)
     assert not list(tmp_path.rglob("*.npz"))
     (tmp_path / "a.csv").write_text("V_b (V),I_h (mA)\n1,0.1\n2,0.2\n3,0.3\n")
     # a fit that was written before is not looked for
-    monkeypatch.setattr(batch, "_written_before", lambda *_: pytest.fail("taken again"))
-    monkeypatch.setattr(batch, "_executor", lambda *_: nullcontext())
-    monkeypatch.setattr(batch, "_not_reduced", lambda *_: {})
-    monkeypatch.setattr(batch, "run_all", lambda *_: [])
+    monkeypatch.setattr(many, "_written_before", lambda *_: pytest.fail("taken again"))
+    monkeypatch.setattr(many, "_executor", lambda *_: nullcontext())
+    monkeypatch.setattr(many, "_not_reduced", lambda *_: {})
+    monkeypatch.setattr(many, "run_all", lambda *_: [])
     assert not fit_many([tmp_path / "a.csv"], tmp_path / "out", probe).failures

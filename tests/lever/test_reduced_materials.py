@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from hotlever.cache import CACHE_VARIABLE
-from hotlever.estimate import FitOptions, Measurement, batch, fit
-from hotlever.estimate.result import FitFile
+from hotlever.estimate import FitOptions, Measurement, many
 from hotlever.estimate.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
@@ -91,12 +90,11 @@ def test_the_paper_s_silicon_has_ranges_of_its_own():
 def test_a_batch_reduces_what_can_be_reduced(strip, monkeypatch):
     reduced_names = []
     monkeypatch.setattr(
-        batch, "cached_reduction", lambda _, progress, names: reduced_names.append(names)
+        many, "cached_reduction", lambda _, progress, names: reduced_names.append(names)
     )
     data, free = Measurement.of_sweep(strip.sweep(BIAS)), ("film.lorenz_ratio",)
     for options in (FitOptions(), FitOptions(free=free), FitOptions(free=("thickness_um",))):
-        work = batch.Work("fit", fit, FitFile, ".json", strip.probe, options)
-        assert not batch._not_reduced(work, {"one": data}, None)
+        assert not many._not_reduced(strip.probe, options, {"one": data}, None)
     assert reduced_names == [
         set(ParameterDomain.of(strip.probe).names),
         {*ParameterDomain.of(strip.probe).names, *free},
@@ -113,7 +111,7 @@ def test_a_batch_of_film_levers_is_fitted(tmp_path, monkeypatch):
         text = "\n".join(",".join(map(str, row)) for row in rows)
         paths.append(tmp_path / f"film-{number}.csv")
         paths[-1].write_text(f"V_b (V),I_h (mA),T_tip (K)\n{text}\n")
-    done = batch.fit_many(
+    done = many.fit_many(
         *(paths, tmp_path / "fits", strip_probe()),
         processes=1,
         reducing=lambda *steps: progress.append(steps),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hotlever.probe.parameters import parameters_of
 from scipy.integrate import quad
 
 from hotlever.materials.air import (
@@ -13,6 +12,7 @@ from hotlever.materials.air import (
     thermal_conductivity_of_air,
 )
 from hotlever.probe import Probe
+from hotlever.probe.probe_parameters import parameters_of
 
 
 @pytest.mark.parametrize("T", [210.0, 293.0, 500.0, 900.0, 1300.0, 1690.0, 1750.0])

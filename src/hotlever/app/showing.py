@@ -23,7 +23,7 @@ from hotlever.app.probe_fields import figure_file, svg
 from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.errors import HotleverError, InputError
-from hotlever.estimate import Calibration, Fit, read_calibration, read_fit
+from hotlever.estimate import Estimate, read_calibration, read_fit
 from hotlever.estimate.fit_summary import parameter_rows
 from hotlever.estimate.levers import calibration_rows, compare_calibrations
 from hotlever.estimate.tip_table import interpolated
@@ -265,7 +265,7 @@ def spectrum(
 
 def levers(report: Report, names: list[str]) -> dict[str, Any]:
     """Return the table of the fits, or of the calibrations, that are there."""
-    fits, calibrations = dict[str, Fit](), dict[str, Calibration]()
+    fits, calibrations = dict[str, Estimate](), dict[str, Estimate]()
     for name in names:
         with suppress(InputError):  # being written, or another kind of file
             kind, estimate, _ = _estimate(Path(name), file_stamp(Path(name)))
@@ -305,11 +305,11 @@ def _result(path: Path, stamp: float) -> tuple[str, Any, Page]:
     return kind, estimate, paged(estimate)
 
 
-def _calibration(name: str) -> Calibration:
+def _calibration(name: str) -> Estimate:
     kind, estimate, _ = _estimate(Path(name), file_stamp(Path(name)))
     if kind != CALIBRATION:
         raise InputError(f"{name}: is a fit, expected a calibration")
-    calibration: Calibration = estimate
+    calibration: Estimate = estimate
     return calibration
 
 

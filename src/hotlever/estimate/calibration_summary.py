@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from hotlever.estimate.calibration import Calibration
+from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.fit_summary import NEAREST, prior_lines
-from hotlever.estimate.pulses import PulseCalibration
-from hotlever.estimate.tip_table import BUDGETS, budgets_of
+from hotlever.estimate.tip_table import BUDGETS, PulseCalibration, budgets_of
 from hotlever.estimate.uncertainty_budget import TemperatureBudget
 from hotlever.text import aligned, significant, value_with_error
 from hotlever.types import Array
@@ -55,7 +54,7 @@ class Parts(NamedTuple):
     after: list[str]
 
 
-def calibration_parts(calibration: Calibration) -> Parts:
+def calibration_parts(calibration: Estimate) -> Parts:
     """Return what a calibration says in words and tables; of one not described no table."""
     basis = f"based on {_BASIS[calibration.route]}, used in {calibration.medium}"
     after, tables = prior_lines(calibration.priors), []
@@ -81,7 +80,7 @@ def calibration_parts(calibration: Calibration) -> Parts:
     return Parts(before, tables, after)
 
 
-def calibration_text(calibration: Calibration) -> str:
+def calibration_text(calibration: Estimate) -> str:
     """Return the result of a calibration as lines of text."""
     parts = calibration_parts(calibration)
     lines = parts.before
@@ -123,7 +122,7 @@ def linear_words(stated: TemperatureBudget) -> str:
     )
 
 
-def _law_line(calibration: Calibration) -> str:
+def _law_line(calibration: Estimate) -> str:
     law = calibration.power_law
     if law is None:
         return "no power law: " + (
@@ -139,7 +138,7 @@ def _law_line(calibration: Calibration) -> str:
     return f"{text}, within {residual:.0f} K of the model" if residual else text
 
 
-def _knee_lines(calibration: Calibration) -> list[str]:
+def _knee_lines(calibration: Estimate) -> list[str]:
     """Return the knee of a lever that shows its data, and the factor k."""
     knee, law = calibration.knee, calibration.power_law
     if np.isnan(knee.power_mW):
@@ -157,7 +156,7 @@ def _knee_lines(calibration: Calibration) -> list[str]:
     return lines
 
 
-def _knee_point(calibration: Calibration) -> str:
+def _knee_point(calibration: Estimate) -> str:
     """Return the values at a knee, with their errors where these are known."""
     knee = calibration.knee
     return (
@@ -169,7 +168,7 @@ def _knee_point(calibration: Calibration) -> str:
     )
 
 
-def _budget_rows(calibration: Calibration) -> list[list[str]]:
+def _budget_rows(calibration: Estimate) -> list[list[str]]:
     """Return the standard error by source at some temperatures, and the power there.
 
     Without a power law the bias tells more.
@@ -183,7 +182,7 @@ def _budget_rows(calibration: Calibration) -> list[list[str]]:
     return _rows(table, columns, temperatures)
 
 
-def _apex_rows(calibration: Calibration) -> list[list[str]]:
+def _apex_rows(calibration: Estimate) -> list[list[str]]:
     """Return temperatures at the contact for some of the tip, with the apex's error by source."""
     temperatures = [float(row[0]) for row in _budget_rows(calibration)[1:]]
     columns = [("T_tip (K)", "tip_K", 0), ("apex (K)", "apex_K", 0), ("± (K)", "apex_stderr_K", 1)]
@@ -218,7 +217,7 @@ def _rows(
     return [list(row) for row in zip(*cells, strict=True)]
 
 
-def _verdict(calibration: Calibration) -> str:
+def _verdict(calibration: Estimate) -> str:
     stated = calibration.tip_temperature_uncertainty_K
     word = "good" if stated <= _GOOD else "fair" if stated <= _FAIR else "rough"
     budget = budgets_of(calibration.table)[BUDGETS[0]]

@@ -1,30 +1,52 @@
-"""Fitting the material parameters of a lever to measured data.
+"""Fits and calibrations: one act, by other priors.
 
-Of a lever whose medium nobody knows both are tried, and it is said which describes the data.
+What is known of a lever is brought up to date by all that was measured: by a fit, with flat priors
+unless some are stated, to find its parameters; by a calibration, with the usual ones unless others
+are, to find its tip temperature. Of a lever whose medium nobody knows both are tried, and it is
+said which describes the data.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, TypeVar, cast, get_args
+from typing import Any, get_args
 
 import numpy as np
-import xarray as xr
 
-from hotlever.errors import ComputationError, unknown_name
-from hotlever.estimate.diagnosis import Diagnosis, lack_of_fit_text, outlier_notes
+from hotlever.errors import ComputationError, InputError, unknown_name
+from hotlever.estimate.calibration import calibrated
+from hotlever.estimate.diagnosis import Diagnosis, outlier_notes
+from hotlever.estimate.estimate import Estimate, read_fit
 from hotlever.estimate.experiment import Experiment, Prediction
-from hotlever.estimate.inverse_problem import Estimate, estimate
+from hotlever.estimate.knee_scaling import calibrated_by_knee
 from hotlever.estimate.options import UNKNOWN_MEDIUM, FitOptions
-from hotlever.estimate.outcome import Outcome
-from hotlever.estimate.posterior import standard_errors
-from hotlever.estimate.result import Fit, band_dataset
-from hotlever.measurement import Measurement, given_measurement
+from hotlever.estimate.power_law import PowerLaw
+from hotlever.estimate.prior_density import PriorDensity
+from hotlever.estimate.problem import Problem
+from hotlever.estimate.pulses import PulseTiming, pulse_calibration
+from hotlever.estimate.search import Solution, solve
+from hotlever.estimate.tip_table import BUDGETS, budgets_of, table_with_budgets
+from hotlever.estimate.tip_temperature import (
+    OF_THE_MEASUREMENT,
+    check_in_range,
+    limits_of_range,
+)
+from hotlever.estimate.uncertainty_budget import BudgetOf, check_budget_of, limits_of
+from hotlever.estimate.verdict import check_plausible, no_ramp, verdict_on
+from hotlever.measurement import Measurement, given_measurement, with_measured_circuit
+from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
-from hotlever.probe.priors import priors_of
-from hotlever.probe.probe_parameters import of_materials, parameters_of
+from hotlever.probe.priors import (
+    SCALES,
+    Prior,
+    as_known,
+    default_priors,
+    published_material,
+    updated,
+)
+from hotlever.probe.probe_parameters import of_materials, parameters_of, usual_parameters
 from hotlever.probe.surroundings import Medium
 from hotlever.text import NOT_DETERMINED, value_with_error, with_unit
 from hotlever.types import Array, Progress
@@ -36,8 +58,6 @@ _AT_THE_BOUND = 1e-3
 #: Two parameters are called hard to tell apart from this correlation.
 _ENTANGLED = 0.95
 
-Answer = TypeVar("Answer", bound=Outcome)
-
 
 def fit(
     measurement: Measurement | str | os.PathLike[str],
@@ -48,7 +68,7 @@ def fit(
     progress: Progress | None = None,
     seen: Callable[[Prediction], None] | None = None,
     **choices: Any,
-) -> Fit:
+) -> Estimate:
     """Find the material parameters that make the model match a measurement.
 
     Gauss and Newton's steps within a trust region, with the exact Jacobian
@@ -81,98 +101,285 @@ def fit(
     ComputationError
         If the lever cannot be solved at the start, or the fit does not converge.
     """
-    options = chosen_options(options, choices)
+    options = _chosen(options, choices)
     nominal = Probe.reference() if probe is None else Probe.coerce(probe)
     whole = given_measurement(measurement, nominal)
 
-    def fitted(medium: Any) -> tuple[Estimate, Fit]:
-        within = replace(options, medium=medium)
-        solution = estimate(whole, nominal, within, model=model, progress=progress, seen=seen)
-        return solution, _fit_of(solution)
+    def within(medium: Any) -> tuple[Solution, Estimate]:
+        """Fit the lever in a medium."""
+        problem = Problem.of(whole, nominal, replace(options, medium=medium), model=model)
+        solution = solve(problem, progress, seen)
+        return solution, _with_remarks(solution, Estimate.of(solution, *verdict_on(solution)))
 
-    solution, result = in_medium(options.medium, fitted, _either)
+    solution, result = in_medium(options.medium, within)
     # a search that has not come to its end contradicts nothing
     if result.describes_data is not False or result.in_time or "current" not in result.observables:
         return result
-    if solution.options.robust or not outlier_notes(
-        solution.residuals, solution.prediction.values, robust=False
-    ):
-        cause = Diagnosis(solution.measurement, solution.stated, options.priors or None).named()
+    problem, values = solution.problem, solution.prediction.values
+    if problem.options.robust or not outlier_notes(solution.residuals, values, robust=False):
+        priors = problem.options.priors or None
+        cause = Diagnosis(problem.measurement, problem.probe, priors).named()
     else:
         cause = "are the points far from the fit wrong ones? a robust fit (--robust) forgets them"
     return replace(result, reason=f"{result.reason}; {cause}")
 
 
-def _fit_of(estimate: Estimate) -> Fit:
-    """Return what users are given of an estimate."""
-    options, residuals, prediction = estimate.options, estimate.residuals, estimate.prediction
-    values, posterior = prediction.values, estimate.posterior
-    in_time = estimate.measurement.time_us is not None
-    priors = priors_of(options.priors, estimate.probe, "priors", in_time=in_time)
-    notes = outlier_notes(residuals, values, options.robust)
-    notes += residuals.drifting_zeros(values, posterior.slopes)
-    chi_square = residuals.errors.reduced_chi_square(
-        residuals.difference(values), len(options.varied)
-    )
-    converged, reason = estimate.verdict(lack_of_fit_text(residuals, values))
-    if chi_square is not None:
-        text = (
-            f"the scatter about the fit is {np.sqrt(chi_square):.2f} times the measurement errors"
+def calibrate(
+    measurement: Measurement | str | os.PathLike[str],
+    *,
+    probe: Probe | str | os.PathLike[str] | None = None,
+    fit: Estimate | str | os.PathLike[str] | None = None,
+    law: PowerLaw | None = None,
+    medium: str | None = None,
+    priors: Mapping[str, Prior | str] | None = None,
+    pulse: PulseTiming | None = None,
+    samples: int = 0,
+    at_V: float | None = None,
+    budget_of: BudgetOf = "tip",
+    progress: Progress | None = None,
+) -> Estimate:
+    """Find the tip temperature of a lever from its I-V curve.
+
+    What is known of the lever beforehand is brought up to date by all that was measured; with a
+    power law the paper's rule is used instead (`hotlever.estimate.knee_scaling`).
+
+    Parameters
+    ----------
+    measurement : Measurement or path
+        With bias and current; reader voltages and tip temperatures count where they are.
+    probe : Probe or path, optional
+        A probe like the measured one; the reference probe by default.
+    fit : Estimate or path, optional
+        A fit of the measured lever itself, in vacuum or in air. Not together with `probe`. Its data
+        count, not what it made of them.
+    law : PowerLaw, optional
+        A power law in vacuum, in place of a model. It takes a lever that only the swept supply
+        heats.
+    medium : {"vacuum", "air", "unknown"}, optional
+        What the lever is in; by default what the data file says, or else the fit or the probe. If
+        it is unknown both are tried. With vacuum for data from air the paper's rule is used: the
+        temperatures that the probe has in vacuum, at k times the power.
+    priors : mapping of str to Prior or str, optional
+        What is known beforehand, in place of some of the usual priors, such as
+        ``{"n_d": "3.3e17 ± 15%"}``; see `hotlever.probe.priors`. If empty there are none, and
+        dimensions are held.
+    pulse : PulseTiming, optional
+        Of pulses whose tip temperature is wanted too (`hotlever.estimate.pulses`).
+    samples : int
+        Of the posterior, at least, from which the limits of the tip temperature are taken; by
+        default they follow from its linearised error, or estimates of hotter and colder levers.
+    at_V : float, optional
+        Bias of the uncertainty budget; that of the hottest tip by default.
+    budget_of : {"tip", "apex"}
+        What the uncertainty budget is of: the tip, or its apex that touches a sample.
+    progress : callable, optional
+        Called with solved branches, then with steps of the sampler and followed pulses, and how
+        many there usually are.
+
+    Raises
+    ------
+    InputError
+        If the data cannot be those of the probe.
+    ComputationError
+        If no lever near the probe has states at all measured biases.
+    """
+    if (probe is not None) + (fit is not None) + (law is not None) > 1:
+        raise InputError("a fit, a probe and a power law exclude each other")
+    if law is not None and medium not in (None, "vacuum"):
+        raise InputError("a power law holds in vacuum; with one, leave the medium out")
+    if law is not None and priors is not None:
+        raise InputError("a power law takes no priors; a probe or a fit does")
+    if fit is not None:
+        fit = fit if isinstance(fit, Estimate) else read_fit(fit)
+        fit.measurement.need_rest("a calibration with a fit")
+        route, origin = f"fit in {fit.medium}", fit.probe
+    else:
+        route = "probe" if law is None else "power law"
+        origin = Probe.reference() if probe is None else Probe.coerce(probe)
+    whole = given_measurement(measurement, origin)
+    whole.need_rest("a calibration")
+    if np.isnan(whole.current(origin.circuit)).all():
+        raise InputError(
+            f"{whole.path}: no values of I_h, which a calibration needs beside V_b, or of "
+            "V_bridge, of a probe with bridge_upper_ohm and bridge_lower_ohm in [circuit]"
         )
-        follow = not options.priors and converged and not reason
-        notes.append(f"{text}; standard errors follow the scatter" if follow else text)
-    weighted = residuals.weighted(values)
-    result = Fit(
-        probe=estimate.probe,
-        measurement=estimate.measurement,
-        options=options,
-        names=options.varied,
-        observables=residuals.observables,
-        covariance=posterior.covariance,
-        common_noise_covariance=estimate.covariance,
-        data_weights=residuals.data_weights,
-        sum_of_squares=float(weighted @ weighted),
-        residual_rms=residuals.rms(values),
-        band=_band(estimate),
-        evaluations=estimate.predictor.evaluations,
-        steps=estimate.optimiser.steps,
-        reason=reason,
-        converged=converged,
-        seconds=estimate.seconds,
-        priors=estimate.priors(priors),
-        notes=[*estimate.notes, *notes],
+    check_budget_of(budget_of, origin.contact is not None)
+    if law is not None or (medium == "vacuum" and whole.medium == "air"):
+        lacks = {
+            "has no posterior": samples > 0,
+            "has no uncertainty budget": at_V is not None or budget_of != "tip",
+            "says nothing about a pulse": pulse is not None,
+        }
+        for lack, is_requested in lacks.items():
+            if is_requested:
+                raise InputError(
+                    f"the paper's rule {lack}; expected a probe or a fit, in the medium of the data"
+                )
+        return _by_the_rule(whole, origin, law, route)
+    if pulse is not None:
+        origin.circuit.need_cold_start("a calibration for pulses")
+
+    def within(medium: Any) -> tuple[Solution, Estimate]:
+        """Calibrate the lever in a medium."""
+        known = priors is None or bool(priors)
+        options = FitOptions(priors=priors or {}, usual_priors=known, medium=medium)
+        problem = Problem.of(whole, origin, options)
+        causes = Diagnosis(problem.measurement, problem.probe, priors)
+        check_plausible(problem, causes)
+        check_in_range(at_V, *limits_of_range(problem.measurement, problem.probe))
+        try:
+            if fit is None:
+                solution = solve(problem, progress)
+            else:
+                solution = _beside_a_fit(problem, fit, priors, progress)
+            converged, reason = verdict_on(solution)
+            result = calibrated(
+                solution,
+                Estimate.of(solution, converged, reason or no_ramp(solution)),
+                problem.measurement,
+                route=route,
+                samples=samples,
+                at_V=at_V,
+                budget_of=budget_of,
+                progress=progress,
+            )
+        except ComputationError as error:
+            raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
+        if result.reason and result.converged:
+            cause = causes.named(fit is not None)
+            result = replace(result, reason=f"{result.reason}; {cause}")
+        notes = list(dict.fromkeys([*problem.notes, *result.notes]))
+        return solution, replace(result, notes=notes)
+
+    solution, result = in_medium(medium, within)
+    if pulse is not None and result.describes_data:
+        return replace(result, pulse=pulse_calibration(solution, pulse, progress))
+    if pulse is not None:
+        note = "the pulse was not followed, since it would be that of another lever"
+        return replace(result, notes=[*result.notes, note])
+    return result
+
+
+def _chosen(options: FitOptions | None, choices: dict[str, Any]) -> FitOptions:
+    """Return options with some of them chosen by name.
+
+    Raises
+    ------
+    InputError
+        If there is no such option; the text gives the nearest one.
+    """
+    names = list(FitOptions.__dataclass_fields__)
+    for name in choices:
+        if name not in names:
+            raise unknown_name("option", name, names, "fit")
+    return replace(options or FitOptions(), **choices)
+
+
+def _by_the_rule(whole: Measurement, origin: Probe, law: PowerLaw | None, route: str) -> Estimate:
+    """Calibrate a lever by the paper's rule."""
+    measured = averaged(whole, robust=True)
+    # a power law holds for vacuum, whatever the lever is in
+    anywhere = measured if law is None else replace(measured, medium=None)
+    probe, notes = with_measured_circuit(origin, anywhere, "vacuum")
+    probe.circuit.need_cold_start("a power law")
+    try:
+        result = calibrated_by_knee(measured, probe, law, route)
+    except InputError as error:
+        raise InputError(f"{measured.path or 'measurement'}: {error}") from error
+    return replace(result, notes=[*notes, *note_on_averages(whole, measured), *result.notes])
+
+
+# --- beside a fit to other data -----------------------------------------------------------------
+
+
+def _beside_a_fit(
+    problem: Problem,
+    fit: Estimate,
+    priors: Mapping[str, Prior | str] | None,
+    progress: Progress | None,
+) -> Solution:
+    """Estimate a lever by its own data and those of a fit.
+
+    What the data of the fit leave of the lever itself is known before the other data; circuit and
+    gas are those of each measurement.
+
+    Raises
+    ------
+    ComputationError
+        If no lever near the probe has states at all measured biases.
+    """
+    before, fixed = known_before_a_fit(fit, priors), dict.fromkeys(fit.options.fixed)
+    options = FitOptions(
+        observables=fit.observables,
+        fixed=fixed,
+        priors=before,
+        medium=fit.probe.surroundings.medium,
     )
-    return replace(result, notes=[*result.notes, *undetermined(result)])
+    fitted = solve(Problem.of(fit.measurement, fit.probe, options), progress)
+    if _same_data(fit.measurement, problem.measurement):
+        return fitted
+    varied = fitted.problem.options.varied
+    own = [name for name in varied if name not in OF_THE_MEASUREMENT]
+    numbers = [varied.index(name) for name in own]
+    values, covariance = fitted.probe.values(own), fitted.posterior.covariance
+    relative = np.array([name not in before or before[name].relative for name in own])
+    left = PriorDensity.of_estimate(own, values, covariance[np.ix_(numbers, numbers)], relative)
+    probe = problem.probe.replace(dict(zip(own, values.tolist(), strict=True)))
+    theirs = {
+        name: prior
+        for name, prior in problem.known.items()
+        if name in {*OF_THE_MEASUREMENT, *SCALES}
+    }
+    free = tuple(name for name in own if name not in usual_parameters(probe))
+    medium = problem.probe.surroundings.medium
+    again = FitOptions(fixed=fixed, priors=theirs, free=free, medium=medium)
+    together = Problem.of(problem.measurement, probe, again, before=left)
+    try:
+        return solve(replace(together, known={**before, **theirs}), progress)
+    except ComputationError as error:
+        raise ComputationError(
+            f"no lever like the fitted one shows these data; is it another lever's fit? ({error})"
+        ) from error
 
 
-def _band(estimate: Estimate) -> xr.Dataset:
-    """Return the tip temperature and its standard error, at the rows or where it was followed."""
-    columns, covariance = estimate.prediction.columns, estimate.posterior.covariance
-    slopes = estimate.prediction.tip_slopes[:, estimate.objective.columns]
-    along = {name: columns[name] for name in ("time_us", "bias_V") if name in columns}
-    power = estimate.probe.circuit.power(columns["bias_V"], columns["current_mA"])
-    stderr = standard_errors(slopes, covariance)
-    return band_dataset(**along, power_mW=power, tip_K=columns["tip_K"], tip_stderr_K=stderr)
+def known_before_a_fit(fit: Estimate, priors: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
+    """Return what was known of a lever before it was fitted.
+
+    The probe of a fit has the material that was found, so that this is no prior of its own.
+    """
+    if priors is not None and not priors:
+        return {}
+    stated = {**fit.options.priors, **(priors or {})}
+    probe = as_known(fit.probe, stated)
+    before = updated(default_priors(probe, published_material()), stated, probe, "priors")
+    return {name: prior for name, prior in before.items() if name not in fit.options.fixed}
+
+
+def _same_data(first: Measurement, second: Measurement) -> bool:
+    columns, others = (
+        (data.bias_V, data.observable("current"), data.observable("bridge"))
+        for data in (first, second)
+    )
+    return np.array_equal(columns, others, equal_nan=True)
+
+
+# --- a medium that nobody knows -----------------------------------------------------------------
 
 
 def in_medium(
-    requested_medium: str | None,
-    answered: Callable[[str | None], tuple[Estimate, Answer]],
-    of_either: Callable[[Answer, Answer], Answer],
-) -> tuple[Estimate, Answer]:
+    requested_medium: str | None, answered: Callable[[str | None], tuple[Solution, Estimate]]
+) -> tuple[Solution, Estimate]:
     """Answer for a lever in the medium that is asked; if that is unknown, in the likelier one.
 
-    Then a note says how well either describes the data.
+    Then a note says how well either describes the data; where both do, these do not tell which it
+    is, and errors hold both.
 
     Parameters
     ----------
     requested_medium : str or None
         None is what measurement and probe say.
     answered : callable
-        Return an estimate in a medium, and the outcome that is read from it.
-    of_either : callable
-        Return an outcome whose errors hold another: where both describe the data, these do not
-        tell which it is.
+        Return a solution in a medium, and the estimate that is read from it.
 
     Raises
     ------
@@ -181,7 +388,7 @@ def in_medium(
     """
     if requested_medium != UNKNOWN_MEDIUM:
         return answered(requested_medium)
-    answers: dict[str, tuple[Estimate, Answer]] = {}
+    answers: dict[str, tuple[Solution, Estimate]] = {}
     failures: dict[str, ComputationError] = {}
     for medium in get_args(Medium):
         try:
@@ -193,32 +400,83 @@ def in_medium(
 
     def unlikeliness(medium: str) -> tuple[bool, float]:
         # what describes the data comes first, and of two of a kind the more probable one
-        estimate, answer = answers[medium]
-        return bool(answer.reason), estimate.posterior.deviance
+        solution, answer = answers[medium]
+        return bool(answer.reason), solution.posterior.deviance
 
     best, *rest = sorted(answers, key=unlikeliness)
     texts = [f"in {medium} a lever {_how_well(*answers[medium])}" for medium in (best, *rest)]
     texts += [f"in {medium} none can be solved: {error}" for medium, error in failures.items()]
     note = f"the medium is not known: {'; '.join(texts)}"
-    estimate, answer = answers[best]
+    solution, answer = answers[best]
     for other in (answers[medium][1] for medium in rest if not answers[medium][1].reason):
-        answer = of_either(answer, other)
+        answer = _either(answer, other)
         note += "; the data do not tell which, and the errors of the tip temperature hold both"
-    return estimate, replace(cast("Any", answer), notes=[note, *answer.notes])
+    return solution, replace(answer, notes=[note, *answer.notes])
 
 
-def error_of_choice(tip_K: Array, other_K: Array) -> Array:
-    """Return the standard error (K) of a tip temperature that may as well be another one."""
-    return np.asarray(np.abs(tip_K - other_K) / np.sqrt(2.0))
-
-
-def _how_well(estimate: Estimate, answer: Outcome) -> str:
-    rms = estimate.residuals.rms(estimate.prediction.values)
+def _how_well(solution: Solution, answer: Estimate) -> str:
+    rms = solution.residuals.rms(solution.prediction.values)
     rms_text = ", ".join(f"{value:.2g} {name.rsplit('_', 1)[1]}" for name, value in rms.items())
     return f"{'does not describe' if answer.reason else 'describes'} the data (rms {rms_text})"
 
 
-def undetermined(fit: Fit) -> list[str]:
+def _error_of_choice(tip_K: Array, other_K: Array) -> Array:
+    """Return the standard error (K) of a tip temperature that may as well be another one."""
+    return np.asarray(np.abs(tip_K - other_K) / np.sqrt(2.0))
+
+
+def _either(estimate: Estimate, other: Estimate) -> Estimate:
+    """Return an estimate whose errors hold another of the same data as well."""
+    band, choice = estimate.band, _error_of_choice(estimate.band.tip_K, other.band.tip_K)
+    band = band.assign(tip_stderr_K=np.hypot(band.tip_stderr_K, choice))
+    estimate = replace(estimate, band=band)
+    if not estimate.route:
+        return estimate
+    columns = {name: estimate.table[name].values for name in estimate.columns}
+    others = {
+        name: np.interp(columns["bias_V"], other.table.bias_V.values, other.table[name].values)
+        for name in columns
+    }
+    columns["tip_low_K"] = np.minimum(columns["tip_low_K"], others["tip_low_K"])
+    columns["tip_high_K"] = np.maximum(columns["tip_high_K"], others["tip_high_K"])
+    choices = {}
+    for error in (name for name in columns if name.endswith("_stderr_K")):
+        name = error.replace("_stderr", "")
+        choices[name] = _error_of_choice(columns[name], others[name])
+        columns[error] = np.hypot(columns[error], choices[name])
+    budgets = {
+        name: parts | {"medium": choices["apex_K" if name == BUDGETS[1] else "tip_K"]}
+        for name, parts in budgets_of(estimate.table).items()
+    }
+    table, gum = table_with_budgets(columns, budgets), estimate.gum
+    if gum is not None and other.gum is not None:
+        row = columns["bias_V"].tolist().index(gum.bias_V)
+        limits = limits_of(table.isel(bias=row), gum.of)
+        gum = gum.in_either(other.gum, choices[f"{gum.of}_K"][row].item(), limits)
+    return replace(estimate, table=table, gum=gum)
+
+
+# --- what is said of the parameters of a fit ----------------------------------------------------
+
+
+def _with_remarks(solution: Solution, estimate: Estimate) -> Estimate:
+    """Return a fit with notes on its data, and on what these do not determine."""
+    options, residuals, values = estimate.options, solution.residuals, solution.prediction.values
+    notes = outlier_notes(residuals, values, options.robust)
+    notes += residuals.drifting_zeros(values, solution.posterior.slopes)
+    chi_square = residuals.errors.reduced_chi_square(
+        residuals.difference(values), len(estimate.names)
+    )
+    if chi_square is not None:
+        text = (
+            f"the scatter about the fit is {np.sqrt(chi_square):.2f} times the measurement errors"
+        )
+        follow = not options.priors and estimate.describes_data
+        notes.append(f"{text}; standard errors follow the scatter" if follow else text)
+    return replace(estimate, notes=[*estimate.notes, *notes, *undetermined(estimate)])
+
+
+def undetermined(fit: Estimate) -> list[str]:
     """Say in words what the data do not determine, and what that means for the tip temperature."""
     texts, declared = [], parameters_of(fit.probe, in_time=True)
     for name in fit.names:
@@ -260,25 +518,3 @@ def undetermined(fit: Fit) -> list[str]:
             f"{largest:.1f} K from the fitted parameters"
         )
     return texts
-
-
-def chosen_options(options: FitOptions | None, choices: dict[str, Any]) -> FitOptions:
-    """Return options with some of them chosen by name.
-
-    Raises
-    ------
-    InputError
-        If there is no such option; the text gives the nearest one.
-    """
-    names = list(FitOptions.__dataclass_fields__)
-    for name in choices:
-        if name not in names:
-            raise unknown_name("option", name, names, "fit")
-    return replace(options or FitOptions(), **choices)
-
-
-def _either(fit: Fit, other: Fit) -> Fit:
-    """Return a fit in whose band the errors hold that of another one, at the same rows or times."""
-    band, of_choice = fit.band, error_of_choice(fit.band.tip_K.values, other.band.tip_K.values)
-    stderr = band.tip_stderr_K.copy(data=np.hypot(band.tip_stderr_K.values, of_choice))
-    return replace(fit, band=band.assign(tip_stderr_K=stderr))

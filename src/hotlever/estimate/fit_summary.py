@@ -15,8 +15,7 @@ from scipy.special import chdtri
 
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError
-from hotlever.estimate.outcome import Outcome
-from hotlever.estimate.result import Fit
+from hotlever.estimate.estimate import Estimate
 from hotlever.materials.parameters import (
     INVERSION,
     heading,
@@ -46,7 +45,7 @@ _RARE = 0.01
 _APART, _FEWEST = 5.0, 6
 
 
-def parameter_rows(fit: Fit) -> list[tuple[str, str, str, str]]:
+def parameter_rows(fit: Estimate) -> list[tuple[str, str, str, str]]:
     """Return name, value with error, unit and a remark for each parameter of a fit."""
     rows, declared = [], parameters_of(fit.probe, in_time=True)
     for name, fitted in fit.parameters.items():
@@ -58,7 +57,7 @@ def parameter_rows(fit: Fit) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def conclusions(fit: Fit) -> list[str]:
+def conclusions(fit: Estimate) -> list[str]:
     """Say what follows from the parameters of a fit, and how well it describes the data."""
     lines = [_tip_in_time(fit.band)] if fit.in_time else []
     if np.isfinite(fit.inversion_temperature_K):
@@ -105,7 +104,7 @@ def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:
     return [f"{text}: {', '.join(names)}" for text, names in lines.items() if names]
 
 
-def fit_text(fit: Fit) -> str:
+def fit_text(fit: Estimate) -> str:
     """Return the result of a fit as lines of text; first that it describes no data, if so."""
     lines = [] if fit.describes_data else [fit.doubt, NEAREST]
     lines += [*aligned(parameter_rows(fit)), *conclusions(fit), *prior_lines(fit.priors)]
@@ -127,7 +126,7 @@ class Compared(NamedTuple):
     upper: float = np.inf
 
 
-def compare_levers(fits: Mapping[str, Fit]) -> xr.Dataset:
+def compare_levers(fits: Mapping[str, Estimate]) -> xr.Dataset:
     """Put the fits of several levers side by side; see `compared`.
 
     The quantities are the parameters of the materials, and ``inversion_temperature`` if there is
@@ -151,7 +150,7 @@ def compare_levers(fits: Mapping[str, Fit]) -> xr.Dataset:
 
 
 def compared(
-    results: Mapping[str, Outcome],
+    results: Mapping[str, Estimate],
     quantities: Mapping[str, Mapping[str, tuple[float, float | None]]],
     written: Mapping[str, Compared],
     more: Mapping[str, Any] | None = None,
@@ -164,7 +163,7 @@ def compared(
 
     Parameters
     ----------
-    results : mapping of str to Fit or Calibration
+    results : mapping of str to Estimate or Estimate
         By lever.
     quantities : mapping of str to mapping
         By lever, of each quantity its value and standard error.
@@ -244,7 +243,7 @@ def _compared(name: str) -> Compared:
     return Compared(heading(name), parameter.unit, f"{name}{{}}", name, *how)
 
 
-def _quantities(fit: Fit) -> dict[str, tuple[float, float | None]]:
+def _quantities(fit: Estimate) -> dict[str, tuple[float, float | None]]:
     """Return what a lever is compared by, with errors: its materials, the inversion temperature."""
     # dimensions and the like are varied within priors: their scatter is not the levers'
     quantities = {

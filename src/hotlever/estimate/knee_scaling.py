@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimate.calibration import Calibration, rms
+from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.knee import (
     IVCurve,
     Knee,
@@ -25,7 +25,7 @@ from hotlever.estimate.knee import (
     scale_to,
 )
 from hotlever.estimate.power_law import PowerLaw, law_of_model, power_turns
-from hotlever.estimate.tip_table import BUDGETS, table_by_bias
+from hotlever.estimate.tip_table import BUDGETS, rms, table_by_bias
 from hotlever.lever import Branch, OperatingPoint
 from hotlever.lever.branch import Reach, shifted
 from hotlever.lever.lever import COARSE, Lever
@@ -108,7 +108,7 @@ def knee_of(model: Branch) -> OperatingPoint:
 
 def calibrated_by_knee(
     measured: Measurement, probe: Probe, law: PowerLaw | None, route: str
-) -> Calibration:
+) -> Estimate:
     """Return the calibration of a lever by its knee: the temperatures of a reference at k times P.
 
     Parameters
@@ -119,7 +119,7 @@ def calibrated_by_knee(
     law : PowerLaw, optional
         The reference; the probe's model in vacuum by default.
     route : str
-        See `hotlever.estimate.calibration.Calibration`.
+        See `hotlever.estimate.Estimate`.
 
     Raises
     ------
@@ -179,10 +179,9 @@ def calibrated_by_knee(
             f"{beyond} rows of the table are hotter than the models go, and have no temperature"
         )
     own = reference.at(circuit.power(measured.bias_V, current), knee_mW)
-    return Calibration(
+    return Estimate(
         table=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, {BUDGETS[0]: parts}),
         route=route,
-        medium="vacuum",
         power_law=used,
         law_residual_K=residual,
         k=k,

@@ -1,23 +1,16 @@
-"""Calibrations of many levers, and what they say together: how alike levers are somewhere.
-
-Levers are calibrated as fits of many are, see `hotlever.estimate.batch`.
-"""
+"""What calibrations of many levers say together: how alike they are somewhere."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from functools import partial
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import HotleverError
-from hotlever.estimate.batch import Batch, Work, estimate_many
-from hotlever.estimate.calibration import Calibration, CalibrationFile
+from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.fit_summary import (
     Compared,
     compared,
@@ -26,15 +19,7 @@ from hotlever.estimate.fit_summary import (
     statements,
     table_text,
 )
-from hotlever.estimate.options import FitOptions
-from hotlever.estimate.power_law import PowerLaw
-from hotlever.estimate.procedure import calibrate
-from hotlever.estimate.pulses import PulseTiming
 from hotlever.estimate.tip_table import STATED, interpolated
-from hotlever.estimate.uncertainty_budget import BudgetOf
-from hotlever.files import CALIBRATION
-from hotlever.probe import Probe
-from hotlever.probe.priors import Prior, known_beforehand
 from hotlever.quantities import QUANTITIES
 from hotlever.text import value_with_error
 
@@ -58,62 +43,6 @@ LAW = {
 _POINTS = 200
 
 
-def calibrate_many(
-    paths: Sequence[str | os.PathLike[str]],
-    folder: str | os.PathLike[str],
-    probe: Probe | None = None,
-    *,
-    law: PowerLaw | None = None,
-    medium: str | None = None,
-    priors: Mapping[str, Prior | str] | None = None,
-    pulse: PulseTiming | None = None,
-    samples: int = 0,
-    budget_of: BudgetOf = "tip",
-    **how: Any,
-) -> Batch[Calibration]:
-    """Calibrate many levers and write a calibration file for each as soon as it is done.
-
-    Parameters
-    ----------
-    paths : sequence of path
-        Measurement files.
-    folder : path
-        Where the calibration files go, named after the data files.
-    probe : Probe, optional
-        What the levers are like; the reference probe by default.
-    law, medium, priors, pulse, samples, budget_of
-        See `hotlever.estimate.procedure.calibrate`.
-    **how
-        As `hotlever.estimate.batch.estimate_many` has them.
-
-    Raises
-    ------
-    InputError, ComputationError
-        See `hotlever.estimate.batch.estimate_many`.
-    """
-    like = probe or Probe.reference()
-    # what it is for each lever, whatever its file says of circuit and medium
-    options = FitOptions(priors=known_beforehand(like, priors), medium=medium)  # type: ignore[arg-type]
-    request = {
-        "power_law": None if law is None else law.model_dump(),
-        "pulse": None if pulse is None else asdict(pulse),
-        "samples": samples,
-        "budget_of": budget_of,
-    }
-    calibration = partial(
-        calibrate,
-        probe=None if law is not None else like,
-        law=law,
-        medium=medium,
-        priors=priors,
-        pulse=pulse,
-        samples=samples,
-        budget_of=budget_of,
-    )
-    work = Work("calibration", calibration, CalibrationFile, CALIBRATION, like, options, request)
-    return estimate_many(paths, folder, work, **how)
-
-
 # --- what they say together ---------------------------------------------------------------------
 
 
@@ -129,7 +58,7 @@ class Setting(NamedTuple):
         return f"{self.value:.4g} {QUANTITIES[self.along].unit}"
 
 
-def highest_common_bias(calibrations: Mapping[str, Calibration]) -> Setting:
+def highest_common_bias(calibrations: Mapping[str, Estimate]) -> Setting:
     """Return the highest bias at which all levers were measured whose data are described."""
     described = [each for each in calibrations.values() if each.describes_data]
     highest = [each.table.bias_V.values[-1] for each in described or calibrations.values()]
@@ -137,13 +66,13 @@ def highest_common_bias(calibrations: Mapping[str, Calibration]) -> Setting:
 
 
 def compare_calibrations(
-    calibrations: Mapping[str, Calibration], at: Setting | None = None
+    calibrations: Mapping[str, Estimate], at: Setting | None = None
 ) -> xr.Dataset:
     """Put the calibrations of several levers side by side.
 
     Parameters
     ----------
-    calibrations : mapping of str to Calibration
+    calibrations : mapping of str to Estimate
         By lever.
     at : Setting, optional
         Where the tip temperatures are compared; by default at `highest_common_bias`.
@@ -191,7 +120,7 @@ def compare_calibrations(
     return table.assign_attrs(along=at.along)
 
 
-def _rows_along(calibration: Calibration, along: str) -> xr.Dataset | None:
+def _rows_along(calibration: Estimate, along: str) -> xr.Dataset | None:
     """Return the rows that tell a tip temperature by bias or power; None if there are none."""
     by_bias = along == "bias_V"
     if not calibration.describes_data or not (by_bias or calibration.power_law is not None):
@@ -199,7 +128,7 @@ def _rows_along(calibration: Calibration, along: str) -> xr.Dataset | None:
     return calibration.table if by_bias else calibration.heating
 
 
-def _tip_at(calibration: Calibration, at: Setting) -> dict[str, float]:
+def _tip_at(calibration: Estimate, at: Setting) -> dict[str, float]:
     """Return the tip temperature with its errors (K); NaN where there is none."""
     rows, names = _rows_along(calibration, at.along), ("tip_K", *STATED)
     if rows is None:
@@ -207,7 +136,7 @@ def _tip_at(calibration: Calibration, at: Setting) -> dict[str, float]:
     return {name: float(interpolated(rows, at.value, at.along, name)) for name in names}
 
 
-def _why_none(calibration: Calibration, at: Setting, tip: Mapping[str, float]) -> str:
+def _why_none(calibration: Estimate, at: Setting, tip: Mapping[str, float]) -> str:
     """Return why a lever whose data are described has no tip temperature there, if so."""
     if np.isfinite(tip["tip_K"]):
         return ""
@@ -218,12 +147,12 @@ def _why_none(calibration: Calibration, at: Setting, tip: Mapping[str, float]) -
     return f"{at.text} is out of its range, {low:.4g} to {high:.4g} {unit}, or where it jumps"
 
 
-def tips_along(calibrations: Mapping[str, Calibration], along: str) -> xr.Dataset:
+def tips_along(calibrations: Mapping[str, Estimate], along: str) -> xr.Dataset:
     """Return the tip temperatures of those levers whose data are described, at the same settings.
 
     Parameters
     ----------
-    calibrations : mapping of str to Calibration
+    calibrations : mapping of str to Estimate
         By lever.
     along : {"bias_V", "power_mW"}
 

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimate.calibration import Calibration
+from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP
 from hotlever.estimate.optimal_design import Information, NoiseLaw
 from hotlever.estimate.optimiser import DISCREPANCY
@@ -56,7 +56,7 @@ class LinearisedLever:
         Of parameters and scales.
     measurement : Measurement or None
     weights : dict of str to ndarray
-        See `hotlever.estimate.Calibration`; empty without data.
+        See `hotlever.estimate.Estimate`; empty without data.
     stretch : float
         Standard deviations of the tip upwards as a multiple of the linearised ones, 1 or more: as
         far as the calibration has found them to be longer.
@@ -70,7 +70,7 @@ class LinearisedLever:
     stretch: float = 1.0
 
     @classmethod
-    def of_calibration(cls, calibration: Calibration) -> LinearisedLever:
+    def of_calibration(cls, calibration: Estimate) -> LinearisedLever:
         """Return the lever that was calibrated.
 
         Raises

@@ -16,7 +16,7 @@ from scipy.special import ndtri
 
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, unknown_name
-from hotlever.estimate.calibration import Calibration
+from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.linearised_lever import LinearisedLever
 from hotlever.estimate.optimal_design import Candidate, Information, best_first
 from hotlever.estimate.surrogate import Rows
@@ -115,7 +115,7 @@ class Plan:
 
 
 def plan_next(
-    calibration: Calibration | None = None,
+    calibration: Estimate | None = None,
     *,
     probe: Probe | None = None,
     priors: Mapping[str, Prior | str] | None = None,
@@ -131,7 +131,7 @@ def plan_next(
 
     Parameters
     ----------
-    calibration : Calibration, optional
+    calibration : Estimate, optional
         Of what was measured so far, by a probe with priors.
     probe : Probe, optional
         In its place, of a lever that was not measured yet; the reference probe by default.
@@ -356,7 +356,7 @@ def _usual_biases(lever: LinearisedLever) -> Array:
 
 
 def _errors_that_stay(
-    lever: LinearisedLever, calibration: Calibration | None, bias: Array
+    lever: LinearisedLever, calibration: Estimate | None, bias: Array
 ) -> tuple[Array, list[str]]:
     """Return standard errors (K) at some biases that no such measurement lessens, and notes.
 

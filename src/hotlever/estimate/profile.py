@@ -8,6 +8,7 @@ calibration asks so for the tip temperature, a fit for each of its parameters.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -21,10 +22,12 @@ from hotlever.estimate.objective import Objective, Penalty, Quantity, Subproblem
 from hotlever.estimate.optimiser import Optimiser
 from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.posterior import Posterior
-from hotlever.estimate.result import Fit
 from hotlever.probe.probe_parameters import parameter_of, usual_parameters
 from hotlever.text import BAND
 from hotlever.types import Array, Index
+
+if TYPE_CHECKING:
+    from hotlever.estimate.estimate import Estimate
 
 #: Biases, in the hotter half, at which the tip temperature is moved away, and by how many
 #: standard errors.
@@ -158,7 +161,7 @@ def hotter_rows(at: Prediction) -> Index:
 
 
 def profile_likelihood(
-    result: Fit,
+    result: Estimate,
     name: str,
     *,
     points: int = 11,
@@ -167,7 +170,7 @@ def profile_likelihood(
 
     Parameters
     ----------
-    result : Fit
+    result : Estimate
     name : str
         A parameter that was varied.
     points : int
@@ -247,7 +250,7 @@ def profile_likelihood(
     return _dataset(result, name, dict(sorted(rows.items())), reasons)
 
 
-def _noise_variance(result: Fit, name: str, size: int) -> float:
+def _noise_variance(result: Estimate, name: str, size: int) -> float:
     """Return what the sum of squares knows of the noise, corrected by the standard error."""
     variance = result.sum_of_squares / max(size - len(result.names), 1)
     number, stderr = result.names.index(name), result.parameters[name].stderr
@@ -256,7 +259,7 @@ def _noise_variance(result: Fit, name: str, size: int) -> float:
 
 
 def _dataset(
-    result: Fit, name: str, rows: dict[float, tuple[float, Array]], reasons: dict[str, str]
+    result: Estimate, name: str, rows: dict[float, tuple[float, Array]], reasons: dict[str, str]
 ) -> xr.Dataset:
     optimum = result.parameters[name]
     values = np.array(list(rows))

@@ -9,28 +9,18 @@ is that of a shorter one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Self
-
 import numpy as np
-import pandas as pd
-import xarray as xr
-from numpy.typing import ArrayLike
-from pydantic import ValidationInfo, model_validator
 from scipy.integrate import simpson
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from hotlever.datasets import frame_text
-from hotlever.errors import ComputationError, InputError, unknown_name
-from hotlever.estimate.inverse_problem import Estimate
-from hotlever.estimate.outcome import Columns, Section, Vector
+from hotlever.errors import ComputationError
+from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import (
     BUDGETS,
-    budgets_of,
-    check_rows,
-    even_rows,
-    interpolated,
-    stored_table,
+    MOMENTS,
+    PULSE_COLUMNS,
+    PulseCalibration,
+    PulseTiming,
     table_with_budgets,
     total_error,
 )
@@ -52,11 +42,6 @@ from hotlever.types import Array, Index, Progress
 HEAT_CAPACITY_SPREAD = 0.03
 #: The same of what air takes up, by the properties of cold air: 7 % too much at a rise of 600 K.
 _HEAT_IN_AIR_SPREAD = 0.1
-#: What is told of a pulse: its highest tip temperature, that at its end, and the mean during it.
-MOMENTS = ("peak", "end", "mean")
-_KINDS = ("_K", "_stderr_K", "_low_K", "_high_K")
-#: Columns of the table.
-PULSE_COLUMNS = ("height_V", *(f"{moment}{kind}" for moment in MOMENTS for kind in _KINDS))
 #: Heights that are followed with the coarse mesh, and which of them with the fine one and for
 #: moved levers.
 _HEIGHTS, _SOME = 13, (12, 9, 6, 3)
@@ -69,112 +54,14 @@ _LEAST_VARIANCE, _LEFT_OUT = 1e-3, 2e-3
 _LONGER = 8
 
 
-@dataclass(frozen=True)
-class PulseTiming:
-    """Length of a rectangular pulse and the period of its repetition (µs), if it is repeated."""
-
-    length_us: float
-    period_us: float | None = None
-
-    def __post_init__(self) -> None:
-        pulse(1.0, self.length_us, self.period_us)
-
-    @property
-    def text(self) -> str:
-        """What it is, in words."""
-        each = "" if self.period_us is None else f" each {self.period_us:g} µs"
-        return f"a pulse of {self.length_us:g} µs{each}"
-
-
-@dataclass(frozen=True)
-class PulseCalibration:
-    """Tip temperatures of a calibrated lever in a pulse.
-
-    Attributes
-    ----------
-    timing : PulseTiming
-        A repeated pulse is one in the cyclic steady state of its train.
-    table : xarray.Dataset
-        `PULSE_COLUMNS` on the dimension ``height``, over the heights of the calibrated range; and
-        ``budget_K``, the standard error of the peak by ``source``.
-    """
-
-    timing: PulseTiming
-    table: xr.Dataset
-
-    def tip_temperature(self, height_V: ArrayLike, moment: str = "peak") -> Array:
-        """Return the tip temperature (K) by the height of the pulse (V); NaN out of range.
-
-        Parameters
-        ----------
-        height_V : array_like
-        moment : {"peak", "end", "mean"}
-        """
-        return interpolated(self.table, height_V, "height_V", _column(moment), tip="peak_K")
-
-    def height_for(self, tip_K: ArrayLike, moment: str = "peak") -> Array:
-        """Return the height (V) of the pulse for a tip temperature (K); NaN out of range.
-
-        Parameters
-        ----------
-        tip_K : array_like
-        moment : {"peak", "end", "mean"}
-        """
-        return interpolated(self.table, tip_K, _column(moment), "height_V", tip="peak_K")
-
-    def section(self) -> PulseSection:
-        """Return the section of the calibration file."""
-        table = {name: self.table[name].values for name in PULSE_COLUMNS}
-        return PulseSection.holding(self.timing, table=table, **budgets_of(self.table))
-
-    def table_csv(self, by: str = "temperature", step: float | None = None) -> str:
-        """Return the table as CSV, to load into an instrument; see `Calibration.table_csv`.
-
-        Raises
-        ------
-        InputError
-            If there is none by power, which a pulse has no single one of, or the rows are too many.
-        """
-        along = {"temperature": "peak_K", "bias": "height_V"}.get(by)
-        if along is None:
-            raise InputError(f"a table of pulses by {by}: expected by temperature or bias")
-        rows = even_rows(self.table, PULSE_COLUMNS, along, step, tip="peak_K")
-        return frame_text(pd.DataFrame(rows), index=False, float_format="%.6g")
-
-
-class PulseSection(Section):
-    """What a calibration file holds of a pulse."""
-
-    length_us: float
-    period_us: float | None = None
-    table: Columns
-    budget_K: dict[str, Vector]
-
-    @model_validator(mode="after")
-    def _belongs_together(self, info: ValidationInfo) -> Self:
-        where = f"{info.context}: pulse"
-        check_rows(self.table, {BUDGETS[0]: self.budget_K}, "height", "peak_K", where)
-        try:
-            PulseTiming(self.length_us, self.period_us)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
-        return self
-
-    def calibration(self) -> PulseCalibration:
-        """Return what was written."""
-        budgets = {BUDGETS[0]: self.budget_K}
-        table = stored_table(self.table, budgets, PULSE_COLUMNS, "height")
-        return PulseCalibration(PulseTiming(self.length_us, self.period_us), table)
-
-
 def pulse_calibration(
-    estimate: Estimate, timing: PulseTiming, progress: Progress | None = None
+    solution: Solution, timing: PulseTiming, progress: Progress | None = None
 ) -> PulseCalibration:
     """Return what an estimated lever does in a pulse, over the heights of its measured range.
 
     Parameters
     ----------
-    estimate : Estimate
+    solution : Solution
     timing : PulseTiming
     progress : callable, optional
         Called with the pulses followed and how many there are, about.
@@ -184,9 +71,9 @@ def pulse_calibration(
     ComputationError
         If the lever cannot be followed in time.
     """
-    bias = measured_range(estimate)
-    pulses = _Pulses(estimate, bias, timing, progress)
-    directions = estimate.posterior.principal_steps(_LEAST_VARIANCE)
+    bias = measured_range(solution)
+    pulses = _Pulses(solution, bias, timing, progress)
+    directions = solution.posterior.principal_steps(_LEAST_VARIANCE)
     axes: Index = np.arange(len(directions))
     corrections, changes = [], []
     for row in _SOME:
@@ -209,7 +96,7 @@ def pulse_calibration(
     slopes = rise[:, None] * _through(heights[list(_SOME)], changes, bias)
     # with the base the whole lever gets warmer
     slopes[:, :-1] += np.array([[direction.get(BASE, 0.0)] for direction in directions])
-    return _with_errors(estimate, bias, timing, rise, slopes, directions)
+    return _with_errors(solution, bias, timing, rise, slopes, directions)
 
 
 class _Pulses:
@@ -219,12 +106,12 @@ class _Pulses:
     """
 
     def __init__(
-        self, estimate: Estimate, bias: Array, timing: PulseTiming, progress: Progress | None
+        self, solution: Solution, bias: Array, timing: PulseTiming, progress: Progress | None
     ) -> None:
-        self._probe, self._timing, self._progress = estimate.probe, timing, progress
-        self._done, self._all = 0, 2 * (_HEIGHTS + len(estimate.options.varied))
+        self._probe, self._timing, self._progress = solution.probe, timing, progress
+        self._done, self._all = 0, 2 * (_HEIGHTS + len(solution.objective.varied))
         self.heights = np.linspace(float(bias[0]), float(bias[-1]), _HEIGHTS)
-        self.coarse, self.fine = Lever(estimate.probe, COARSE), Lever(estimate.probe)
+        self.coarse, self.fine = Lever(solution.probe, COARSE), Lever(solution.probe)
         self._similar = SimilarLevers(self.coarse)
         # a train settles sooner from where one that is a little lower has
         states: list[State | None] = [None]
@@ -290,7 +177,7 @@ def _through(heights: Array, values: list[Array], at: Array) -> Array:
 
 
 def _with_errors(
-    estimate: Estimate,
+    solution: Solution,
     bias: Array,
     timing: PulseTiming,
     rise: Array,
@@ -298,13 +185,13 @@ def _with_errors(
     directions: list[dict[str, float]],
 ) -> PulseCalibration:
     """Return rises (n, moments) with errors, by their changes (n, directions + 1, moments)."""
-    probe, varied = estimate.probe, estimate.options.varied
+    probe, varied = solution.probe, solution.objective.varied
     # changes by directions to changes by parameters, of which units differ by many orders
     steps = np.array([[direction[name] for name in varied] for direction in directions])
     scale = np.abs(steps).max(axis=0)
     inverse = np.linalg.pinv(steps / scale) / scale[:, None]
     by_parameter = np.einsum("pd,ndm->nmp", inverse, slopes[:, :-1])
-    parts = errors_by_source(estimate.posterior, by_parameter)
+    parts = errors_by_source(solution.posterior, by_parameter)
     parts["heat capacity"] = np.abs(slopes[:, -1])
     around = probe.surroundings
     if around.medium == "air":
@@ -333,9 +220,3 @@ def _share_of_air(probe: Probe, time_us: float) -> float:
     capacity = float(heat_capacity_of_air(T, probe.surroundings.pressure_mbar)[0])
     per_area = 2.0 * 4.0 / 3.0 * np.sqrt(kappa * capacity * 1e-6 * time_us / np.pi)
     return float(per_area / (1e-4 * probe.layout().thickness_um * heat_capacity(T)[0]))
-
-
-def _column(moment: str) -> str:
-    if moment not in MOMENTS:
-        raise unknown_name("moment", moment, MOMENTS)
-    return f"{moment}_K"

@@ -26,12 +26,12 @@ from hotlever.estimate.chains import (
     sample,
     worth,
 )
+from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP, ExperimentAtRest, Predictor, experiment_of, named
 from hotlever.estimate.objective import Quantity, Subproblem
 from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.posterior import Posterior
 from hotlever.estimate.profile import ErrorProfile, hotter_rows
-from hotlever.estimate.result import Fit
 from hotlever.estimate.surrogate import ReducedSurrogate
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import full_name
@@ -77,7 +77,7 @@ class SampledLever:
 
     @classmethod
     def of_fit(
-        cls, fit: Fit, probe: Probe, bias: Array, distance_um: Array | None = None
+        cls, fit: Estimate, probe: Probe, bias: Array, distance_um: Array | None = None
     ) -> SampledLever:
         """Return a lever that was fitted, at some biases (V) and distances, exact at a probe."""
         experiment = experiment_of(probe, bias, names=tuple(fit.names), reduce=True)
@@ -166,7 +166,7 @@ def sample_tip(
 # --- the parameters of a fit --------------------------------------------------------------------
 
 
-def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity, SampledLever]:
+def _density_at(fit: Estimate, probe: Probe, noise: Noise) -> tuple[PosteriorDensity, SampledLever]:
     """Return the density of a fit's parameters, approximated about a probe, and levers near it."""
     objective = fit.objective(fit.names)
     residuals = objective.residuals
@@ -176,7 +176,7 @@ def _density_at(fit: Fit, probe: Probe, noise: Noise) -> tuple[PosteriorDensity,
 
 
 def sample_posterior(
-    fit: Fit,
+    fit: Estimate,
     *,
     samples: int = 10_000,
     walkers: int | None = None,
@@ -189,7 +189,7 @@ def sample_posterior(
 
     Parameters
     ----------
-    fit : Fit
+    fit : Estimate
     samples : int
         Kept, at least; rounded up to a whole number of steps of all walkers.
     walkers : int, optional
@@ -255,7 +255,7 @@ def _outermost(points: Array) -> list[int]:
     return [int(np.argmin(along)), int(np.argmax(along))]
 
 
-def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> xr.Dataset:
+def _dataset(fit: Estimate, chains: Chains, values_of: Callable[[Array], Array]) -> xr.Dataset:
     ensembles, walkers, draws, _ = chains.points.shape
     values = values_of(chains.points)
     columns = {name: values[..., number] for number, name in enumerate(fit.names)}
@@ -299,7 +299,7 @@ def _dataset(fit: Fit, chains: Chains, values_of: Callable[[Array], Array]) -> x
 
 
 def predictive_band(
-    fit: Fit,
+    fit: Estimate,
     posterior: xr.Dataset,
     *,
     bias: Sequence[float] | Array | None = None,
@@ -313,7 +313,7 @@ def predictive_band(
 
     Parameters
     ----------
-    fit : Fit
+    fit : Estimate
     posterior : xarray.Dataset
         From `sample_posterior`.
     bias : sequence of float, optional

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import labelled
-from hotlever.errors import InputError
-from hotlever.estimate.outcome import array
+from hotlever.datasets import frame_text, labelled
+from hotlever.errors import InputError, unknown_name
+from hotlever.lever.transient import pulse
 from hotlever.probe import Circuit
 from hotlever.quantities import QUANTITIES
 from hotlever.text import BAND
@@ -36,6 +38,11 @@ _FAR_K, _FURTHER = 2.5 * STEEP_K, 2.4
 MOST_ROWS = 10_000
 #: What rows may be even in, by the word for it: their column and its unit.
 TABLES_BY = {"temperature": ("tip_K", "K"), "power": ("power_mW", "mW"), "bias": ("bias_V", "V")}
+#: What is told of a pulse: its highest tip temperature, that at its end, and the mean during it.
+MOMENTS = ("peak", "end", "mean")
+_KINDS = ("_K", "_stderr_K", "_low_K", "_high_K")
+#: Columns of the table.
+PULSE_COLUMNS = ("height_V", *(f"{moment}{kind}" for moment in MOMENTS for kind in _KINDS))
 
 
 def table_with_budgets(
@@ -177,37 +184,84 @@ def table_by_bias(
     return table_with_budgets({**columns, **(more or {})}, budgets)
 
 
-# --- in files -----------------------------------------------------------------------------------
+def rms(difference: Array) -> float:
+    """Return the root mean square of what is known of a difference; NaN if nothing is."""
+    present = difference[np.isfinite(difference)]
+    return float(np.sqrt(np.mean(present**2))) if present.size else float("nan")
 
 
-def check_rows(
-    columns: Mapping[str, Array], budgets: Budgets, along: str, tip: str, where: str
-) -> None:
-    """Refuse what a file holds in place of a table with its budgets; `where` names the file.
+# --- of pulses ----------------------------------------------------------------------------------
 
-    Raises
-    ------
-    InputError
-        If its rows do not rise or have no tip temperature, or a budget is not one of them.
+
+@dataclass(frozen=True)
+class PulseTiming:
+    """Length of a rectangular pulse and the period of its repetition (µs), if it is repeated."""
+
+    length_us: float
+    period_us: float | None = None
+
+    def __post_init__(self) -> None:
+        pulse(1.0, self.length_us, self.period_us)
+
+    @property
+    def text(self) -> str:
+        """What it is, in words."""
+        each = "" if self.period_us is None else f" each {self.period_us:g} µs"
+        return f"a pulse of {self.length_us:g} µs{each}"
+
+
+@dataclass(frozen=True)
+class PulseCalibration:
+    """Tip temperatures of a calibrated lever in a pulse.
+
+    Attributes
+    ----------
+    timing : PulseTiming
+        A repeated pulse is one in the cyclic steady state of its train.
+    table : xarray.Dataset
+        `PULSE_COLUMNS` on the dimension ``height``, over the heights of the calibrated range; and
+        ``budget_K``, the standard error of the peak by ``source``.
     """
-    rising, sources = columns.get(f"{along}_V", np.array([])), budgets[BUDGETS[0]].keys()
-    if not rising.size or not sources or not np.all(np.diff(rising) > 0):
-        raise InputError(
-            f"{where}: table: expected rows of rising {along}, and a budget of their errors"
-        )
-    if not np.isfinite(columns.get(tip, np.nan)).any():
-        raise InputError(f"{where}: table: expected a tip temperature ({tip}) in some rows")
-    for name, parts in budgets.items():
-        if parts.keys() != sources:
-            raise InputError(f"{where}: {name}: expected the sources {', '.join(sources)}")
-        for source, errors in parts.items():
-            array(errors, rising.shape, f"{where}: {name}: {source}")
+
+    timing: PulseTiming
+    table: xr.Dataset
+
+    def tip_temperature(self, height_V: ArrayLike, moment: str = "peak") -> Array:
+        """Return the tip temperature (K) by the height of the pulse (V); NaN out of range.
+
+        Parameters
+        ----------
+        height_V : array_like
+        moment : {"peak", "end", "mean"}
+        """
+        return interpolated(self.table, height_V, "height_V", _column(moment), tip="peak_K")
+
+    def height_for(self, tip_K: ArrayLike, moment: str = "peak") -> Array:
+        """Return the height (V) of the pulse for a tip temperature (K); NaN out of range.
+
+        Parameters
+        ----------
+        tip_K : array_like
+        moment : {"peak", "end", "mean"}
+        """
+        return interpolated(self.table, tip_K, _column(moment), "height_V", tip="peak_K")
+
+    def table_csv(self, by: str = "temperature", step: float | None = None) -> str:
+        """Return the table as CSV, to load into an instrument; see `Estimate.table_csv`.
+
+        Raises
+        ------
+        InputError
+            If there is none by power, which a pulse has no single one of, or the rows are too many.
+        """
+        along = {"temperature": "peak_K", "bias": "height_V"}.get(by)
+        if along is None:
+            raise InputError(f"a table of pulses by {by}: expected by temperature or bias")
+        rows = even_rows(self.table, PULSE_COLUMNS, along, step, tip="peak_K")
+        return frame_text(pd.DataFrame(rows), index=False, float_format="%.6g")
 
 
-def stored_table(
-    columns: Mapping[str, Array], budgets: Budgets, names: Sequence[str], along: str = "bias"
-) -> xr.Dataset:
-    """Return the table that a file holds; columns are NaN that an older file has not."""
-    unknown = np.full_like(columns[f"{along}_V"], np.nan)
-    own = {name: columns.get(name, unknown) for name in names}
-    return table_with_budgets(own, budgets, along)
+def _column(moment: str) -> str:
+    if moment not in MOMENTS:
+        raise unknown_name("moment", moment, MOMENTS)
+    return f"{moment}_K"

@@ -18,9 +18,9 @@ import xarray as xr
 from hotlever.datasets import quantity
 from hotlever.errors import InputError
 from hotlever.estimate.experiment import TIP, PredictionAtRest
-from hotlever.estimate.inverse_problem import Estimate
 from hotlever.estimate.posterior import Posterior, standard_errors
 from hotlever.estimate.profile import profile_of_tip
+from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import (
     BUDGETS,
     TOTAL_POWER,
@@ -90,7 +90,7 @@ class TipByBias(NamedTuple):
 
 
 def tip_by_bias(
-    estimate: Estimate,
+    solution: Solution,
     samples: int = 0,
     at_V: float | None = None,
     progress: Progress | None = None,
@@ -99,7 +99,7 @@ def tip_by_bias(
 
     Parameters
     ----------
-    estimate : Estimate
+    solution : Solution
     samples : int
         Of the posterior, from which the credible interval is then taken; none by default.
     at_V : float, optional
@@ -112,17 +112,17 @@ def tip_by_bias(
         If samples are asked for of an estimate without priors, or the bias is not in the measured
         range.
     """
-    probe, circuit, bias = estimate.probe, estimate.probe.circuit, _rows(estimate, at_V)
-    predicted = estimate.predicted(bias)
-    tip, slopes = predicted.values[TIP], predicted.slopes[TIP][:, estimate.objective.columns]
-    parts = errors_by_source(estimate.posterior, slopes)
+    probe, circuit, bias = solution.probe, solution.probe.circuit, _rows(solution, at_V)
+    predicted = solution.predicted(bias)
+    tip, slopes = predicted.values[TIP], predicted.slopes[TIP][:, solution.objective.columns]
+    parts = errors_by_source(solution.posterior, slopes)
     stderr = total_error(parts)
     rise = tip - circuit.base_temperature_K
     parts["model"] = error_of_model(probe.surroundings, bias, rise)
     low, high, asymmetry = _credible_interval(
-        estimate, tip, stderr, parts["model"], samples, progress
+        solution, tip, stderr, parts["model"], samples, progress
     )
-    jumps = jumps_of(estimate.branch, circuit, *tips_in_contact(estimate))
+    jumps = jumps_of(solution.branch, circuit, *tips_in_contact(solution))
     for jump in jumps:
         here = jump.unknown(bias)
         low = np.where(here, np.minimum(low, jump.cold_K), low)
@@ -131,11 +131,11 @@ def tip_by_bias(
         parts["jump"] = np.hypot(parts.get("jump", 0.0), either)
     more, budgets = dict[str, Array](), {BUDGETS[0]: parts}
     if probe.contact is not None:
-        more, budgets[BUDGETS[1]] = _at_the_contact(estimate, predicted, parts)
+        more, budgets[BUDGETS[1]] = _at_the_contact(solution, predicted, parts)
     table = table_by_bias(circuit, bias, predicted.values[0], tip, budgets, (low, high), more)
     if not circuit.starts_cold:
         # the held supplies' part is within a coarse mesh's error
-        branch = estimate.branch
+        branch = solution.branch
         swept = branch.x[-1] * branch.equations.observed(branch.x)[1]
         held = spline_through(branch.u, branch.equations.power(branch.x) - swept)
         total = table.power_mW.values + held(branch.read(circuit, bias).u)
@@ -143,20 +143,20 @@ def tip_by_bias(
     return TipByBias(table, jumps, asymmetry)
 
 
-def tips_in_contact(estimate: Estimate) -> tuple[Array, Array]:
+def tips_in_contact(solution: Solution) -> tuple[Array, Array]:
     """Return biases (V) and tip temperatures (K) of the rows in contact, or all without a sample.
 
     They are those that lie on the branch of the lever.
     """
-    residuals, tip = estimate.residuals, estimate.prediction.values[TIP]
+    residuals, tip = solution.residuals, solution.prediction.values[TIP]
     touching = np.ones(tip.size, dtype=bool)
-    if residuals.distance_um is not None and estimate.probe.contact is not None:
+    if residuals.distance_um is not None and solution.probe.contact is not None:
         touching = residuals.distance_um <= 0.0
     return residuals.bias[touching], tip[touching]
 
 
 def _at_the_contact(
-    estimate: Estimate, predicted: PredictionAtRest, of_tip: Mapping[str, Array]
+    solution: Solution, predicted: PredictionAtRest, of_tip: Mapping[str, Array]
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return columns of apex and surface, and the errors of the apex by source.
 
@@ -165,12 +165,12 @@ def _at_the_contact(
     """
     columns: dict[str, Array] = {}
     of_apex: dict[str, Array] = {}
-    base_K = estimate.probe.circuit.base_temperature_K
+    base_K = solution.probe.circuit.base_temperature_K
     rise = predicted.values[TIP] - base_K
     for name, of in OF_A_CONTACT.items():
         row = list(FITTED).index(name)
-        slopes = predicted.slopes[row][:, estimate.objective.columns]
-        parts = errors_by_source(estimate.posterior, slopes)
+        slopes = predicted.slopes[row][:, solution.objective.columns]
+        parts = errors_by_source(solution.posterior, slopes)
         risen = predicted.values[row] - base_K
         share = np.divide(risen, rise, out=np.zeros_like(rise), where=rise != 0.0)
         parts |= {source: share * error for source, error in of_tip.items() if source not in parts}
@@ -180,10 +180,10 @@ def _at_the_contact(
     return columns, of_apex
 
 
-def measured_range(estimate: Estimate) -> Array:
+def measured_range(solution: Solution) -> Array:
     """Return even biases (V) over the measured range, as far as the lever has states."""
-    lowest, highest = limits_of_range(estimate.measurement, estimate.probe)
-    return np.linspace(lowest, min(highest, highest_bias(estimate)), _ROWS)
+    lowest, highest = limits_of_range(solution.problem.measurement, solution.probe)
+    return np.linspace(lowest, min(highest, highest_bias(solution)), _ROWS)
 
 
 def limits_of_range(measured: Measurement, probe: Probe) -> tuple[float, float]:
@@ -203,20 +203,20 @@ def check_in_range(at_V: float | None, lowest_V: float, highest_V: float) -> Non
         )
 
 
-def _rows(estimate: Estimate, at_V: float | None) -> Array:
+def _rows(solution: Solution, at_V: float | None) -> Array:
     """Return the biases (V) of the table: even ones, more where the tip rises steeply, and one."""
-    even, branch = measured_range(estimate), estimate.branch
+    even, branch = measured_range(solution), solution.branch
     fine = np.linspace(even[0], even[-1], _FINE)
-    tip = branch.tip_K(branch.read(estimate.probe.circuit, fine).u)
+    tip = branch.tip_K(branch.read(solution.probe.circuit, fine).u)
     rows = with_steep_rows(even, fine, tip)
     check_in_range(at_V, *even[[0, -1]])
     return rows if at_V is None else np.union1d(rows, at_V)
 
 
-def highest_bias(estimate: Estimate) -> float:
+def highest_bias(solution: Solution) -> float:
     """Return the highest bias (V) up to the highest measured one at which the lever has a state."""
-    measured = float(estimate.residuals.bias.max())
-    return estimate.branch.highest_bias(estimate.probe.circuit, measured)
+    measured = float(solution.residuals.bias.max())
+    return solution.branch.highest_bias(solution.probe.circuit, measured)
 
 
 # --- how sure it is -----------------------------------------------------------------------------
@@ -247,7 +247,7 @@ def error_of_model(around: Surroundings, bias: Array, rise: Array) -> Array:
 
 
 def _credible_interval(
-    estimate: Estimate,
+    solution: Solution,
     tip: Array,
     stderr: Array,
     of_model: Array,
@@ -255,18 +255,18 @@ def _credible_interval(
     progress: Progress | None,
 ) -> tuple[Array, Array, str]:
     """Return what 95 % of the tip temperatures lie between (K), and words on where that is from."""
-    posterior, informed, too_few = estimate.posterior, estimate.objective.informed, ""
+    posterior, informed, too_few = solution.posterior, solution.objective.informed, ""
     if samples:
         if not informed:
             raise InputError("posterior: expected priors, without which it is not that of a fit")
         # what samples takes a second to load, for which few calibrations have to wait
         from hotlever.estimate.sampling import sample_tip
 
-        sampled = sample_tip(posterior, estimate.predictor, samples=samples, progress=progress)
+        sampled = sample_tip(posterior, solution.predictor, samples=samples, progress=progress)
         if sampled.enough:
             return *sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
         too_few = sampled.note
-    profile = profile_of_tip(posterior, estimate.predictor.experiment) if informed else None
+    profile = profile_of_tip(posterior, solution.predictor.experiment) if informed else None
     if profile is None or profile.linear:
         away = BAND * np.hypot(stderr, of_model)
         return tip - away, tip + away, too_few

@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 from hotlever.estimate.chains import FEWEST_EFFECTIVE, SETTLED_RHAT
+from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.profile import profile_likelihood
-from hotlever.estimate.result import Fit
 from hotlever.estimate.sampling import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.files import json_text
 from hotlever.materials.parameters import heading, scale_of
@@ -55,14 +55,14 @@ class Uncertainty:
 
     Attributes
     ----------
-    fit : Fit
+    fit : Estimate
     posterior, band : xarray.Dataset or None
         See `sample_posterior` and `predictive_band`.
     profiles : dict of str to xarray.Dataset
         By parameter; see `profile_likelihood`.
     """
 
-    fit: Fit
+    fit: Estimate
     posterior: xr.Dataset | None
     band: xr.Dataset | None
     profiles: dict[str, xr.Dataset]
@@ -179,7 +179,7 @@ class Uncertainty:
 
 
 def examine(
-    fit: Fit,
+    fit: Estimate,
     *,
     samples: int | None = None,
     profiles: bool = False,
@@ -192,7 +192,7 @@ def examine(
 
     Parameters
     ----------
-    fit : Fit
+    fit : Estimate
     samples : int, optional
         Of the posterior, at least; none by default.
     profiles : bool
@@ -240,7 +240,7 @@ def _unsettled(posterior: xr.Dataset) -> list[str]:
     ]
 
 
-def _about(fit: Fit, name: str, values: Array) -> list[str]:
+def _about(fit: Estimate, name: str, values: Array) -> list[str]:
     """Say whether a parameter is undetermined, or its interval not that of its standard error."""
     parameter, fitted = parameters_of(fit.probe)[name], fit.parameters[name]
     span = parameter.upper - parameter.lower
@@ -248,7 +248,7 @@ def _about(fit: Fit, name: str, values: Array) -> list[str]:
     for bound in (parameter.lower, parameter.upper):
         if np.mean(np.abs(values - bound) < _NEAR * span) > _AT_BOUND:
             return [f"{undetermined} reaches its bound {with_unit(f'{bound:g}', parameter.unit)}"]
-    prior = fit.stated_priors.get(name)
+    prior = fit.known.get(name)
     if prior is not None and np.std([*map(prior.deviation, values)]) > _AS_KNOWN:
         return [f"{name} is as known before: these data do not tell"]
     if values.std() > _AS_WIDE * span / np.sqrt(12.0):

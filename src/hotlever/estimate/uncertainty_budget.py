@@ -9,28 +9,25 @@ Monte Carlo method (JCGM 101:2008).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import Annotated, Any, Literal, Self, get_args
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
 import xarray as xr
-from pydantic import PlainSerializer, ValidationInfo, model_validator
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.experiment import TIP
 from hotlever.estimate.gum import Budget, CoverageInterval, InputQuantity, propagate
-from hotlever.estimate.inverse_problem import Estimate
-from hotlever.estimate.outcome import IF_ANY, Correlations, Section
 from hotlever.estimate.posterior import CurvedQuantity
 from hotlever.estimate.prior_density import PriorDensity
+from hotlever.estimate.search import Solution
 from hotlever.estimate.surrogate import Rows
 from hotlever.estimate.tip_table import BUDGETS, budgets_of
 from hotlever.materials.departures import DEPARTURES, departure_of
 from hotlever.materials.parameters import own_name
-from hotlever.probe.priors import SCALES, PriorUse
+from hotlever.probe.priors import SCALES
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import FITTED, OBSERVABLES
-from hotlever.records import Number
 from hotlever.text import BAND
 from hotlever.types import Array
 
@@ -150,34 +147,27 @@ def limits_of(row: xr.Dataset, of: BudgetOf) -> tuple[float, float]:
     return low, high
 
 
-def budget_of_estimate(
-    estimate: Estimate,
-    priors: Mapping[str, PriorUse],
-    row: xr.Dataset,
-    of: BudgetOf,
-) -> TemperatureBudget:
-    """Return the budget of a temperature in a row of the table of an estimate.
+def budget_of_estimate(solution: Solution, row: xr.Dataset, of: BudgetOf) -> TemperatureBudget:
+    """Return the budget of a temperature in a row of the table of an estimated lever.
 
     Parameters
     ----------
-    estimate : Estimate
-    priors : mapping of str to PriorUse
-        Of the parameters and the scales.
+    solution : Solution
     row : xarray.Dataset
         With the standard errors beside those of the parameters.
     of : {"tip", "apex"}
     """
     bias_V, errors_K = row.bias_V.item(), budgets_of(row)[BUDGETS[of == "apex"]]
     model = {name: errors_K[name].item() for name in ("model", "jump") if name in errors_K}
-    residuals, objective = estimate.residuals, estimate.objective
-    predicted = estimate.predicted(np.array([bias_V]))
+    residuals, objective, priors = solution.residuals, solution.objective, solution.priors
+    predicted = solution.predicted(np.array([bias_V]))
     observable = list(FITTED).index(of)
     # a ramp of levers like it may not have jumped yet, where it is known that this one has
     surrogate = predicted.surrogate.reading(Rows(predicted.surrogate.rows.bias_V, predicted.values))
     slopes = predicted.slopes[observable, 0, objective.columns]
-    contributions = {name: slopes @ by for name, by in estimate.posterior.influences.items()}
-    u = residuals.noise(estimate.prediction.values).tolist()
-    leverage = objective.leverage(estimate.prediction.slopes, objective.point(estimate.probe))
+    contributions = {name: slopes @ by for name, by in solution.posterior.influences.items()}
+    u = residuals.noise(solution.prediction.values).tolist()
+    leverage = objective.leverage(solution.prediction.slopes, objective.point(solution.probe))
     dof = residuals.errors.degrees_of_freedom(leverage).tolist()
     rows = []
     for name, size, free in zip(residuals.observables, u, dof, strict=True):
@@ -185,7 +175,7 @@ def budget_of_estimate(
         kind: Literal["A", "B"] = "A" if np.isfinite(free) else "B"
         noise, unit = f"noise of {name}", FITTED[name].unit
         rows.append(InputQuantity(noise, 0.0, unit, size, kind, "normal", sensitivity, free))
-    units = {name: each.unit for name, each in parameters_of(estimate.probe, anywhere=True).items()}
+    units = {name: each.unit for name, each in parameters_of(solution.probe, anywhere=True).items()}
     units |= dict.fromkeys(SCALES, "1")
     by_fit = contributions.pop(_FIT, None)
     for law, parts in _by_law(contributions).items():
@@ -215,10 +205,10 @@ def budget_of_estimate(
         return temperature_budget
     free = dict(zip(residuals.observables, dof, strict=True))
     try:
-        curved = CurvedQuantity(estimate.posterior, surrogate, observable)
+        curved = CurvedQuantity(solution.posterior, surrogate, observable)
     except (ComputationError, np.linalg.LinAlgError):
         return replace(temperature_budget, monte_carlo=_NO_INTERVAL)
-    errors = _Errors(curved, estimate.posterior.influences, free)
+    errors = _Errors(curved, solution.posterior.influences, free)
 
     def draw(count: int) -> Array:
         return value + curved.changes(errors.draw(count)) + other * errors.random.normal(size=count)
@@ -227,7 +217,7 @@ def budget_of_estimate(
     # of what is hotter no lever was solved, and it may melt
     ended = predicted.values[: len(OBSERVABLES)].copy()
     ended[TIP] = surrogate.branch.hottest_K
-    hottest = surrogate.contact.added(ended, estimate.probe.values(objective.names))[observable, 0]
+    hottest = surrogate.contact.added(ended, solution.probe.values(objective.names))[observable, 0]
     beyond = max(interval.high, temperature_budget.interval_K[1]) > hottest
     return replace(temperature_budget, monte_carlo=_NO_INTERVAL if beyond else interval)
 
@@ -305,77 +295,3 @@ def _root(covariance: Array) -> Array:
     """Return the symmetric root of a covariance, of which rounding may have left less than none."""
     variances, axes = np.linalg.eigh(covariance)
     return np.asarray((axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T)
-
-
-# A row as calibration files hold it.
-_Row = Annotated[
-    InputQuantity, PlainSerializer(lambda row: asdict(row) | {"contribution_K": row.contribution})
-]
-
-
-class IntervalSection(Section):
-    """What the Monte Carlo method says, as calibration files hold it; no ends where it failed."""
-
-    trials: int
-    low_K: Number
-    high_K: Number
-    tolerance_K: Number
-
-
-class BudgetFields(Section):
-    """An uncertainty budget as calibration files hold it, with what follows from it for 95 %."""
-
-    gum: list[_Row] | None = IF_ANY
-    gum_correlation: Correlations | None = IF_ANY
-    gum_bias_V: float | None = IF_ANY
-    gum_of: BudgetOf | None = IF_ANY
-    effective_dof: Number | None = IF_ANY
-    coverage_factor: float | None = IF_ANY
-    expanded_uncertainty_K: float | None = IF_ANY
-    gum_monte_carlo: IntervalSection | None = IF_ANY
-    gum_linear: bool | None = IF_ANY
-
-    @staticmethod
-    def fields_of(stated: TemperatureBudget) -> dict[str, Any]:
-        """Return the values of a budget by field."""
-        budget, interval, section = stated.budget, stated.monte_carlo, None
-        if interval is not None:
-            ends = {"low_K": interval.low, "high_K": interval.high}
-            section = IntervalSection.holding(interval, **ends, tolerance_K=budget.tolerance)
-        return {
-            "gum": list(budget.inputs),
-            "gum_correlation": budget.correlation,
-            "gum_bias_V": stated.bias_V,
-            "gum_of": stated.of,
-            "effective_dof": budget.dof,
-            "coverage_factor": budget.coverage_factor(),
-            "expanded_uncertainty_K": budget.expanded(),
-            "gum_monte_carlo": section,
-            "gum_linear": stated.linear,
-        }
-
-    @model_validator(mode="after")
-    def _correlation_is_of_the_rows(self, info: ValidationInfo) -> Self:
-        size, correlation = len(self.gum or []), self.gum_correlation
-        if size and correlation is not None and correlation.shape != (size, size):
-            raise InputError(
-                f"{info.context}: gum_correlation: expected numbers in {size} × {size} places"
-            )
-        return self
-
-    def temperature_budget(self, table: xr.Dataset) -> TemperatureBudget | None:
-        """Return the budget of a row of a table, if there is one."""
-        if self.gum is None:
-            return None
-        row, monte_carlo, of = (
-            table.sel(bias=self.gum_bias_V),
-            self.gum_monte_carlo,
-            self.gum_of or "tip",
-        )
-        interval = (
-            None
-            if monte_carlo is None
-            else CoverageInterval(monte_carlo.trials, monte_carlo.low_K, monte_carlo.high_K)
-        )
-        budget, value = Budget(tuple(self.gum), self.gum_correlation), row[f"{of}_K"].item()
-        return TemperatureBudget(budget, row.bias_V.item(), value, limits_of(row, of), of, interval)

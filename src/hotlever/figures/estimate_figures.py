@@ -17,11 +17,11 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
-from hotlever.estimate.calibration import Calibration
 from hotlever.estimate.diagnosis import USUAL_SCATTER
+from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.levers import tips_along
 from hotlever.estimate.next_measurement import SURE, Plan
-from hotlever.estimate.pulses import PulseCalibration
+from hotlever.estimate.tip_table import PulseCalibration
 from hotlever.figures.style import (
     LINES,
     MEASURED,
@@ -68,7 +68,7 @@ def data_and_model(
     fitted : sequence of str
         The observables that entered the fit.
     band : xarray.Dataset, optional
-        `Fit.band`: of the tip, which is then drawn with it, and whether it was measured or not.
+        `Estimate.band`: of the tip, which is then drawn with it, measured or not.
     """
     (along,) = map(str, measured.sizes)
     in_time = along == "time"
@@ -169,7 +169,7 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     Parameters
     ----------
     band : xarray.Dataset
-        `Fit.band`, or from `hotlever.estimate.sampling.predictive_band`.
+        `Estimate.band`, or from `hotlever.estimate.sampling.predictive_band`.
     measured : xarray.Dataset, optional
         From `Measurement.dataset`; drawn as points.
     """
@@ -385,7 +385,7 @@ _MARKS: dict[str, Any] = {
 _BY_ADDED = (BLACK, ORANGE, GREEN, BLUE, SKY)
 
 
-def calibration_curves(calibration: Calibration) -> Figure:
+def calibration_curves(calibration: Estimate) -> Figure:
     """Draw the tip temperature against power and bias with its band, the knee and the budget.
 
     Where the lever does not show what was measured, the difference stands in place of the budget,
@@ -442,12 +442,12 @@ def calibration_curves(calibration: Calibration) -> Figure:
     return fig
 
 
-def calibrated_levers(calibrations: Mapping[str, Calibration], levers: xr.Dataset) -> Figure:
+def calibrated_levers(calibrations: Mapping[str, Estimate], levers: xr.Dataset) -> Figure:
     """Draw where the calibrations of several levers differ.
 
     Parameters
     ----------
-    calibrations : mapping of str to Calibration
+    calibrations : mapping of str to Estimate
         By lever; those whose data are not described are left out.
     levers : xarray.Dataset
         From `hotlever.estimate.levers.compare_calibrations`.
@@ -549,7 +549,7 @@ def _budget(axes: Axes, table: xr.Dataset) -> None:
     axes.legend(loc="upper left")
 
 
-def _difference(axes: Axes, calibration: Calibration, measured: xr.Dataset) -> None:
+def _difference(axes: Axes, calibration: Estimate, measured: xr.Dataset) -> None:
     """Draw data minus the nearest lever, and mark the rows that are off."""
     table, data = calibration.table, measured.dropna("bias", subset=["current_mA"])
     expected = np.interp(data.bias_V, table.bias_V, table.current_mA)

@@ -9,11 +9,11 @@ import xarray as xr
 
 from hotlever import figures
 from hotlever.errors import InputError
-from hotlever.estimate import Calibration
-from hotlever.estimate.batch import Batch
+from hotlever.estimate import Estimate
 from hotlever.estimate.calibration_summary import calibration_parts, linear_words
 from hotlever.estimate.gum import Budget, InputQuantity
 from hotlever.estimate.levers import calibration_rows, calibration_statements, law_rows
+from hotlever.estimate.many import Batch
 from hotlever.estimate.tip_table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, even_rows
 from hotlever.estimate.uncertainty_budget import TemperatureBudget
 from hotlever.materials.parameters import sentence
@@ -30,9 +30,7 @@ _CONTRIBUTIONS = 10
 _HEAD = ["quantity", "estimate", "u", "type", "distribution", "sensitivity", "in K", "dof"]
 
 
-def calibration_page(
-    calibration: Calibration, added: Callable[[Block], None] | None = None
-) -> Page:
+def calibration_page(calibration: Estimate, added: Callable[[Block], None] | None = None) -> Page:
     """Return the report page of a calibration, which two sheets of paper hold.
 
     ``added`` is called with each block as soon as it is there.
@@ -70,7 +68,7 @@ def calibration_page(
     return page
 
 
-def calibrations_page(batch: Batch[Calibration], levers: xr.Dataset) -> Page:
+def calibrations_page(batch: Batch, levers: xr.Dataset) -> Page:
     """Return the report page of many levers, of which one is calibrated or more.
 
     Parameters
@@ -98,7 +96,7 @@ def calibrations_page(batch: Batch[Calibration], levers: xr.Dataset) -> Page:
     return page
 
 
-def budget_page(calibration: Calibration) -> Page:
+def budget_page(calibration: Estimate) -> Page:
     """Return the uncertainty budget of a temperature, with nothing left out.
 
     Raises

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from hotlever import figures
-from hotlever.estimate.batch import Batch
+from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.fit_summary import (
     NEAREST,
     compare_levers,
@@ -17,7 +16,7 @@ from hotlever.estimate.fit_summary import (
     parameter_rows,
     statements,
 )
-from hotlever.estimate.result import Fit
+from hotlever.estimate.many import Batch
 from hotlever.estimate.uncertainty import Uncertainty
 from hotlever.lever import Lever
 from hotlever.materials.parameters import INVERSION
@@ -28,7 +27,9 @@ _POINTS = 110
 
 
 def fit_page(
-    fit: Fit, uncertainty: Uncertainty | None = None, added: Callable[[Block], None] | None = None
+    fit: Estimate,
+    uncertainty: Uncertainty | None = None,
+    added: Callable[[Block], None] | None = None,
 ) -> Page:
     """Return the report page of one fit, and of what was sampled and profiled of it.
 
@@ -46,7 +47,7 @@ def fit_page(
     return page
 
 
-def add_fit(page: Page, fit: Fit) -> None:
+def add_fit(page: Page, fit: Estimate) -> None:
     """Add tables and figures of a fit to a page."""
     if not fit.describes_data:
         page.sentences(fit.doubt, NEAREST)
@@ -62,7 +63,7 @@ def add_fit(page: Page, fit: Fit) -> None:
     (_draw_in_time if fit.in_time else _draw_at_rest)(page, fit)
 
 
-def _draw_at_rest(page: Page, fit: Fit) -> None:
+def _draw_at_rest(page: Page, fit: Estimate) -> None:
     measured = fit.measurement.dataset(fit.probe.circuit)
     # solved once for both
     lever = Lever(fit.probe)
@@ -100,7 +101,7 @@ def _draw_at_rest(page: Page, fit: Fit) -> None:
     )
 
 
-def _add_correlation(page: Page, fit: Fit) -> None:
+def _add_correlation(page: Page, fit: Estimate) -> None:
     if len(fit.names) < 2 or not fit.describes_data:
         return
     page.figure(
@@ -110,7 +111,7 @@ def _add_correlation(page: Page, fit: Fit) -> None:
     )
 
 
-def _draw_in_time(page: Page, fit: Fit) -> None:
+def _draw_in_time(page: Page, fit: Estimate) -> None:
     measured = fit.measurement.dataset(fit.probe.circuit)
     page.figure(
         "fit_in_time",
@@ -158,7 +159,7 @@ def _add_uncertainty(page: Page, uncertainty: Uncertainty) -> None:
         )
 
 
-def levers_page(batch: Batch[Fit]) -> Page:
+def levers_page(batch: Batch) -> Page:
     """Return the report page of many levers, of which one is fitted or more."""
     levers = compare_levers(batch.results)
     observables = {fit.observables for fit in batch.results.values()}
@@ -179,7 +180,7 @@ def levers_page(batch: Batch[Fit]) -> Page:
     return page
 
 
-def add_remarks(page: Page, batch: Batch[Any], result: str, participle: str) -> None:
+def add_remarks(page: Page, batch: Batch, result: str, participle: str) -> None:
     """Add to a page of many levers what their results say, and what could not be made."""
     noted = [*batch.undescribed.items()]
     noted += [(name, text) for name, each in batch.results.items() for text in each.notes]

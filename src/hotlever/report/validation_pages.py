@@ -11,9 +11,9 @@ import numpy as np
 import xarray as xr
 
 from hotlever import figures
-from hotlever.estimate import Calibration, calibrate
-from hotlever.estimate.calibration import rms
+from hotlever.estimate import Estimate, calibrate
 from hotlever.estimate.calibration_summary import calibration_parts
+from hotlever.estimate.tip_table import rms
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.report.report_page import Page
@@ -190,7 +190,7 @@ def _bases(page: Page, every: Sequence[Case]) -> None:
     )
 
 
-def _calibrated(changes: dict[str, Any]) -> Calibration:
+def _calibrated(changes: dict[str, Any]) -> Estimate:
     """Calibrate the one real I-V curve of the examples, with a lever that is other than assumed."""
     with resources.as_file(resources.files("hotlever") / "examples") as folder:
         probe = Probe.from_file(folder / f"{_CURVE}.toml")
@@ -198,7 +198,7 @@ def _calibrated(changes: dict[str, Any]) -> Calibration:
         return calibrate(folder / f"{_CURVE}.csv", probe=other)
 
 
-def _real_curve(page: Page, calibrations: Sequence[Calibration]) -> None:
+def _real_curve(page: Page, calibrations: Sequence[Estimate]) -> None:
     """Show what the real curve says of its lever, and what to believe of that."""
     page.heading("A real curve")
     calibration = calibrations[0]
@@ -261,7 +261,7 @@ def _real_curve(page: Page, calibrations: Sequence[Calibration]) -> None:
     )
 
 
-def _differences(calibration: Calibration) -> Array:
+def _differences(calibration: Estimate) -> Array:
     """Return measured less calibrated currents (µA)."""
     measured, table = calibration.measurement, calibration.table
     model = np.interp(measured.bias_V, table.bias_V.values, table.current_mA.values)

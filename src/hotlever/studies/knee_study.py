@@ -32,7 +32,7 @@ from scipy.interpolate import CubicSpline
 from hotlever import spieser2017 as paper
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError
-from hotlever.estimate import Fit, Measurement, fit
+from hotlever.estimate import Estimate, Measurement, fit
 from hotlever.lever import Branch, Lever, OperatingPoint
 from hotlever.lever.lever import COARSE
 from hotlever.materials.silicon import inversion_temperature
@@ -322,7 +322,7 @@ def by_layout(probe: Probe, progress: Progress | None = None) -> float:
     return float(np.linalg.norm(off))
 
 
-def by_covariance(result: Fit) -> float:
+def by_covariance(result: Estimate) -> float:
     """Return the standard error (K) of the knee that a fit predicts, by its covariance."""
     errors = {name: result.parameters[name].stderr or 0.0 for name in result.names}
 
@@ -339,7 +339,7 @@ def by_covariance(result: Fit) -> float:
 
 
 def compare_suspects(
-    probe: Probe, example: Fit, *, layout: bool = True, progress: Progress | None = None
+    probe: Probe, example: Estimate, *, layout: bool = True, progress: Progress | None = None
 ) -> xr.Dataset:
     """Compute what each suspect carries of the knee's discrepancy, in one medium.
 
@@ -347,7 +347,7 @@ def compare_suspects(
     ----------
     probe : Probe
         In vacuum or in air.
-    example : Fit
+    example : Estimate
         Of a measurement with noise as the paper's, for the covariance.
     layout : bool
         Whether the uncertain layout is computed, a fit for each dimension.

@@ -58,11 +58,10 @@ from hotlever.tasks.reporter import Reporter
 from hotlever.units import setting
 
 if TYPE_CHECKING:
-    from hotlever.estimate import Calibration, Fit
-    from hotlever.estimate.batch import Batch
+    from hotlever.estimate import Estimate
     from hotlever.estimate.experiment import Prediction
     from hotlever.estimate.levers import Setting
-    from hotlever.estimate.outcome import Result
+    from hotlever.estimate.many import Batch
     from hotlever.estimate.uncertainty import Uncertainty
     from hotlever.measurement import Measurement
     from hotlever.probe import Probe
@@ -141,8 +140,8 @@ def fit_files(
     command again goes on where it was stopped.
     """
     from hotlever.estimate import FitOptions, fit
-    from hotlever.estimate.batch import fit_many
     from hotlever.estimate.fit_summary import fit_text
+    from hotlever.estimate.many import fit_many
     from hotlever.measurement import parse_columns, read_measurement_of
     from hotlever.probe.priors import is_of_laws
 
@@ -240,7 +239,7 @@ def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
 
 def _examine(
     reporter: Reporter,
-    result: Fit,
+    result: Estimate,
     samples: int | None,
     profiles: bool,
     processes: int | None,
@@ -326,12 +325,12 @@ def calibrate_files(
     With several data files: of each lever, in parallel, and where the levers differ. The same
     command again goes on where it was stopped.
     """
-    from hotlever.estimate import read_fit
+    from hotlever.estimate import calibrate, read_fit
     from hotlever.estimate.calibration_summary import calibration_text
-    from hotlever.estimate.levers import Setting, calibrate_many
+    from hotlever.estimate.levers import Setting
+    from hotlever.estimate.many import calibrate_many
     from hotlever.estimate.options import UNKNOWN_MEDIUM
     from hotlever.estimate.power_law import read_power_law
-    from hotlever.estimate.procedure import calibrate
     from hotlever.estimate.uncertainty_budget import check_budget_of
     from hotlever.measurement import parse_columns, read_measurement_of
 
@@ -409,7 +408,7 @@ def _table_options(by: str, step: str | None) -> dict[str, Any]:
     return {"by": by, "step": value}
 
 
-def _write_pages(result: Calibration, folder: Path) -> Path:
+def _write_pages(result: Estimate, folder: Path) -> Path:
     """Write the page of a calibration, and that of its uncertainty budget; return the former."""
     from hotlever.report.calibration_pages import budget_page, calibration_page
 
@@ -553,8 +552,8 @@ def _calibrated_first(
     column: list[str] | None,
     beforehand: Sequence[str],
     medium: str | None,
-) -> Calibration:
-    from hotlever.estimate.procedure import calibrate
+) -> Estimate:
+    from hotlever.estimate import calibrate
     from hotlever.measurement import parse_columns, read_measurement_of
 
     measurement = read_measurement_of(like, data, parse_columns(column or []))
@@ -616,8 +615,8 @@ class _Summary:
 def _estimate_several(
     reporter: Reporter,
     levers: _Levers,
-    make: Callable[..., Batch[Result]],
-    summarise: Callable[[Batch[Result]], _Summary],
+    make: Callable[..., Batch],
+    summarise: Callable[[Batch], _Summary],
 ) -> int:
     """Make a result of each of many measurements and compare them; return the exit status.
 
@@ -711,7 +710,7 @@ def _is_open(address: str) -> bool:
     return scheme != "tls" and not (host in ("localhost", "::1") or host.startswith("127."))
 
 
-def _of_fits(batch: Batch[Fit]) -> _Summary:
+def _of_fits(batch: Batch) -> _Summary:
     from hotlever.estimate.fit_summary import (
         compare_levers,
         lever_rows,
@@ -727,9 +726,7 @@ def _of_fits(batch: Batch[Fit]) -> _Summary:
     return _Summary(text, lambda: levers_page(batch), files)
 
 
-def _of_calibrations(
-    at: Setting | None, table: dict[str, Any], batch: Batch[Calibration]
-) -> _Summary:
+def _of_calibrations(at: Setting | None, table: dict[str, Any], batch: Batch) -> _Summary:
     from hotlever.estimate.levers import (
         calibrations_csv,
         calibrations_text,

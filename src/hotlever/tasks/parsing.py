@@ -15,7 +15,7 @@ from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.units import NUMBER, bias_setting, setting
 
 if TYPE_CHECKING:
-    from hotlever.estimate.pulses import PulseTiming
+    from hotlever.estimate.tip_table import PulseTiming
     from hotlever.probe import Probe
     from hotlever.types import Array
 
@@ -150,7 +150,7 @@ def parse_timing(text: str) -> PulseTiming:
     >>> parse_timing("5us,0.1ms")
     PulseTiming(length_us=5.0, period_us=100.0)
     """
-    from hotlever.estimate.pulses import PulseTiming
+    from hotlever.estimate.tip_table import PulseTiming
 
     length, comma, period = text.partition(",")
     each = setting(period, "us", "--pulse") if comma else None

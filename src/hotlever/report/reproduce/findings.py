@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from hotlever import spieser2017 as paper
-from hotlever.estimate import Fit, Measurement, fit, read_measurement
+from hotlever.estimate import Estimate, Measurement, fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.report.report_page import Page
 from hotlever.types import Progress
@@ -65,7 +65,7 @@ class Findings(Page):
         self.claims: list[tuple[str, str, str, str]] = []
 
     @cached_property
-    def fitted_example(self) -> Fit:
+    def fitted_example(self) -> Estimate:
         """Option III on the virtual lab's first lever."""
         return fit(example("lever-a.csv"), self.lever.probe)
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from hotlever import figures
 from hotlever import spieser2017 as paper
-from hotlever.estimate import Fit, Measurement, fit
+from hotlever.estimate import Estimate, Measurement, fit
 from hotlever.estimate.fit_summary import parameter_rows
 from hotlever.estimate.power_law import EQ12, PowerLaw, fit_power_law
 from hotlever.figures import correlation_matrix, judged_calibrations, raman_check, thermometry
@@ -300,7 +300,7 @@ def _compare_options(page: Findings, measurement: Measurement) -> None:
     page.say("doping_held", name=name, changes=changes)
 
 
-def _option_claims(page: Findings, name: str, fits: dict[str, Fit]) -> None:
+def _option_claims(page: Findings, name: str, fits: dict[str, Estimate]) -> None:
     (first, _), (third, own) = _between_groups(fits["I"]), _between_groups(fits["III"])
     page.claim("dependent_parameters", holds=first > 0.8, name=name, first=first)
     page.claim("decoupled_groups", holds=third < 0.6, name=name, third=third, own=own)
@@ -312,7 +312,7 @@ def _option_claims(page: Findings, name: str, fits: dict[str, Fit]) -> None:
     page.claim("doping_held", holds=worse < 2.0, name=name, shift_K=shift_K, worse=worse)
 
 
-def _between_groups(result: Fit) -> list[float]:
+def _between_groups(result: Estimate) -> list[float]:
     """Largest absolute correlation between parameters of different groups.
 
     The first number is that from one noise for all observables, the second from one for each.
@@ -324,7 +324,7 @@ def _between_groups(result: Fit) -> list[float]:
     return [float(np.abs(correlation[apart]).max()) for correlation in correlations]
 
 
-def _hot_error(result: Fit) -> float:
+def _hot_error(result: Estimate) -> float:
     """Largest difference of predicted and measured tip temperature above 850 K."""
     order = np.argsort(result.measurement.bias_V)
     measured = result.measurement.tip_K[order]

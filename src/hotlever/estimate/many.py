@@ -6,72 +6,52 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Generic
+from typing import Any
 
 from hotlever import __version__
 from hotlever.errors import HotleverError, InputError
-from hotlever.estimate.estimator import fit
+from hotlever.estimate.estimate import Estimate
+from hotlever.estimate.estimator import calibrate, fit
+from hotlever.estimate.file import EstimateFile
 from hotlever.estimate.options import FitOptions
-from hotlever.estimate.outcome import Result, ResultFile
-from hotlever.estimate.result import Fit, FitFile
-from hotlever.files import FOLDER, check_outputs, output_file, output_folder, without_nan
+from hotlever.estimate.power_law import PowerLaw
+from hotlever.estimate.tip_table import PulseTiming
+from hotlever.estimate.uncertainty_budget import BudgetOf
+from hotlever.files import (
+    CALIBRATION,
+    FOLDER,
+    check_outputs,
+    output_file,
+    output_folder,
+    without_nan,
+)
 from hotlever.lever.lever import Lever
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced
 from hotlever.measurement import Measurement, read_measurement_of, with_measured_circuit
 from hotlever.probe import Probe
+from hotlever.probe.priors import Prior
 from hotlever.processes import PROCESSORS, Executor, guarded, local_executor, run_all
 from hotlever.types import Progress
 
 
-@dataclass(frozen=True)
-class Work(Generic[Result]):
-    """What is done with each of many measurements.
-
-    Attributes
-    ----------
-    kind : str
-        Of what is made: ``fit`` or ``calibration``.
-    estimate : callable
-        Makes it of a measurement, in another process.
-    file : type
-        What its file holds.
-    ending : str
-        Of the names of the files.
-    probe : Probe
-        What the levers are like.
-    options : FitOptions
-        What of a lever is varied.
-    asked : dict of str to JSON values
-        What else the result depends on.
-    """
-
-    kind: str
-    estimate: Callable[[Measurement], Result]
-    file: type[ResultFile[Result]]
-    ending: str
-    probe: Probe
-    options: FitOptions
-    settings: Mapping[str, Any] = field(default_factory=dict)
-
-
 @dataclass
-class Batch(Generic[Result]):
+class Batch:
     """What became of many data files.
 
     Attributes
     ----------
-    results : dict of str to Fit or Calibration
+    results : dict of str to Estimate
         By the name of the lever, in the order of the data files.
     failures : dict of str to HotleverError
-        By data file: why it could not be read, or no result could be made of it.
+        By data file: why it could not be read, or nothing could be made of it.
     reused : int
-        Results that had been written before from the same data, probe, options and version.
+        Estimates that had been written before from the same data, probe, options and version.
     """
 
-    results: dict[str, Result] = field(default_factory=dict)
+    results: dict[str, Estimate] = field(default_factory=dict)
     failures: dict[str, HotleverError] = field(default_factory=dict)
     reused: int = 0
 
@@ -102,15 +82,15 @@ def fit_many(
     probe: Probe | None = None,
     options: FitOptions | None = None,
     **how: Any,
-) -> Batch[Fit]:
-    """Fit many levers and write a fit file for each as soon as it is done; see `estimate_many`.
+) -> Batch:
+    """Fit many levers and write a file of each as soon as it is done; see `estimate_many`.
 
     Parameters
     ----------
     paths : sequence of path
         Measurement files.
     folder : path
-        Where the fit files go, named after the data files.
+        Where the files go, named after the data files.
     probe : Probe, optional
         The reference probe by default.
     options : FitOptions, optional
@@ -118,15 +98,70 @@ def fit_many(
         As `estimate_many` has them.
     """
     probe, options = probe or Probe.reference(), options or FitOptions()
-    work = partial(fit, probe=probe, options=options)
     options.of(probe)  # raises for all levers at once
-    return estimate_many(paths, folder, Work("fit", work, FitFile, ".json", probe, options), **how)
+    make = partial(fit, probe=probe, options=options)
+    return estimate_many(paths, folder, "fit", make, probe, options, {}, **how)
+
+
+def calibrate_many(
+    paths: Sequence[str | os.PathLike[str]],
+    folder: str | os.PathLike[str],
+    probe: Probe | None = None,
+    *,
+    law: PowerLaw | None = None,
+    medium: str | None = None,
+    priors: Mapping[str, Prior | str] | None = None,
+    pulse: PulseTiming | None = None,
+    samples: int = 0,
+    budget_of: BudgetOf = "tip",
+    **how: Any,
+) -> Batch:
+    """Calibrate many levers and write a file of each as soon as it is done; see `estimate_many`.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Measurement files.
+    folder : path
+        Where the files go, named after the data files.
+    probe : Probe, optional
+        What the levers are like; the reference probe by default.
+    law, medium, priors, pulse, samples, budget_of
+        See `hotlever.estimate.estimator.calibrate`.
+    **how
+        As `estimate_many` has them.
+    """
+    like, usual = probe or Probe.reference(), priors is None or bool(priors)
+    # what it is for each lever, whatever its file says of circuit and medium
+    options = FitOptions(priors=priors or {}, usual_priors=usual, medium=medium)  # type: ignore[arg-type]
+    options.of(like)
+    settings = {
+        "power_law": None if law is None else law.model_dump(),
+        "pulse": None if pulse is None else asdict(pulse),
+        "samples": samples,
+        "budget_of": budget_of,
+    }
+    make = partial(
+        calibrate,
+        probe=None if law is not None else like,
+        law=law,
+        medium=medium,
+        priors=priors,
+        pulse=pulse,
+        samples=samples,
+        budget_of=budget_of,
+    )
+    return estimate_many(paths, folder, "calibration", make, like, options, settings, **how)
 
 
 def estimate_many(
     paths: Sequence[str | os.PathLike[str]],
     folder: str | os.PathLike[str],
-    work: Work[Result],
+    kind: str,
+    make: Callable[[Measurement], Estimate],
+    probe: Probe,
+    options: FitOptions,
+    settings: Mapping[str, Any],
     *,
     processes: int | None = None,
     scheduler: str | None = None,
@@ -134,10 +169,10 @@ def estimate_many(
     reading: Callable[[Measurement], None] | None = None,
     reducing: Progress | None = None,
     progress: Progress | None = None,
-) -> Batch[Result]:
-    """Do the same work on many measurements and write a file of each result as soon as it is done.
+) -> Batch:
+    """Estimate many levers and write a file of each as soon as it is done.
 
-    A file that cannot be read, or of which nothing can be made, is reported in the result; the
+    A file that cannot be read, or of which nothing can be made, is reported in the batch; the
     others go on. What is there already, from the same data, probe, options and version, is not
     made again.
 
@@ -147,7 +182,16 @@ def estimate_many(
         Measurement files.
     folder : path
         Where the files go, named after the data files.
-    work : Work
+    kind : {"fit", "calibration"}
+        What is made of each measurement.
+    make : callable
+        Makes it, in another process.
+    probe : Probe
+        What the levers are like.
+    options : FitOptions
+        What of a lever is varied.
+    settings : mapping of str to JSON values
+        What else an estimate depends on.
     processes : int, optional
         Local worker processes; by default as many as there are processors. They are started by
         spawn: a script needs ``if __name__ == "__main__"``.
@@ -172,12 +216,13 @@ def estimate_many(
         raise InputError(f"found processes = {processes}, expected 1 or more")
     target, data = Path(folder), lever_names(paths)
     check_outputs([(target, FOLDER)])
-    files = {name: target / f"{name}{work.ending}" for name in data}
-    request = {"probe": work.probe.sections(), "options": work.options.values(), **work.settings}
+    ending = CALIBRATION if kind == "calibration" else ".json"
+    files = {name: target / f"{name}{ending}" for name in data}
+    request = {"probe": probe.sections(), "options": options.values(), **settings}
     request["version"] = __version__
     if columns:
         request["columns"] = dict(columns)
-    batch, waiting, requests = Batch[Result](), dict[str, Measurement](), dict[str, Any]()
+    batch, waiting, requests = Batch(), dict[str, Measurement](), dict[str, Any]()
 
     def tell() -> None:
         if progress is not None:
@@ -185,8 +230,8 @@ def estimate_many(
 
     for name, path in data.items():
         try:
-            measurement = read_measurement_of(work.probe, path, columns)
-            measurement.need_rest(f"a {work.kind} of several levers")
+            measurement = read_measurement_of(probe, path, columns)
+            measurement.need_rest(f"a {kind} of several levers")
             if reading is not None:
                 reading(measurement)
             if target.is_dir():
@@ -197,8 +242,8 @@ def estimate_many(
         # all that a result depends on, for its file: the same again need not be made
         requests[name] = dict(without_nan({"sha256": measurement.sha256, **request}))
         # whoever changes the code of a class of materials keeps its name
-        again = not work.probe.classes
-        earlier = _written_before(files[name], work, requests[name]) if again else None
+        again = not probe.classes
+        earlier = _written_before(files[name], kind, requests[name]) if again else None
         if earlier is None:
             waiting[name] = measurement
         else:
@@ -207,11 +252,11 @@ def estimate_many(
     tell()
     if waiting:
         with _executor(scheduler, min(processes or PROCESSORS, len(waiting))) as executor:
-            for name, reason in _not_reduced(work, waiting, reducing).items():
+            for name, reason in _not_reduced(probe, options, waiting, reducing).items():
                 batch.fail(waiting.pop(name).path, reason)
             names = list(waiting)
             tasks = ((measurement,) for measurement in waiting.values())
-            for number, result in run_all(executor, work.estimate, tasks):
+            for number, result in run_all(executor, make, tasks):
                 name, measurement = names[number], waiting[names[number]]
                 try:
                     if isinstance(result, HotleverError):
@@ -275,17 +320,20 @@ def _identity(path: Path) -> object:
     return status.st_dev, status.st_ino
 
 
-def _written_before(file: Path, work: Work[Result], request: dict[str, Any]) -> Result | None:
-    """Return a result of a file that was made from the same; None if there is none."""
+def _written_before(file: Path, kind: str, request: dict[str, Any]) -> Estimate | None:
+    """Return the estimate of a file that was made from the same; None if there is none."""
     try:
-        content = work.file.read(file, work.kind)
+        content = EstimateFile.read(file, kind)
     except InputError:
         return None
-    return content.result() if content.request == request else None
+    return Estimate.of_file(content) if content.request == request else None
 
 
 def _not_reduced(
-    work: Work[Any], waiting: Mapping[str, Measurement], progress: Progress | None
+    probe: Probe,
+    options: FitOptions,
+    waiting: Mapping[str, Measurement],
+    progress: Progress | None,
 ) -> dict[str, HotleverError]:
     """Reduce each geometry once, before the workers need it; return why some levers have none.
 
@@ -296,8 +344,7 @@ def _not_reduced(
     for name, measurement in waiting.items():
         try:
             probes = [
-                with_measured_circuit(work.probe, measurement, medium)[0]
-                for medium in work.options.media
+                with_measured_circuit(probe, measurement, medium)[0] for medium in options.media
             ]
         except InputError as error:
             failures[name] = error
@@ -306,7 +353,7 @@ def _not_reduced(
         for measured in probes:
             geometry = measured.circuit.base_temperature_K, measured.surroundings.medium
             if geometry not in results:
-                results[geometry] = guarded(_reduce, measured, work.options, progress)
+                results[geometry] = guarded(_reduce, measured, options, progress)
             errors.append(results[geometry])
         # of two media one will do
         if None not in errors:
@@ -317,5 +364,6 @@ def _not_reduced(
 def _reduce(probe: Probe, options: FitOptions, progress: Progress | None) -> None:
     own = options.of(probe)
     names = {*own.usual, *own.varied}
-    if can_be_reduced(probe, names):
+    # with the usual priors more is varied than a reduced lever has
+    if not options.usual_priors and can_be_reduced(probe, names):
         cached_reduction(Lever(probe), progress, names)

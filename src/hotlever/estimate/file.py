@@ -1,0 +1,666 @@
+"""The file of an estimate: one schema, which fits and calibrations are written and read by.
+
+What stands in a file as it is in an `Estimate` is taken from it by name; what stands in another
+form has a type that says how. Files of former versions are first made like those of this one.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+import xarray as xr
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    JsonValue,
+    PlainSerializer,
+    ValidationError,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    field_serializer,
+    model_validator,
+)
+
+from hotlever import __version__
+from hotlever.datasets import labelled
+from hotlever.errors import InputError, unknown_name
+from hotlever.estimate.gum import Budget, CoverageInterval, InputQuantity
+from hotlever.estimate.knee import Knee
+from hotlever.estimate.options import FitOptions
+from hotlever.estimate.power_law import PowerLaw
+from hotlever.estimate.tip_table import (
+    BUDGETS,
+    OF_THE_CONTACT,
+    PULSE_COLUMNS,
+    TABLE_COLUMNS,
+    TOTAL_POWER,
+    Budgets,
+    PulseCalibration,
+    PulseTiming,
+    budgets_of,
+    table_with_budgets,
+)
+from hotlever.estimate.uncertainty_budget import BudgetOf, TemperatureBudget, limits_of
+from hotlever.files import read_json, without_nan
+from hotlever.lever.transient.waveform import Polyline, Sine
+from hotlever.measurement import MEASURED, Measurement
+from hotlever.measurement.data import OPTIONAL
+from hotlever.probe import Probe
+from hotlever.probe.priors import SCALES, PriorUse, priors_of
+from hotlever.probe.probe_parameters import parameter_of, parameters_of
+from hotlever.probe.surroundings import Medium
+from hotlever.quantities import FITTED, Observable
+from hotlever.records import Number, StandardError, explained, stored_as
+from hotlever.text import value_with_error, with_unit
+from hotlever.types import Array
+
+#: No column of a measurement has larger values, in the units inside.
+_LARGEST = 1e9
+#: What a correlation of 1 may be off by.
+_ROUNDED = 1e-6
+#: Variables of a band at rest.
+_OF_BAND = {"bias_V", "power_mW", "tip_K", "tip_stderr_K"}
+#: Which command writes what a file is to be, and the keys that it has.
+_KINDS = {
+    "fit": (
+        "hotlever fit",
+        ("parameters", "correlation", "observables", "options", "common_noise_covariance", "band"),
+    ),
+    "calibration": (
+        "hotlever calibrate",
+        ("route", "medium", "power_law", "power_law_residual_K", "k", "k_stderr", "knee", "table"),
+    ),
+}
+
+
+# --- values that stand in files in another form --------------------------------------------------
+
+
+def _array(values: Sequence[Any] | Array, shape: tuple[int, ...], where: str) -> Array:
+    """Make an array of nested lists, NaN where there is nothing.
+
+    Raises
+    ------
+    InputError
+        If it has another shape.
+    """
+    try:
+        return np.array(values, dtype=float).reshape(shape)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{where}: expected numbers in {' × '.join(map(str, shape))} places"
+        ) from None
+
+
+def _matrix(values: list[list[float]]) -> Array:
+    """Return a matrix of its rows."""
+    if len({len(row) for row in values}) > 1:
+        raise ValueError("expected rows of the same length")
+    return np.array(values, dtype=float)
+
+
+def _correlations(rows: list[list[float]]) -> Array:
+    """Return a matrix of correlations of its rows."""
+    matrix = _matrix(rows)
+    if np.any(abs(matrix) > 1.0 + _ROUNDED) or np.any(abs(np.diag(matrix) - 1.0) > _ROUNDED):
+        raise ValueError("expected numbers from -1 to 1, and 1 along the diagonal")
+    return matrix
+
+
+def _columns(rows: list[dict[str, float]]) -> dict[str, Array]:
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: np.array([row.get(name) for row in rows], dtype=float) for name in names}
+
+
+def _rows(columns: dict[str, Array]) -> list[dict[str, float]]:
+    values = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in values]
+
+
+def _probe(sections: dict[str, dict[str, Any]], info: ValidationInfo) -> Probe:
+    return Probe.from_sections(sections, f"{info.context}: probe")
+
+
+def _law(values: dict[str, float], info: ValidationInfo) -> PowerLaw:
+    coefficients = {name: value for name, value in values.items() if name != "threshold_K"}
+    return PowerLaw.from_values(coefficients, f"{info.context}: power_law")
+
+
+def _band(columns: dict[str, Array]) -> xr.Dataset:
+    if not columns.keys() >= _OF_BAND or len({values.size for values in columns.values()}) > 1:
+        raise ValueError(f"expected {', '.join(sorted(_OF_BAND))}, as many of each")
+    return band_dataset(**columns)
+
+
+def _columns_of(band: xr.Dataset) -> dict[str, list[float]]:
+    return {str(name): values.values.tolist() for name, values in band.data_vars.items()}
+
+
+def _options(values: Any, check: ValidatorFunctionWrapHandler, info: ValidationInfo) -> FitOptions:
+    """Read the options of an estimate; what these refuse names the file too."""
+    try:
+        options: FitOptions = check(values)
+    except InputError as error:
+        raise InputError(f"{info.context}: options: {error}") from None
+    return options
+
+
+# Arrays of one and of two dimensions, NaN where there is nothing.
+Vector = Annotated[Array, stored_as(list[Number])]
+Matrix = Annotated[Array, stored_as(list[list[Number]], _matrix)]
+Correlations = Annotated[Array, stored_as(list[list[Number]], _correlations)]
+# Columns of a table, of which files hold the rows.
+Columns = Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)]
+_Count = Annotated[float, Field(ge=1, multiple_of=1)]
+_Counts = Annotated[
+    Array, stored_as(list[_Count], write=lambda counts: counts.astype(int).tolist())
+]
+_Times = Annotated[Array, stored_as(list[float])]
+_Probe = Annotated[Probe, stored_as(dict[str, dict[str, Any]], _probe, Probe.sections)]
+_Law = Annotated[PowerLaw, stored_as(dict[str, float], _law, PowerLaw.values)]
+_Band = Annotated[xr.Dataset, stored_as(dict[str, Vector], _band, _columns_of)]
+_Options = Annotated[FitOptions, WrapValidator(_options), PlainSerializer(FitOptions.values)]
+_Row = Annotated[
+    InputQuantity, PlainSerializer(lambda row: asdict(row) | {"contribution_K": row.contribution})
+]
+# What is not written where there is none.
+IF_ANY: Any = Field(None, exclude_if=lambda value: value is None)
+
+
+# --- the parts of a file ------------------------------------------------------------------------
+
+
+class Section(BaseModel):
+    """A part of a file; what is not known is left alone.
+
+    While a file is read its path is pydantic's context, for errors.
+    """
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+    @classmethod
+    def holding(cls, source: object, **others: Any) -> Self:
+        """Return the section with the attributes of a source that have its names, and others."""
+        same = {
+            name: getattr(source, name)
+            for name in cls.model_fields
+            if name not in others and hasattr(source, name)
+        }
+        # what hotlever has made need not be checked
+        return cls.model_construct(**same, **others)
+
+    def attributes_of(self, kind: Any) -> dict[str, Any]:
+        """Return what it holds of a dataclass as it is, by attribute."""
+        names = [field.name for field in fields(kind) if field.name in type(self).model_fields]
+        return {name: getattr(self, name) for name in names}
+
+
+class MeasurementSection(Section):
+    """A measurement as files hold it."""
+
+    path: str = ""
+    sha256: str = ""
+    series_resistance_ohm: float | None = None
+    base_temperature_K: float | None = None
+    medium: Medium | None = None
+    gas_conductivity: float | None = None
+    pressure_mbar: float | None = None
+    raman_scale: float | None = IF_ANY
+    columns: dict[str, Vector]
+    rows: _Counts | None = IF_ANY
+    time_us: _Times | None = IF_ANY
+    waveform: Polyline | Sine | None = IF_ANY
+
+    @classmethod
+    def of(cls, measurement: Measurement) -> Self:
+        """Return the section of a measurement."""
+        columns = {
+            column.symbol: values
+            for column in MEASURED
+            if (values := getattr(measurement, column.name)) is not None
+        }
+        return cls.holding(measurement, columns=columns)
+
+    @model_validator(mode="after")
+    def _columns_belong_together(self, info: ValidationInfo) -> Self:
+        where = f"{info.context}: data"
+        if "V_b" not in self.columns:
+            raise InputError(f"{where}: columns: V_b is missing")
+        count, waveform = self.columns["V_b"].size, self.waveform
+        for name, values in {**self.columns, "rows": self.rows, "time_us": self.time_us}.items():
+            if values is None:
+                continue
+            _array(values, (count,), f"{where}: {name}")
+            least = 0.0 if name.startswith("d") else -_LARGEST
+            wrong = values[(values <= least) | (values > _LARGEST)]
+            if wrong.size:
+                raise InputError(
+                    f"{where}: {name}: found {wrong[0]:g}, expected more than {least:g} and at "
+                    f"most {_LARGEST:g}"
+                )
+        if (waveform is None) != (self.time_us is None) or (
+            isinstance(waveform, Polyline) and len(waveform.times) != len(waveform.volts)
+        ):
+            raise InputError(f"{where}: waveform: expected the one that belongs to the times")
+        return self
+
+    def measurement(self) -> Measurement:
+        """Return the measurement."""
+        nothing, columns = np.full(self.columns["V_b"].size, np.nan), dict[str, Any]()
+        for column in MEASURED:
+            columns[column.name] = None if column.name in OPTIONAL else nothing
+            if column.symbol in self.columns:
+                columns[column.name] = self.columns[column.symbol]
+        return Measurement(**self.attributes_of(Measurement), **columns)
+
+
+class CorrelationSection(Section):
+    """The correlation of the parameters that were varied."""
+
+    names: list[str]
+    matrix: Correlations
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """A parameter of an estimate.
+
+    `stderr` is None if the parameter was fixed or its error could not be estimated.
+    """
+
+    value: float
+    stderr: Annotated[float, Field(ge=0)] | None
+    unit: str
+    vary: bool
+
+    def __str__(self) -> str:
+        """Return the value with its error, as far as there is one, and its unit."""
+        return with_unit(value_with_error(self.value, self.stderr), self.unit)
+
+
+class ParameterFields(Section):
+    """What a file holds of the parameters; nothing of a calibration by the paper's rule."""
+
+    parameters: dict[str, FittedParameter] | None = None
+    correlation: CorrelationSection | None = None
+    observables: tuple[Observable, ...] = ()
+    inversion_temperature_K: Number = np.nan
+    inversion_temperature_stderr_K: Number = np.nan
+    residual_rms: dict[str, float] = Field(default_factory=dict)
+    evaluations: int = 0
+    steps: int = 0
+    seconds: Annotated[float, PlainSerializer(lambda seconds: round(seconds, 3))] = 0.0
+    options: _Options | None = None
+    common_noise_covariance: Matrix | None = None
+    sum_of_squares: Number = np.nan
+    band: _Band | None = None
+
+
+class PulseSection(Section):
+    """What a file holds of a pulse."""
+
+    length_us: float
+    period_us: float | None = None
+    table: Columns
+    budget_K: dict[str, Vector]
+
+    @classmethod
+    def of(cls, pulse: PulseCalibration) -> Self:
+        """Return the section of a pulse."""
+        table = {name: pulse.table[name].values for name in PULSE_COLUMNS}
+        return cls.holding(pulse.timing, table=table, **budgets_of(pulse.table))
+
+    @model_validator(mode="after")
+    def _belongs_together(self, info: ValidationInfo) -> Self:
+        where = f"{info.context}: pulse"
+        _check_rows(self.table, {BUDGETS[0]: self.budget_K}, "height", "peak_K", where)
+        try:
+            PulseTiming(self.length_us, self.period_us)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        return self
+
+    def pulse(self) -> PulseCalibration:
+        """Return what was written."""
+        table = _table(self.table, {BUDGETS[0]: self.budget_K}, PULSE_COLUMNS, "height")
+        return PulseCalibration(PulseTiming(self.length_us, self.period_us), table)
+
+
+class IntervalSection(Section):
+    """What the Monte Carlo method says of a budget; no ends where it failed."""
+
+    trials: int
+    low_K: Number
+    high_K: Number
+    tolerance_K: Number
+
+
+class TipFields(Section):
+    """What a file holds of the tip; nothing of a fit.
+
+    Beside what an `Estimate` has: of the knee ``tip_K`` and whether it was measured, the largest
+    errors in the table, all in all and by source, and what follows from the budget for 95 %.
+    """
+
+    route: Literal["power law", "probe", "fit in vacuum", "fit in air"] | None = None
+    medium: str = ""
+    power_law: _Law | None = None
+    power_law_residual_K: Number = np.nan
+    k: Number = np.nan
+    k_stderr: StandardError = np.nan
+    # beside numbers, whether it was measured
+    knee: Annotated[dict[str, Number], PlainSerializer(dict)] = Field(default_factory=dict)
+    tip_temperature_uncertainty_K: StandardError = np.nan
+    uncertainty_budget_K: dict[str, Number] = Field(default_factory=dict)
+    base_temperature_K: Number = np.nan
+    table: Columns | None = None
+    budget_K: dict[str, Vector] = Field(default_factory=dict)
+    apex_budget_K: dict[str, Vector] | None = IF_ANY
+    measured_rms_K: Number = np.nan
+    pulse: PulseSection | None = IF_ANY
+    gum: list[_Row] | None = IF_ANY
+    gum_correlation: Correlations | None = IF_ANY
+    gum_bias_V: float | None = IF_ANY
+    gum_of: BudgetOf | None = IF_ANY
+    effective_dof: Number | None = IF_ANY
+    coverage_factor: float | None = IF_ANY
+    expanded_uncertainty_K: float | None = IF_ANY
+    gum_monte_carlo: IntervalSection | None = IF_ANY
+    gum_linear: bool | None = IF_ANY
+
+    @property
+    def budgets(self) -> dict[str, dict[str, Array]]:
+        """The errors of the table by source."""
+        own = zip(BUDGETS, (self.budget_K, self.apex_budget_K), strict=True)
+        return {name: budget for name, budget in own if budget is not None}
+
+    @field_serializer("power_law")
+    def _with_threshold(self, law: PowerLaw | None) -> dict[str, float] | None:
+        return None if law is None else law.values(self.base_temperature_K)
+
+    @staticmethod
+    def values_of(estimate: Any) -> dict[str, Any]:
+        """Return the values of a calibration that it has not as they are, by field."""
+        budgets, stated = budgets_of(estimate.table), estimate.gum
+        values: dict[str, Any] = {
+            "power_law_residual_K": estimate.law_residual_K,
+            "knee": vars(estimate.knee)
+            | {"tip_K": estimate.knee_tip_K, "measured": estimate.knee_measured},
+            "uncertainty_budget_K": {
+                name: part.max() for name, part in budgets[BUDGETS[0]].items()
+            },
+            "table": {name: estimate.table[name].values for name in estimate.columns},
+            "pulse": None if estimate.pulse is None else PulseSection.of(estimate.pulse),
+            "gum": None,
+            **budgets,
+        }
+        if stated is None:
+            return values
+        budget, interval, section = stated.budget, stated.monte_carlo, None
+        if interval is not None:
+            ends = {"low_K": interval.low, "high_K": interval.high}
+            section = IntervalSection.holding(interval, **ends, tolerance_K=budget.tolerance)
+        return values | {
+            "gum": list(budget.inputs),
+            "gum_correlation": budget.correlation,
+            "gum_bias_V": stated.bias_V,
+            "gum_of": stated.of,
+            "effective_dof": budget.dof,
+            "coverage_factor": budget.coverage_factor(),
+            "expanded_uncertainty_K": budget.expanded(),
+            "gum_monte_carlo": section,
+            "gum_linear": stated.linear,
+        }
+
+    def check(self, path: str) -> None:
+        """Refuse a table, a budget or a pulse whose numbers do not belong together."""
+        assert self.table is not None
+        _check_rows(self.table, self.budgets, "bias", "tip_K", path)
+        if self.gum is not None and self.gum_bias_V not in self.table["bias_V"]:
+            raise InputError(f"{path}: gum_bias_V: expected the bias of a row of the table")
+        size, correlation = len(self.gum or []), self.gum_correlation
+        if size and correlation is not None and correlation.shape != (size, size):
+            raise InputError(f"{path}: gum_correlation: expected numbers in {size} × {size} places")
+
+    def of_table(self) -> dict[str, Any]:
+        """Return what an estimate has of the tip, by attribute."""
+        assert self.table is not None
+        more = [name for name in (TOTAL_POWER, *OF_THE_CONTACT) if name in self.table]
+        table = _table(self.table, self.budgets, [*TABLE_COLUMNS, *more])
+        knee = {name: self.knee[name] for name in Knee.__dataclass_fields__ if name in self.knee}
+        return {
+            "law_residual_K": self.power_law_residual_K,
+            "knee": Knee(**knee),
+            "knee_tip_K": self.knee.get("tip_K", np.nan),
+            "table": table,
+            "pulse": None if self.pulse is None else self.pulse.pulse(),
+            "gum": self._budget(table),
+        }
+
+    def _budget(self, table: xr.Dataset) -> TemperatureBudget | None:
+        if self.gum is None:
+            return None
+        row, tried, of = table.sel(bias=self.gum_bias_V), self.gum_monte_carlo, self.gum_of or "tip"
+        interval = None
+        if tried is not None:
+            interval = CoverageInterval(tried.trials, tried.low_K, tried.high_K)
+        budget, value = Budget(tuple(self.gum), self.gum_correlation), row[f"{of}_K"].item()
+        return TemperatureBudget(budget, row.bias_V.item(), value, limits_of(row, of), of, interval)
+
+
+class EstimateFile(ParameterFields, TipFields):
+    """What the file of an estimate holds: the schema that it is written and read by.
+
+    One that does not say whether its data are described has a reason if they are not. ``request``
+    is what a batch was asked that the estimate is of.
+    """
+
+    describes_data: bool | None = True
+    reason: str = ""
+    priors: dict[str, PriorUse] = Field(default_factory=dict)
+    probe: _Probe
+    data: MeasurementSection
+    weights: dict[str, Vector] | None = IF_ANY
+    notes: list[str]
+    request: dict[str, JsonValue] | None = IF_ANY
+    software: str = f"hotlever {__version__}"
+
+    #: What is of the parameters alone, and of the tip alone.
+    of_parameters: ClassVar[frozenset[str]] = frozenset(ParameterFields.model_fields)
+    of_tip: ClassVar[frozenset[str]] = frozenset(TipFields.model_fields)
+
+    @classmethod
+    def of(cls, estimate: Any, request: dict[str, JsonValue] | None = None) -> Self:
+        """Return what the file of an estimate holds."""
+        of_tip = TipFields.values_of(estimate) if estimate.route else dict.fromkeys(cls.of_tip)
+        correlation = CorrelationSection.model_construct(
+            names=estimate.names, matrix=estimate.correlation
+        )
+        return cls.holding(
+            estimate,
+            **of_tip,
+            correlation=correlation if estimate.names else None,
+            data=MeasurementSection.of(estimate.measurement),
+            request=request,
+        )
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], kind: str) -> Self:
+        """Read a JSON file of a kind, a fit or a calibration.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read or holds something else; the text names the key.
+        """
+        command, keys = _KINDS[kind]
+        content, where = read_json(path), f"{path}: not a {kind} file ({command} -o)"
+        for key in keys:
+            if key not in content or (content[key] is None and kind == "fit"):
+                raise InputError(f"{where}: {key} is missing")
+        try:
+            return cls.model_validate(_as_of_now(content, str(path)), context=path)
+        except ValidationError as error:
+            raise explained(error, cls, where) from None
+
+    @model_validator(mode="after")
+    def _belongs_together(self, info: ValidationInfo) -> Self:
+        path, in_time = str(info.context), self.data.time_us is not None
+        of_probe = [*parameters_of(self.probe, anywhere=True, in_time=True), *SCALES]
+        for name in self.priors:
+            if name not in of_probe:
+                raise unknown_name("prior", name, of_probe, f"{path}: priors")
+        lowest = self.probe.lowest_bias_V if not in_time else -np.inf
+        if np.isfinite(lowest) and not np.all(self.data.columns["V_b"] >= lowest):
+            raise InputError(f"{path}: data: V_b: expected biases of {lowest:g} or more")
+        if self.options is not None:
+            where = f"{path}: options"
+            try:
+                self.options.of(self.probe, in_time=in_time)
+            except InputError as error:
+                raise InputError(f"{where}: {error}") from None
+            priors = priors_of(self.options.priors, self.probe, f"{where}: priors", in_time=in_time)
+            self.options = replace(self.options, priors=priors)
+        for name, weights in (self.weights or {}).items():
+            if name not in FITTED:
+                raise unknown_name("observable", name, FITTED, f"{path}: weights")
+            _array(weights, self.data.columns["V_b"].shape, f"{path}: weights: {name}")
+        if self.correlation is not None:
+            self._check_parameters(path, in_time)
+        if self.table is not None:
+            self.check(path)
+        return self
+
+    def _check_parameters(self, path: str, in_time: bool) -> None:
+        assert self.correlation is not None
+        names, parameters = self.correlation.names, self.parameters or {}
+        if not parameters.keys() >= set(names):
+            raise InputError(f"{path}: parameters and correlation do not belong together")
+        for name in names:
+            parameter_of(self.probe, name, f"{path}: correlation", in_time=in_time)
+            stated, of_probe = parameters[name].value, self.probe.values([name]).item()
+            if not np.isclose(stated, of_probe, rtol=1e-9, atol=0.0):
+                raise InputError(
+                    f"{path}: parameters: {name} = {stated:g}, expected that of the probe, "
+                    f"{of_probe:g}"
+                )
+        if self.band is not None and in_time != ("time_us" in self.band):
+            raise InputError(f"{path}: band: expected time_us in it of data in time, and only then")
+        square, common = (len(names),) * 2, self.common_noise_covariance
+        common = np.zeros(square) if common is None else common
+        _array(self.correlation.matrix, square, f"{path}: correlation")
+        _array(
+            np.zeros(square) if common is None else common,
+            square,
+            f"{path}: common_noise_covariance",
+        )
+
+    def content(self) -> dict[str, Any]:
+        """Return what is written, in plain values: first of the tip, then of the parameters."""
+        left_out = set[str]()
+        if self.table is None:
+            left_out |= self.of_tip
+        if self.correlation is None:
+            left_out |= self.of_parameters
+        values = without_nan(self.model_dump(exclude=left_out))
+
+        def part(entry: tuple[str, Any]) -> int:
+            return (entry[0] not in self.of_tip) + (
+                entry[0] not in self.of_tip | self.of_parameters
+            )
+
+        return dict(sorted(values.items(), key=part))
+
+    def attributes(self, names: Sequence[str]) -> dict[str, Any]:
+        """Return what the file tells of some attributes of an estimate, by name."""
+        attributes = {
+            name: getattr(self, name) for name in names if name in type(self).model_fields
+        } | {
+            "measurement": self.data.measurement(),
+            "converged": self.describes_data is not None,
+            "reason": self.reason or ("" if self.describes_data else "the file does not say why"),
+        }
+        if self.correlation is not None:
+            varied, parameters = self.correlation.names, self.parameters or {}
+            stderr = np.array([parameters[name].stderr for name in varied], dtype=float)
+            attributes |= {
+                "names": varied,
+                "covariance": self.correlation.matrix * np.outer(stderr, stderr),
+            }
+        # what the file has nothing of is as an estimate has it by default
+        absent = {name for name in self.of_parameters if attributes.get(name) is None}
+        if self.table is None:
+            absent |= self.of_tip
+        else:
+            attributes |= self.of_table()
+        return {name: value for name, value in attributes.items() if name not in absent}
+
+
+def band_dataset(**columns: Array) -> xr.Dataset:
+    """Return the `band` of an estimate: one row per bias or, with ``time_us``, time; rising."""
+    along, name = ("time", "time_us") if "time_us" in columns else ("bias", "bias_V")
+    rising, order = np.unique(columns[name], return_index=True)
+    ordered = {name: values[order] for name, values in columns.items()}
+    return labelled(ordered, along, {along: rising})
+
+
+def _check_rows(
+    columns: Mapping[str, Array], budgets: Budgets, along: str, tip: str, where: str
+) -> None:
+    """Refuse what a file holds in place of a table with its budgets; `where` names the file.
+
+    Raises
+    ------
+    InputError
+        If its rows do not rise or have no tip temperature, or a budget is not one of them.
+    """
+    rising, sources = columns.get(f"{along}_V", np.array([])), budgets[BUDGETS[0]].keys()
+    if not rising.size or not sources or not np.all(np.diff(rising) > 0):
+        raise InputError(
+            f"{where}: table: expected rows of rising {along}, and a budget of their errors"
+        )
+    if not np.isfinite(columns.get(tip, np.nan)).any():
+        raise InputError(f"{where}: table: expected a tip temperature ({tip}) in some rows")
+    for name, parts in budgets.items():
+        if parts.keys() != sources:
+            raise InputError(f"{where}: {name}: expected the sources {', '.join(sources)}")
+        for source, errors in parts.items():
+            _array(errors, rising.shape, f"{where}: {name}: {source}")
+
+
+def _table(
+    columns: Mapping[str, Array], budgets: Budgets, names: Sequence[str], along: str = "bias"
+) -> xr.Dataset:
+    """Return the table that a file holds; columns are NaN that an older file has not."""
+    unknown = np.full_like(columns[f"{along}_V"], np.nan)
+    own = {name: columns.get(name, unknown) for name in names}
+    return table_with_budgets(own, budgets, along)
+
+
+# --- reading ------------------------------------------------------------------------------------
+
+
+def _as_of_now(content: dict[str, Any], path: str) -> dict[str, Any]:
+    """Return what a file of version 1 or 2 holds as one of this version holds it.
+
+    The weights of a fit stood with its data, as rows in the order of its observables; zeros could
+    drift, and a fit that let them cannot be taken up again. A calibration had no options; its
+    priors were what was known before.
+    """
+    content, data, options = dict(content), content.get("data"), content.get("options")
+    if isinstance(data, dict) and "weights" in data:
+        rows, names = data["weights"], content.get("observables")
+        if not isinstance(rows, list) or not isinstance(names, list) or len(rows) != len(names):
+            raise InputError(f"{path}: data: weights: expected a row for each observable")
+        content["weights"] = dict(zip(map(str, names), rows, strict=True))
+    if isinstance(options, dict) and "drift" in options:
+        if options["drift"]:
+            raise InputError(f"{path}: options: zeros that drift are no part of fits now")
+        content["options"] = {key: value for key, value in options.items() if key != "drift"}
+    return content

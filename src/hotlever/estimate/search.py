@@ -1,0 +1,251 @@
+"""The search for the lever that priors and a measurement make most likely.
+
+The resistance of a cold lever tells its doping and size, whatever it does when hot. So a lever that
+is far from the data is first made to show their coldest rows, then more and more of them; each
+portion begins where the last has led, and no candidate is asked for biases that it cannot take.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hotlever import memory
+from hotlever.errors import ComputationError
+from hotlever.estimate.experiment import (
+    Experiment,
+    ExperimentAtRest,
+    Prediction,
+    PredictionAtRest,
+    Predictor,
+)
+from hotlever.estimate.objective import Objective
+from hotlever.estimate.optimiser import Optimiser, Optimum, SearchOptions
+from hotlever.estimate.posterior import Posterior
+from hotlever.estimate.prior_density import PriorDensity
+from hotlever.estimate.problem import Problem
+from hotlever.estimate.residuals import Residuals
+from hotlever.lever.branch import Branch
+from hotlever.probe import Probe
+from hotlever.probe.priors import Prior, PriorUse, default_priors
+from hotlever.probe.probe_parameters import dimensions_of, parameters_of
+from hotlever.types import Array, Progress
+
+#: A lever is far from data that differ from what it shows by this share of the largest (median).
+_FAR = 0.06
+#: Portions by which a lever grows, the last of which is all of the rows; the least rows of one.
+_PORTIONS, _FEWEST_ROWS = 6, 3
+#: By how much the usual priors are widened, and the spread of what has none, where only the
+#: directions are to be closed that a few cold rows leave open.
+_WIDENED, _OPEN = 4.0, 0.5
+#: Share of a dimension by which a mesh follows it well; edges' bias moves all of them.
+_MESH_FOLLOWS = 0.2
+#: A portion is to be met within some per cent: the next moves the lever anyway.
+_OF_PORTIONS = SearchOptions(
+    most_branches=4, decrement=2.0, scatter_rounds=0, first_region=0.7, largest_region=1.2
+)
+
+
+@dataclass(frozen=True)
+class Solution(Optimum):
+    """The most likely lever, with the `problem` that it solves, after so many `seconds`."""
+
+    problem: Problem
+    seconds: float
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """What is known of its parameters, and of any quantity of it."""
+        return Posterior(self.objective, self.prediction)
+
+    @cached_property
+    def priors(self) -> dict[str, PriorUse]:
+        """What was known before, and what the data made of it."""
+        names, before = self.problem.options.varied, self.problem.known
+        values = self.probe.values(names).tolist()
+        spreads = np.sqrt(np.diag(self.posterior.covariance)).tolist()
+        used = {
+            name: before[name].used(value, spread)
+            for name, value, spread in zip(names, values, spreads, strict=True)
+            if name in before
+        }
+        for error in self.residuals.common:
+            size, left = self.posterior.shifts[error.name]
+            after = 1.0 + error.share * size, error.share * left
+            used[error.name] = PriorUse(1.0, error.share, *after)
+        return used
+
+    @property
+    def branch(self) -> Branch:
+        """The lever at rest, as far as it was measured, corrected by the full one."""
+        assert isinstance(self.prediction, PredictionAtRest)
+        return self.prediction.surrogate.branch
+
+    def predicted(self, bias: Array) -> PredictionAtRest:
+        """Return what a slow ramp shows at other biases (V), as far as the measured ones reach."""
+        experiment, prediction = self.predictor.experiment, self.prediction
+        assert isinstance(experiment, ExperimentAtRest)
+        assert isinstance(prediction, PredictionAtRest)
+        return experiment.measuring(bias, None).predict(self.probe, prediction)
+
+
+# --- the search ---------------------------------------------------------------------------------
+
+
+def solve(
+    problem: Problem,
+    progress: Progress | None = None,
+    seen: Callable[[Prediction], None] | None = None,
+) -> Solution:
+    """Find the lever that priors and a measurement make most likely.
+
+    Parameters
+    ----------
+    problem : Problem
+    progress, seen : callable, optional
+        See `hotlever.estimate.experiment.Predictor`.
+
+    Raises
+    ------
+    ComputationError
+        If the lever cannot be solved at the start, or the search does not settle.
+    """
+    began = time.perf_counter()
+    memory.give_back()  # what an earlier one used
+    search, experiment = Search(problem, progress, seen), problem.experiment
+    if isinstance(experiment, ExperimentAtRest):
+        optimum = search.from_anywhere(experiment)
+    else:
+        optimum = search.near(experiment, problem.start)
+    return Solution(**vars(optimum), problem=problem, seconds=time.perf_counter() - began)
+
+
+@dataclass(frozen=True)
+class Search:
+    """The searches for the lever of a problem, of which `progress` and `seen` are told."""
+
+    problem: Problem
+    progress: Progress | None = None
+    seen: Callable[[Prediction], None] | None = None
+
+    def near(self, experiment: Experiment, start: Probe, before: int = 0) -> Optimum:
+        """Search from a lever that is not far from the one that was measured.
+
+        The levers that were solved `before` count.
+        """
+        optimiser = self._optimiser(experiment, start, before)
+        return optimiser.solve_and_confirm(start, self.problem.options.robust)
+
+    def from_anywhere(self, experiment: ExperimentAtRest) -> Optimum:
+        """Search from a lever of which little may be known.
+
+        If it shows something else than the data, or the search leads to a lever that does, it first
+        grows; of two ends the one that describes the data better counts.
+
+        Raises
+        ------
+        ComputationError
+            If the lever cannot be solved at the start.
+        """
+        problem, ends = self.problem, list[Optimum]()
+        optimiser = self._optimiser(experiment, problem.start)
+        with suppress(ComputationError):
+            if not _is_far(problem.residuals, optimiser.predictor.predict(problem.start)):
+                ends.append(optimiser.solve_and_confirm(problem.start, problem.options.robust))
+                if ends[0].describes_data:
+                    return ends[0]
+        before = optimiser.predictor.evaluations
+        grown, nearer, before = self._grown(experiment, before)
+        if ends and nearer == problem.start:
+            # cold rows say nothing else, and the same search would come to the same end
+            return ends[0]
+        try:
+            ends.append(self.near(grown, nearer, before))
+        except ComputationError:
+            if not ends:
+                raise
+        return min(ends, key=lambda end: (not end.describes_data, end.misfit))
+
+    def _optimiser(self, experiment: Experiment, start: Probe, before: int = 0) -> Optimiser:
+        problem = self.problem
+        residuals, varied = problem.residuals.afresh(), problem.options.varied
+        objective = Objective(residuals, start, experiment.names, varied, problem.prior)
+        predictor = Predictor(experiment, self.progress, self.seen, before=before)
+        return Optimiser(objective, predictor)
+
+    def _grown(
+        self, experiment: ExperimentAtRest, before: int
+    ) -> tuple[ExperimentAtRest, Probe, int]:
+        """Return a lever that shows nearly what was measured, up to the hottest portion of rows.
+
+        With it the experiment is returned that is to be searched on with, and the levers that were
+        solved, with those `before`. Without priors the usual ones close what cold rows leave open.
+        """
+        problem, experiment = self.problem, experiment.coarse()
+        start, measurement, varied = problem.start, problem.measurement, problem.options.varied
+        prior = problem.prior
+        if not problem.informed:
+            prior = PriorDensity.of_priors(_closing(start, varied))
+        bias = np.abs(measurement.bias_V)
+        current = measurement.current(start.circuit)
+        heated = np.unique(bias[np.isfinite(current) & (bias > 0)])
+        for portion in range(1, _PORTIONS):
+            count = max(_FEWEST_ROWS, -(-heated.size * portion // _PORTIONS))
+            if count >= heated.size:
+                break
+            part = measurement.part(bias <= heated[count - 1])
+            with_data = set(part.observables)
+            residuals = Residuals(
+                part,
+                [name for name in problem.residuals.observables if name in with_data],
+                "errors",
+            )
+            if _has_moved(experiment.fast.drawn, start):
+                experiment = experiment.drawn_anew(start)
+            of_part = experiment.measuring(*residuals.at_rest)
+            objective = Objective(residuals, start, of_part.names, varied, prior)
+            # what is seen of a portion is not seen at the rows of the measurement
+            predictor = Predictor(of_part, self.progress, before=before)
+            try:
+                start = Optimiser(objective, predictor, _OF_PORTIONS).solve(start).probe
+                before = predictor.evaluations
+            except ComputationError:
+                if portion == 1:
+                    raise
+                break
+        mesh_is_outdated = _has_moved(experiment.fast.drawn, start)
+        return (experiment.drawn_anew(start) if mesh_is_outdated else experiment), start, before
+
+
+def _is_far(residuals: Residuals, at: Prediction) -> bool:
+    """Whether a lever shows something else than the data."""
+    share = residuals.difference(at.values) / residuals.largest
+    # a few wrong rows are no other lever
+    return bool(np.nanmax(np.nanmedian(np.abs(share), axis=1)) > _FAR)
+
+
+def _has_moved(drawn: Probe, probe: Probe) -> bool:
+    """Whether a probe's dimensions are far from those that a mesh was drawn with."""
+    names = dimensions_of(probe)
+    before, now = drawn.values(names), probe.values(names)
+    return bool(np.any(np.abs(now - before) > _MESH_FOLLOWS * np.abs(before)))
+
+
+def _closing(probe: Probe, varied: Sequence[str]) -> dict[str, Prior]:
+    """Return wide priors about a probe for all that is varied."""
+    usual, every = default_priors(probe), parameters_of(probe, anywhere=True)
+    closing = {}
+    for name, value in zip(varied, probe.values(list(varied)).tolist(), strict=True):
+        if name in usual:
+            prior = usual[name]
+            closing[name] = Prior(value, _WIDENED * prior.spread, prior.relative)
+        elif every[name].lower > 0:
+            closing[name] = Prior(value, _OPEN)
+        else:
+            closing[name] = Prior(value, _OPEN * every[name].scale, relative=False)
+    return closing

@@ -1,0 +1,187 @@
+"""The verdict on data: whether they can be those of a lever, and whether an estimate shows them.
+
+They are compared twice: before the search by the resistance of the cold lever, which needs none;
+after it by what is left over, and by how far parameters are from their priors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.special import chdtrc
+
+from hotlever.errors import InputError
+from hotlever.estimate.diagnosis import Diagnosis, lack_of_fit_text, run_of_outliers
+from hotlever.estimate.problem import Problem
+from hotlever.estimate.search import Solution
+from hotlever.estimate.tip_temperature import highest_bias, not_of_a_ramp, tips_in_contact
+from hotlever.lever.branch import Reach
+from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.similar import SimilarLevers
+from hotlever.measurement import Measurement
+from hotlever.measurement.contents import colder_than_base
+from hotlever.probe import Probe
+from hotlever.probe.priors import Prior
+from hotlever.probe.probe_parameters import parameters_of
+
+#: The resistance of a cold lever is within this factor of its model's.
+_WITHIN = 2.5
+#: Beyond so many times that of its model hardly any current flows.
+_OPEN = 100.0
+#: Different biases that a calibration needs.
+_FEWEST = 3
+#: Biases below this share of the largest hardly change what other supplies drive.
+_HARDLY = 0.05
+#: The share of the sum of squares that another step would take away, below which a search that has
+#: not come to its end has come to a verdict.
+_LITTLE = 0.5
+#: Share of the measured biases that a lever must reach to show the data.
+_REACHED = 0.98
+#: Data are not described where parameters are as far from their priors as one lever in 500 is.
+_UNLIKELY = 2e-3
+#: The same where data and all other priors are so many standard deviations from one prior: of the
+#: nearly twenty of a lever one is, by chance, in one lever of 500.
+_UNLIKELY_PULL = 3.85
+
+
+# --- before the search --------------------------------------------------------------------------
+
+
+def check_plausible(problem: Problem, causes: Diagnosis) -> None:
+    """Refuse data whose resistance at low bias, or whose temperatures, are far from the lever's.
+
+    Parameters
+    ----------
+    problem : Problem
+    causes : Diagnosis
+        Of the same data.
+
+    Raises
+    ------
+    InputError
+        Saying what was compared, and the likeliest cause.
+    """
+    measured, probe = problem.measurement, problem.probe
+    where = measured.path or "measurement"
+    alone, size = probe.circuit.starts_cold, np.abs(measured.bias_V)
+    current = measured.current(probe.circuit)
+    here = np.isfinite(current) & (measured.bias_V > 0) & (current > 0)
+    if not alone:
+        # other supplies drive a current as well, which is known less well than what is added
+        here = np.isfinite(current) & (size > _HARDLY * size.max())
+    different = np.unique(measured.bias_V[here]).size
+    if different < _FEWEST:
+        above = " above 0" if alone else ""
+        raise InputError(
+            f"{where}: currents{above} at {different} different biases{above}, expected "
+            f"{_FEWEST} or more"
+        )
+    _check_temperatures(measured, probe, where)
+    bias, current = measured.bias_V[here], current[here]
+    low = np.argsort(np.abs(bias))[: max(_FEWEST, bias.size // 8)]
+    # what a cold lever shows does not depend on what is around it
+    cold = probe.in_medium("vacuum") if alone else probe
+    rest = Lever(cold, COARSE).branch_to(0.0)
+    lever = float(rest.value_slopes[0, 0] / rest.value_slopes[0, 1])
+    series = probe.circuit.series_kohm
+    added = current[low] - rest.values[0, 1]
+    cold_kohm = float(np.median(bias[low] / np.where(added == 0.0, np.nan, added)))
+    ratio = cold_kohm / (lever + series)
+    if cold_kohm > series and abs(np.log(ratio)) < np.log(_WITHIN):
+        return
+    # an owner who knows little of a lever expects no less of it
+    spread = cold_resistance_spread(cold, problem.known) if alone else 0.0
+    if cold_kohm > series and abs(np.log((cold_kohm - series) / lever)) < _UNLIKELY_PULL * spread:
+        return
+    quantity = "V_b / I_h" if alone else "the change of V_b over that of I_h"
+    cause = causes.likeliest()
+    if not cause and cold_kohm > _OPEN * (lever + series):
+        cause = "hardly any current flows, as if a terminal was open or the meter at another one"
+    cause = cause or "no single cause that is known explains it"
+    raise InputError(
+        f"{where}: {quantity} is {cold_kohm:.4g} kΩ at low bias, expected about "
+        f"{lever + series:.4g} kΩ ({series:g} kΩ in series and {lever:.3g} kΩ of the lever): "
+        f"{cause}"
+    )
+
+
+def cold_resistance_spread(probe: Probe, priors: Mapping[str, Prior]) -> float:
+    """Return the standard deviation of the logarithm of a cold lever's resistance by its priors."""
+    lever = SimilarLevers(Lever(probe, COARSE))
+    names = tuple(name for name in priors if name in parameters_of(probe))
+    branch = lever.linearised(probe, Reach(probe.circuit, 0.0), names=names)
+    first = int(branch.branch.solved[0])
+    by = branch.output_slopes[first, :2] / branch.branch.values[first, :2, None]
+    spreads = np.array([priors[name].absolute for name in names])
+    return float(np.linalg.norm((by[0] - by[1]) * spreads))
+
+
+def _check_temperatures(measured: Measurement, probe: Probe, where: str) -> None:
+    """Refuse tips that are colder than the base of the lever."""
+    base = probe.circuit.base_temperature_K
+    colder = colder_than_base(measured.tip_K, measured.tip_error_K, base)
+    if colder.any():
+        row = int(np.argmax(colder))
+        raise InputError(
+            f"{where}: T_tip is {measured.tip_K[row]:.4g} K at {measured.bias_V[row]:.4g} V, "
+            f"expected more than the base temperature, {base:g} K: is it in °C, or another column?"
+        )
+
+
+# --- after it -----------------------------------------------------------------------------------
+
+
+def verdict_on(solution: Solution) -> tuple[bool, str]:
+    """Return whether the search came to an end, and why the data are not described, if so.
+
+    One that was ended far from describing the data, where another step would take less than half of
+    the sum of squares away, has found that no such lever shows them.
+    """
+    reason = _misfit(solution)
+    share = solution.decrement / max(solution.objective.squares(solution.prediction), 1e-300)
+    if solution.converged or (reason and share < _LITTLE):
+        return True, reason
+    refused = solution.optimiser.refused
+    beyond = f"; a lever on the way could not be solved: {refused}" if refused else ""
+    return False, (
+        f"the search was ended after {solution.predictor.evaluations} levers, before it converged: "
+        f"another step would still lower the sum of squares by {share:.1%}{beyond}"
+    )
+
+
+def no_ramp(solution: Solution) -> str:
+    """Say that a slow ramp of the bias does not lead along the data; empty if it does."""
+    circuit, highest = solution.probe.circuit, highest_bias(solution)
+    if reason := not_of_a_ramp(solution.branch, circuit, *tips_in_contact(solution)):
+        return reason
+    if highest < _REACHED * float(solution.residuals.bias.max()):
+        return f"the lever that comes nearest has no steady state above {highest:.4g} V"
+    return ""
+
+
+def _misfit(solution: Solution) -> str:
+    """Return why data are not described by what was fitted to them; empty if they are.
+
+    Without priors outliers stand for themselves: there is nothing that they contradict.
+    """
+    of_data = solution.residuals, solution.prediction.values
+    reason = lack_of_fit_text(*of_data)
+    if reason or not solution.problem.informed:
+        return reason
+    if reason := run_of_outliers(*of_data):
+        return reason
+    shifts = solution.posterior.shifts
+    name = max(shifts, key=lambda name: abs(shifts[name].pull), default="")
+    if name and abs(shifts[name].pull) > _UNLIKELY_PULL:
+        return (
+            f"{name}, known as {solution.priors[name].stated}, would have to be another; the "
+            f"data are {abs(shifts[name].pull):.1f} σ from it"
+        )
+    # as many are free to be away as the data tell of
+    dof = sum(each.contraction for each in shifts.values())
+    if dof > 0 and chdtrc(dof, sum(each.size**2 for each in shifts.values())) < _UNLIKELY:
+        most = sorted(shifts, key=lambda name: -abs(shifts[name].size))[:3]
+        away = ", ".join(f"{name} by {shifts[name].size:+.1f} σ" for name in most)
+        return f"what was known beforehand would have to be wrong by too much together, {away}"
+    return ""
