@@ -53,6 +53,7 @@ FLOORS = {
     "lever": ("lever",),
     "measurement": ("lever3d", "measurement", "raman"),
     "estimate": ("estimate",),
+    "instruments": ("instruments",),
     "studies": ("studies",),
     "figures": ("figures",),
     "report": ("report",),

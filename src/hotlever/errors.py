@@ -42,6 +42,10 @@ class ComputationError(HotleverError):
         self.partial = partial
 
 
+class InstrumentError(HotleverError):
+    """An instrument does not do what it should: the text says which, and what it said."""
+
+
 class NewtonError(ComputationError):
     """Newton's method did not converge; ``partial`` holds the last finite iterate."""
 

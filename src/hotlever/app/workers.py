@@ -239,7 +239,7 @@ def serve(connection: Connection, folder: Path) -> None:
 def _import_all() -> None:
     """Import what commands import when they are called, so that the first is done at once."""
     from hotlever import estimate, figures, lever, raman  # noqa: F401
-    from hotlever.estimate import batch, procedure  # noqa: F401
+    from hotlever.estimate import many  # noqa: F401
     from hotlever.lever import fields, set_points, transient  # noqa: F401
     from hotlever.report import fit_pages  # noqa: F401
 

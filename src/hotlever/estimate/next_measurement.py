@@ -236,7 +236,7 @@ def _safe_then(
 
     A bias beyond one that is not safe is none either.
     """
-    while safe < bias.size and _highest(lever, bias[[safe]], information)[0] < limit_K:
+    while safe < bias.size and hottest_tips(lever, bias[[safe]], information)[0] < limit_K:
         safe += 1
     return float(bias[safe - 1])
 
@@ -258,7 +258,7 @@ def _safe_biases(
         bias = np.unique(stated[(stated > 0.0) & (stated <= lever.highest_V)])
     if not bias.size:
         raise InputError(f"biases: expected some above 0 and up to {lever.highest_V:.4g} V")
-    highest = _highest(lever, bias, information)
+    highest = hottest_tips(lever, bias, information)
     safe = int(np.argmin(np.append(highest < limit_K, False)))
     if not safe:
         reached = f"the tip may reach {highest[0]:.0f} K"
@@ -270,7 +270,7 @@ def _safe_biases(
     low, high = bias[safe - 1 : safe + 1]
     for _ in range(_HALVED):
         middle = np.array([(low + high) / 2.0])
-        tip = _highest(lever, middle, information)
+        tip = hottest_tips(lever, middle, information)
         if tip[0] >= limit_K:
             (high,) = middle
             continue
@@ -280,7 +280,7 @@ def _safe_biases(
     return bias, highest, safe
 
 
-def _highest(lever: LinearisedLever, bias: Array, information: Information) -> Array:
+def hottest_tips(lever: LinearisedLever, bias: Array, information: Information) -> Array:
     """Return the tip temperatures (K) that are not exceeded at some biases (V), for all we know.
 
     They are infinite where something may melt.

@@ -27,6 +27,7 @@ from hotlever.tasks.describing import list_materials, new_probe, propose_probe, 
 from hotlever.tasks.designing import vary_design
 from hotlever.tasks.estimating import calibrate_files, fit_files, propose
 from hotlever.tasks.evidence import reproduce, validate
+from hotlever.tasks.measuring import measure_lever
 from hotlever.tasks.reporter import Reporter
 from hotlever.tasks.simulating import simulate_in_time
 from hotlever.tasks.spectra import join_spectra, measure_spectra
@@ -47,6 +48,7 @@ COMMANDS: dict[str, Command] = {
     "reader": approach,
     "spectrum": respond,
     "design": vary_design,
+    "measure": measure_lever,
     "raman": measure_spectra,
     "join": join_spectra,
     "fit": fit_files,

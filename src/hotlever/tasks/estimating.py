@@ -53,6 +53,7 @@ from hotlever.tasks.parsing import (
     parse_setting,
     parse_temperature,
     parse_timing,
+    with_laws,
 )
 from hotlever.tasks.reporter import Reporter
 from hotlever.units import setting
@@ -154,7 +155,7 @@ def fit_files(
         refuse(why, posterior=posterior, profiles=profiles, step=step, pulse=pulse)
         refuse(why, period=period, count=count, ramp=ramp, sine=sine, waveform=waveform)
     like = read_probe(reporter, probe, physics=physics)
-    priors, stated = parse_priors(_beforehand(prior, laws), like), like.stated_priors
+    priors, stated = parse_priors(with_laws(prior, laws), like), like.stated_priors
     if laws is not None:
         stated = {name: text for name, text in stated.items() if not is_of_laws(name)}
     usual = USUAL in (prior or [])
@@ -222,11 +223,6 @@ def _check_levers(data: Sequence[Path], processes: int | None, scheduler: str | 
     if len(data) == 1:
         refuse("expected several data files", scheduler=scheduler)
     return len(data) > 1
-
-
-def _beforehand(prior: list[str] | None, laws: str | None) -> list[str]:
-    """Return what is known beforehand, as ``--prior`` has it."""
-    return [*(prior or []), *([] if laws is None else [f"laws={laws}"])]
 
 
 def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
@@ -359,7 +355,7 @@ def calibrate_files(
     how: dict[str, Any] = {
         "probe": like if of_lever is None and law is None else None,
         "law": law,
-        "priors": parse_priors(_beforehand(prior, laws), like),
+        "priors": parse_priors(with_laws(prior, laws), like),
         "medium": medium,
         "budget_of": budget_of,
         "pulse": None if pulse is None else parse_timing(pulse),
@@ -529,13 +525,13 @@ def propose(
     elif data is not None:
         like = read_probe(reporter, probe, physics=physics)
         choices["calibration"] = _calibrated_first(
-            reporter, data, like, column, _beforehand(prior, laws), medium
+            reporter, data, like, column, with_laws(prior, laws), medium
         )
     else:
         refuse("expected a measurement file", column=column)
         like = read_probe(reporter, probe, physics=physics)
         like = like if medium is None else like.in_medium(medium)
-        choices |= {"probe": like, "priors": parse_priors(_beforehand(prior, laws), like)}
+        choices |= {"probe": like, "priors": parse_priors(with_laws(prior, laws), like)}
     with reporter.progress("next"):
         plan = plan_next(**choices)
     reporter.note(*plan.notes)

@@ -93,6 +93,11 @@ def parse_priors(texts: Sequence[str] | None, probe: Probe) -> dict[str, str] | 
     return pairs
 
 
+def with_laws(prior: list[str] | None, laws: str | None) -> list[str]:
+    """Return what is known beforehand, as ``--prior`` has it."""
+    return [*(prior or []), *([] if laws is None else [f"laws={laws}"])]
+
+
 def parse_settings(texts: Sequence[str] | None, probe: Probe) -> dict[str, Any]:
     """Parse ``NAME=VALUE`` for any key of a probe file: numbers, switches and words.
 

@@ -1,0 +1,227 @@
+"""Measuring with a source meter: does the tip stay below its limit, and does the output go off?
+
+The levers are those of `foreign_levers`, all of whose laws depart from what calibrates them, behind
+an instrument with the noise that is there. Each is measured as `hotlever measure` does, with 25
+rows at most and a limit of 900 K, and calibrated; and by 40 even rows up to the same bias. Counted
+are the tips that were hotter, and compared what is said at the bias at which the tip is at 800 K.
+
+The ends are those of whole commands that measure a twin, at random moments: Ctrl-C, a kill of the
+command and of the process that supervises, a line that is lost, a file that can grow no more.
+
+    python benchmarks/measuring.py levers [COUNT]     10 if left out
+    python benchmarks/measuring.py ends [COUNT]       50 if left out
+"""
+
+from __future__ import annotations
+
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+
+from foreign_levers import NOISE, foreign_lever, owners_probe
+from hotlever.errors import HotleverError
+from hotlever.estimate import Measurement, calibrate
+from hotlever.estimate.linearised_lever import LinearisedLever
+from hotlever.instruments.ramp import Ramp, RampOptions
+from hotlever.instruments.source_meter import Reading
+from hotlever.instruments.twin import RampCurve, TwinBench, TwinOptions
+from hotlever.probe import Probe
+from problems import table
+
+LIMIT_K, AT_K, ROWS, EVEN = 900.0, 800.0, 25, 40
+HOTTEST_K, HIGHEST_V = 1300.0, 13.0
+
+
+class Direct:
+    """An instrument without a line."""
+
+    def __init__(self, curve: RampCurve, rng: np.random.Generator) -> None:
+        self.curve, self._rng, self.hottest_K, self._bias_V = curve, rng, 0.0, 0.0
+
+    def set_bias(self, bias_V: float) -> None:
+        """Set the bias (V)."""
+        self._bias_V = bias_V
+
+    def read(self) -> Reading:
+        """Return what is shown, with noise."""
+        current, _, tip = self.curve.at(self._bias_V)
+        self.hottest_K = max(self.hottest_K, tip)
+        noisy = current * (1.0 + NOISE * self._rng.standard_normal())
+        return Reading(self._bias_V, noisy, float("nan"), False)
+
+
+def tip_at(measured: Measurement, probe: Probe, bias_V: float) -> tuple[float, float]:
+    """Calibrate; return the tip temperature (K) at a bias, and its standard error."""
+    lever = LinearisedLever.of_calibration(calibrate(measured, probe=probe))
+    tip, slopes = lever.tip(np.array([bias_V]))
+    return float(tip[0]), float(lever.information.stderr(slopes)[0])
+
+
+def measure(number: int) -> dict[str, Any]:
+    """Measure a lever both ways."""
+    lever = foreign_lever(number, "all", "vacuum")
+    sweep = lever.sweep(HOTTEST_K, HIGHEST_V)
+    bias = np.linspace(0.0, sweep.bias_V[-1], 2001)
+    curve, rng = RampCurve(bias, *sweep.at(bias)), np.random.default_rng((number, 7))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "owner.toml"
+        path.write_text(owners_probe(lever.shape, "vacuum"))
+        probe = Probe.coerce(path)
+    instrument, highest = Direct(curve, rng), min(11.0, float(bias[-1]))
+    ramp = Ramp(
+        probe,
+        np.linspace(highest / ROWS, highest, ROWS),
+        RampOptions(stay_below_K=LIMIT_K, settle_s=0.0),
+    )
+    began = time.process_time()
+    measured = ramp.measure(instrument, lambda *_: None)
+    record: dict[str, Any] = {
+        "number": number,
+        "rows": len(measured.readings),
+        "hottest_K": instrument.hottest_K,
+        "reason": "" if measured.complete else measured.reason,
+        "seconds": (time.process_time() - began) / max(len(measured.readings), 1),
+    }
+    if not measured.complete:
+        return record
+    aim = float(np.interp(AT_K, curve.tip_K, curve.bias_V))
+    last = measured.readings[-1].bias_V
+    even = np.linspace(last / EVEN, last, EVEN)
+    noisy = curve.at_each(even)[0] * (1.0 + NOISE * rng.standard_normal(EVEN))
+    nothing = np.full(EVEN, np.nan)
+    rows = Measurement(even, noisy, nothing, nothing, nothing, medium="vacuum")
+    for name, data in (("ramp", ramp.measurement()), ("even", rows)):
+        try:
+            tip, stderr = tip_at(data, probe, aim)
+        except HotleverError as error:
+            return record | {"reason": f"{name}: {error}"}
+        record |= {f"{name}_off_K": tip - AT_K, f"{name}_stderr_K": stderr}
+    return record
+
+
+def levers(count: int) -> None:
+    """Measure levers, and say what came of it."""
+    records = []
+    for number in range(count):
+        records.append(measure(number))
+        print(records[-1], file=sys.stderr, flush=True)
+    good = [record for record in records if "even_off_K" in record]
+    column = {
+        name: np.array([record[name] for record in good]) for name in good[0] if name != "reason"
+    }
+    rms = {way: float(np.sqrt(np.mean(column[f"{way}_off_K"] ** 2))) for way in ("ramp", "even")}
+    stderr = {way: float(np.median(column[f"{way}_stderr_K"])) for way in rms}
+    hot = np.array([record["hottest_K"] for record in records])
+    table(
+        ("quantity", "value", "wanted"),
+        [
+            ("levers, ended early", f"{count}, {count - len(good)}", ""),
+            (f"hotter than {LIMIT_K:.0f} K", f"{np.sum(hot > LIMIT_K)} of {count}", "2 of 200"),
+            (
+                "hottest tip (K), median and range",
+                f"{np.median(hot):.0f}, {hot.min():.0f} to {hot.max():.0f}",
+                "",
+            ),
+            ("rows, most", f"{max(record['rows'] for record in records)}", "25"),
+            (
+                "rms error at 800 K, ramp / 40 even rows (K)",
+                f"{rms['ramp']:.1f} / {rms['even']:.1f}",
+                "as with 40",
+            ),
+            ("stated error, medians (K)", f"{stderr['ramp']:.1f} / {stderr['even']:.1f}", ""),
+            ("processor seconds a row, median", f"{np.median(column['seconds']):.1f}", "10"),
+        ],
+    )
+
+
+# --- ends -----------------------------------------------------------------------------------------
+
+
+def _small_files() -> None:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (700, 700))
+
+
+def end(kind: str, twin: TwinBench, folder: Path, rng: np.random.Generator) -> tuple[float, str]:
+    """Measure, and end it; return after how many seconds the output was off, or infinity."""
+    output = folder / "iv.csv"
+    output.unlink(missing_ok=True)
+    words = ["measure", "--source", twin.source, "--settle", "50ms", "-o", str(output)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "hotlever", *words, "--laws", "paper"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=_small_files if kind == "disk" else None,
+    ) as process:
+        while not twin.output_on and process.poll() is None:
+            time.sleep(0.01)
+        if kind != "disk":
+            time.sleep(rng.uniform(0.0, 15.0))
+        elif process.poll() is None:
+            process.wait(300)
+        began = time.monotonic()
+        if kind == "line":
+            twin.break_lines()
+        elif kind == "supervisor":
+            for child in psutil.Process(process.pid).children():
+                if "spawn_main" in " ".join(child.cmdline()):
+                    child.kill()
+        elif kind != "disk":
+            process.send_signal({"ctrl-c": signal.SIGINT, "kill": signal.SIGKILL}[kind])
+        while twin.output_on and time.monotonic() < began + 20.0:
+            time.sleep(0.005)
+        after = time.monotonic() - began if not twin.output_on else float("inf")
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(60)
+        process.kill()
+        text = process.stderr.read() if process.stderr else ""
+    return after, text
+
+
+def ends(count: int) -> None:
+    """End commands, and say what came of it."""
+    rng = np.random.default_rng(5)
+    kinds = ("ctrl-c", "kill", "supervisor", "line", "disk")
+    curve = RampCurve.of_probe(Probe.reference())
+    seconds: dict[str, list[float]] = {kind: [] for kind in kinds}
+    aloud = rows = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(count):
+            kind = kinds[number % len(kinds)]
+            with TwinBench(curve, TwinOptions(seed=number)) as twin:
+                after, text = end(kind, twin, Path(folder), rng)
+            seconds[kind].append(after)
+            aloud += "MAY STILL BE ON" in text
+            lines = (Path(folder) / "iv.csv").read_text().splitlines()
+            whole = [line.count(",") == 1 for line in lines if line[0] not in "#V"]
+            rows += sum(whole)
+            print(number, kind, round(after, 2), len(whole), file=sys.stderr, flush=True)
+    table(
+        ("end", "times", "output off after (s, largest)", "said aloud"),
+        [
+            (
+                kind,
+                str(len(each)),
+                f"{max(each, default=0.0):.2f}",
+                str(aloud) if kind == "line" else "",
+            )
+            for kind, each in seconds.items()
+        ],
+    )
+    print(f"{rows} whole rows on disk")
+
+
+if __name__ == "__main__":
+    words = sys.argv[1:]
+    what = {"levers": (levers, 10), "ends": (ends, 50)}
+    do, usual = what[words[0] if words else "levers"]
+    do(int(words[1]) if len(words) > 1 else usual)

@@ -1,0 +1,304 @@
+"""Measuring a lever bias by bias, so that its tip stays below a limit.
+
+The paper's procedure is a ramp of the bias with a wait at each. Here each next bias is taken only
+if the lever, as far as it is known by then, has its tip below a limit there with a certainty of
+99 %; what is known is brought up to date by a calibration of the rows so far while the lever
+settles. Where the next bias that is wanted is too hot, the highest that is not is taken, until
+that is hardly above the last.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.estimate import Estimate, calibrate
+from hotlever.estimate.linearised_lever import LinearisedLever
+from hotlever.estimate.next_measurement import hottest_tips, plan_next
+from hotlever.instruments.source_meter import Reading
+from hotlever.measurement import Measurement
+from hotlever.probe import Probe
+from hotlever.probe.priors import Prior
+from hotlever.types import Array
+from hotlever.units import MOST_BIAS
+
+#: The limit that is the temperature of the lever's own knee.
+KNEE = "knee"
+
+
+class Instrument(Protocol):
+    """What sets a bias and reads; see `hotlever.instruments.supervisor`."""
+
+    def set_bias(self, bias_V: float) -> None:
+        """Set the bias (V)."""
+
+    def read(self) -> Reading:
+        """Return what is shown."""
+
+
+@dataclass(frozen=True)
+class RampOptions:
+    """How a lever is measured.
+
+    Attributes
+    ----------
+    stay_below_K : float, "knee" or None
+        The tip stays below with 99 % probability; below what melts if None, and below the first
+        fold of the lever in any case.
+    settle_s : float
+        Between setting a bias and the reading that counts.
+    first_reading_s : float
+        Between setting a bias and a reading by which what is known is brought up to date meanwhile.
+    changed : float
+        A reading that differs from that one by a larger share is one to calibrate by anew.
+    unknown_rows : int
+        Rows before there is a calibration.
+    finest : float
+        Share of the distance between wanted biases below which a step is not worth a row.
+    halvings : int
+        By which the highest bias that is safe is found between two.
+    propose : bool
+        Whether biases are those that tell most (`hotlever.estimate.plan_next`) of many.
+    proposed_of : int
+        So many biases for each wanted row are compared then.
+    """
+
+    stay_below_K: float | str | None = None
+    settle_s: float = 10.0
+    first_reading_s: float = 0.5
+    changed: float = 2e-3
+    unknown_rows: int = 3
+    finest: float = 0.05
+    halvings: int = 5
+    propose: bool = False
+    proposed_of: int = 4
+
+
+@dataclass(frozen=True)
+class Step:
+    """A bias to take, with the tip temperature expected there, and one not exceeded with 99 %."""
+
+    bias_V: float
+    tip_K: float
+    tip_limit_K: float
+
+
+@dataclass
+class MeasuredRamp:
+    """What was measured.
+
+    Attributes
+    ----------
+    readings : list of Reading
+    steps : list of Step
+        What was known of each before it was taken.
+    calibration : Estimate or None
+        Of all readings; None where there are too few.
+    reason : str
+        Why no other bias was taken.
+    complete : bool
+        Whether that is as it was wanted: nothing went wrong.
+    """
+
+    readings: list[Reading] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
+    calibration: Estimate | None = None
+    reason: str = ""
+    complete: bool = True
+
+
+class Ramp:
+    """A measurement of one lever.
+
+    Parameters
+    ----------
+    probe : Probe
+        A lever like the one that is measured, in the medium and circuit that it is in.
+    bias : ndarray, shape (n,)
+        Wanted biases (V), rising from above 0. No more rows are taken.
+    options : RampOptions, optional
+    priors : mapping of str to Prior or str, optional
+        In place of some of the usual ones.
+
+    Raises
+    ------
+    InputError
+        If the biases do not rise from above 0, or the lever does not start cold.
+    """
+
+    def __init__(
+        self,
+        probe: Probe,
+        bias: Array,
+        options: RampOptions | None = None,
+        priors: Mapping[str, Prior | str] | None = None,
+    ) -> None:
+        self.options = options or RampOptions()
+        if not (bias.size and bias[0] > 0.0 and (np.diff(bias) > 0.0).all()):
+            raise InputError("measure: expected biases that rise, the first above 0 V")
+        self._probe, self._priors, self._bias = probe, priors, bias
+        self._spacing = float(np.diff(bias).mean()) if bias.size > 1 else float(bias[0])
+        self._known = LinearisedLever.of_priors(probe, priors)
+        self.measured = MeasuredRamp()
+
+    def measure(
+        self,
+        instrument: Instrument,
+        record: Callable[[Reading, Step], None],
+        wait: Callable[[float], None] = time.sleep,
+    ) -> MeasuredRamp:
+        """Measure row by row; what was measured so far is in ``measured`` also if that fails.
+
+        Parameters
+        ----------
+        instrument : Instrument
+        record : callable
+            Called with each reading that counts, and what was known of it before.
+        wait : callable
+            Called with the seconds to wait.
+
+        Raises
+        ------
+        HotleverError
+            If the instrument fails.
+        """
+        options, measured = self.options, self.measured
+        while (step := self._next_step()) is not None:
+            instrument.set_bias(step.bias_V)
+            begin = time.monotonic()
+            wait(min(options.first_reading_s, options.settle_s))
+            first = instrument.read()
+            if not first.at_compliance:
+                self._update(first)
+            wait(max(options.settle_s - (time.monotonic() - begin), 0.0))
+            reading = instrument.read()
+            if first.at_compliance or reading.at_compliance:
+                return self._stopped(
+                    f"the source limits the current at {step.bias_V:.4g} V (compliance)",
+                    complete=True,
+                )
+            measured.readings.append(reading)
+            measured.steps.append(step)
+            record(reading, step)
+            if abs(reading.current_mA / first.current_mA - 1.0) > options.changed:
+                self._update()
+            if measured.reason:
+                return measured
+        return measured
+
+    def _stopped(self, reason: str, complete: bool = False) -> MeasuredRamp:
+        self.measured.reason, self.measured.complete = reason, complete
+        return self.measured
+
+    # --- what is known ----------------------------------------------------------------------------
+
+    def measurement(self, *more: Reading) -> Measurement:
+        """Return the rows so far, and more, as a measurement."""
+        bias, current, reader, _ = np.array([*self.measured.readings, *more], dtype=float).T
+        nothing = np.full(bias.size, np.nan)
+        return Measurement(
+            bias, current, reader, nothing, nothing, medium=self._probe.surroundings.medium
+        )
+
+    def _update(self, *more: Reading) -> None:
+        """Calibrate by the rows so far, and more."""
+        if len(self.measured.readings) + len(more) < self.options.unknown_rows:
+            return
+        try:
+            calibration = calibrate(self.measurement(*more), probe=self._probe, priors=self._priors)
+        except (InputError, ComputationError) as error:
+            self._stopped(f"the lever is not one like the probe: {error}")
+            return
+        if not calibration.describes_data:
+            self._stopped(f"the rows are of no lever like the probe: {calibration.reason}")
+            return
+        self.measured.calibration = calibration
+        self._known = LinearisedLever.of_calibration(calibration)
+
+    # --- where to go ------------------------------------------------------------------------------
+
+    @property
+    def limit_K(self) -> float:
+        """What the tip stays below: as stated, and below the lever's first fold."""
+        branch, circuit = self._known.surrogate.branch, self._known.probe.circuit
+        stated = self.options.stay_below_K
+        if stated == KNEE:
+            stated = branch.knee.tip_K if branch.knee is not None else None
+        limit = np.inf if stated is None else float(stated)
+        whole = branch.read(circuit, np.array([MOST_BIAS]))
+        # a jump from its fold leads to a hot state, or melts the lever
+        first_K = whole.jumps[0][1] if whole.jumps else whole.last_K
+        return min(limit, float(first_K))
+
+    def _limits(self, bias: Array) -> Array:
+        known = self._known
+        return hottest_tips(known, bias[bias <= known.highest_V], known.information)
+
+    def _is_safe(self, bias_V: float) -> bool:
+        limits = self._limits(np.array([bias_V]))
+        return bool(limits.size and limits[0] < self.limit_K)
+
+    def _next_step(self) -> Step | None:
+        """Return what to take next; None, with the reason, if nothing."""
+        last_V = max((reading.bias_V for reading in self.measured.readings), default=0.0)
+        if self.measured.reason:
+            return None
+        if len(self.measured.readings) == self._bias.size:
+            self._stopped(f"all {self._bias.size} rows are taken", complete=True)
+            return None
+        bias = self._proposed(last_V) if self._proposes else self._wanted(last_V)
+        if bias is None:
+            return None
+        tip, _ = self._known.tip(np.array([bias]))
+        return Step(bias, float(tip[0]), float(self._limits(np.array([bias]))[0]))
+
+    @property
+    def _proposes(self) -> bool:
+        return self.options.propose and self.measured.calibration is not None
+
+    def _wanted(self, last_V: float) -> float | None:
+        """Return the next wanted bias (V), or the highest that is safe before it."""
+        finest = self.options.finest * self._spacing
+        above = self._bias[self._bias > last_V + finest]
+        if not above.size:
+            self._stopped(f"{last_V:.4g} V is the highest bias that was wanted", complete=True)
+            return None
+        wanted = float(above[0])
+        if self._is_safe(wanted):
+            return wanted
+        safe, hot = last_V, wanted
+        for _ in range(self.options.halvings):
+            middle = 0.5 * (safe + hot)
+            safe, hot = (middle, hot) if self._is_safe(middle) else (safe, middle)
+        if safe - last_V >= finest:
+            return safe
+        self._stopped(
+            f"the tip might be above {self.limit_K:.0f} K beyond {last_V:.4g} V with more than 1 %",
+            complete=True,
+        )
+        return None
+
+    def _proposed(self, last_V: float) -> float | None:
+        """Return the bias (V) that tells most of those that are safe."""
+        assert self.measured.calibration is not None
+        count = self.options.proposed_of * self._bias.size
+        many = np.linspace(self._bias[0], self._bias[-1], count)
+        # no step goes farther than to the next wanted bias
+        many = many[many <= last_V + self._spacing]
+        try:
+            plan = plan_next(
+                self.measured.calibration,
+                bias=many,
+                count=1,
+                stay_below_K=self.limit_K,
+                allowed={"bias": None},
+            )
+        except HotleverError as error:
+            self._stopped(f"nothing is proposed: {error}")
+            return None
+        return float(plan.proposals.bias_V.values[0])

@@ -1,0 +1,194 @@
+"""A lever driven by a source meter, and measured."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Option
+
+from hotlever.errors import ComputationError, InputError, excerpt, quoted
+from hotlever.files import write_text
+from hotlever.tasks.arguments import (
+    Laws,
+    MeasuredProbe,
+    Physics,
+    Priors,
+    Written,
+    check_medium,
+)
+from hotlever.tasks.common_steps import read_probe
+from hotlever.tasks.parsing import (
+    check_number,
+    parse_bias,
+    parse_priors,
+    parse_temperature,
+    with_laws,
+)
+from hotlever.tasks.reporter import Reporter
+from hotlever.units import setting
+
+if TYPE_CHECKING:
+    from hotlever.instruments.ramp import MeasuredRamp, Step
+    from hotlever.instruments.source_meter import Reading
+    from hotlever.probe import Probe
+
+#: The source that is no instrument.
+TWIN = "twin"
+
+
+def measure_lever(
+    reporter: Reporter,
+    *,
+    source: Annotated[
+        str,
+        Option(
+            metavar="RESOURCE",
+            help="VISA name of the source meter, as TCPIP0::192.168.0.5::5025::SOCKET; or twin, or "
+            "twin:NUMBER for a certain one: no instrument but a solved lever, to try it.",
+        ),
+    ],
+    output: Annotated[
+        Path,
+        Option("-o", "--output", metavar="IV.csv", help="Rows, as they come, to this new file."),
+        Written((".csv",)),
+    ],
+    reader: Annotated[
+        str | None,
+        Option(metavar="RESOURCE", help="VISA name of a voltmeter at the reader; or twin."),
+    ] = None,
+    bias: Annotated[
+        str,
+        Option(metavar="START:STOP:COUNT", help="Wanted biases (V), and the most rows."),
+    ] = "1:11:25",
+    settle: Annotated[
+        str, Option(metavar="TIME", help="Between setting a bias and the row that counts.")
+    ] = "10s",
+    stay_below: Annotated[
+        str | None,
+        Option(
+            metavar="TEMPERATURE",
+            help="Take no bias at which the tip could be hotter with more than 1 % probability, as "
+            "900K; or knee; what melts if left out.",
+        ),
+    ] = None,
+    propose: Annotated[
+        bool, Option("--next", help="Take the biases that hotlever next proposes.")
+    ] = False,
+    compliance: Annotated[
+        str, Option(metavar="CURRENT", help="The most that the source lets through.")
+    ] = "5mA",
+    probe: MeasuredProbe = None,
+    medium: Annotated[
+        str | None, Option(help="vacuum or air; what the probe file says if left out.")
+    ] = None,
+    physics: Physics = None,
+    prior: Priors = None,
+    laws: Laws = None,
+    calibration: Annotated[
+        Path | None,
+        Option(metavar="CAL.json", help="Write the calibration of all rows to this file."),
+        Written((".json",)),
+    ] = None,
+) -> None:
+    """Measure a lever with a source meter, bias by bias, so that its tip stays below a limit.
+
+    Before each bias the rows so far say how hot the tip may get there. The output is turned off at
+    the end, whatever ends it; set the instrument's own limits first all the same.
+    """
+    from hotlever.estimate import calibrate
+    from hotlever.estimate.calibration_summary import calibration_text
+    from hotlever.instruments.curve_file import CurveFile
+    from hotlever.instruments.ramp import KNEE, Ramp, RampOptions
+    from hotlever.instruments.supervisor import Supervisor, Supply
+    from hotlever.measurement import read_measurement_of
+
+    settle_s = 1e-6 * setting(settle, "us", "--settle")
+    check_number("--settle", settle_s, 0.0, 3600.0)
+    limit_mA = setting(compliance, "mA", "--compliance")
+    check_number("--compliance", limit_mA, 1e-3, 100.0)
+    limit_K = stay_below if stay_below == KNEE else parse_temperature(stay_below, "--stay-below")
+    like = read_probe(reporter, probe, physics=physics)
+    check_medium(medium)
+    like = like if medium is None else like.in_medium(medium)
+    priors = parse_priors(with_laws(prior, laws), like)
+    ramp = Ramp(
+        like,
+        parse_bias(bias),
+        RampOptions(stay_below_K=limit_K, settle_s=settle_s, propose=propose),
+        priors,
+    )
+    with (
+        _instruments(reporter, like, source, reader) as (of_source, of_reader),
+        CurveFile(output, like, of_reader is not None) as file,
+    ):
+
+        def record(reading: Reading, step: Step) -> None:
+            file.add(reading)
+            reporter.tell(_row(len(ramp.measured.readings), reading, step))
+
+        supply = Supply(of_source, of_reader, limit_mA)
+        with Supervisor(supply) as instrument:
+            file.comment(f"source: {instrument.identity}")
+            measured = ramp.measure(instrument, record)
+        file.comment(f"ended: {measured.reason}")
+    reporter.give(_result(output, measured))
+    if not measured.complete:
+        raise ComputationError(f"{output}: {len(measured.readings)} rows; {measured.reason}")
+    if calibration is not None:
+        with reporter.progress("calibrate") as update:
+            whole = calibrate(
+                read_measurement_of(like, output, {}), probe=like, priors=priors, progress=update
+            )
+        write_text(calibration, whole.to_json())
+        reporter.give(calibration_text(whole) + "\n")
+
+
+@contextmanager
+def _instruments(
+    reporter: Reporter, probe: Probe, source: str, reader: str | None
+) -> Iterator[tuple[str, str | None]]:
+    """Give the VISA names of the instruments; twins last as long as this context."""
+    kind, _, number = source.partition(":")
+    if kind != TWIN:
+        if reader == TWIN:
+            raise InputError(f"--reader: found {TWIN} at {excerpt(source)}, expected a voltmeter")
+        yield source, reader
+        return
+    if number and not number.isdigit():
+        raise InputError(f"--source: found {quoted(source)}, expected {TWIN} or {TWIN}:NUMBER")
+    if reader not in (None, TWIN):
+        raise InputError(f"--reader: found {quoted(reader)} at a twin, expected {TWIN}")
+    import numpy as np
+
+    from hotlever.instruments.twin import RampCurve, TwinBench, TwinOptions, drawn_from_priors
+
+    seed = int(number) if number else secrets.randbelow(10_000)
+    lever = drawn_from_priors(probe, np.random.default_rng(seed))
+    reporter.note(f"no instrument but a twin: {TWIN}:{seed} is the same one again")
+    with TwinBench(RampCurve.of_probe(lever), TwinOptions(seed=seed)) as twin:
+        yield twin.source, None if reader is None else twin.reader
+        reporter.note(f"the tip of this twin was {twin.hottest_K:.0f} K at its hottest")
+
+
+def _row(number: int, reading: Reading, step: Step) -> str:
+    """Return a row in words."""
+    return (
+        f"{number:3d}  {reading.bias_V:7.4g} V  {reading.current_mA:8.5g} mA   tip expected at "
+        f"{step.tip_K:.0f} K, below {step.tip_limit_K:.0f} K"
+    )
+
+
+def _result(output: Path, measured: MeasuredRamp) -> str:
+    """Return what was measured, in words."""
+    text = f"{len(measured.readings)} rows in {output}: {measured.reason}.\n"
+    if measured.calibration is not None:
+        last = measured.calibration.table.isel(bias=-1)
+        text += (
+            f"At {float(last.bias_V):.4g} V the tip is at {float(last.tip_K):.0f} K, with 95 % "
+            f"between {float(last.tip_low_K):.0f} and {float(last.tip_high_K):.0f} K.\n"
+        )
+    return text

@@ -1,0 +1,117 @@
+"""A lever is measured bias by bias, and its tip stays below a limit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hotlever.errors import InputError
+from hotlever.instruments.curve_file import CurveFile
+from hotlever.instruments.ramp import KNEE, Ramp, RampOptions
+from hotlever.instruments.source_meter import Reading
+from hotlever.instruments.twin import RampCurve, TwinBench, TwinOptions, drawn_from_priors
+from hotlever.lever.lever import COARSE
+from hotlever.measurement import read_measurement
+from hotlever.probe import Probe
+
+PAPER = {"laws": "paper"}
+
+
+class WithoutLine(TwinBench):
+    """Instruments that are called directly."""
+
+    def set_bias(self, bias_V: float) -> None:
+        """Set the bias (V)."""
+        self.output_on, self.bias_V, self.limit_mA = True, bias_V, 10.0
+
+    def read(self) -> Reading:
+        """Return what is shown."""
+        bias, current, reader = self._shown()
+        return Reading(bias, self._noisy(current), self._noisy(reader), False)
+
+
+@pytest.fixture(scope="module")
+def curve() -> RampCurve:
+    true = drawn_from_priors(Probe.reference(), np.random.default_rng(3))
+    return RampCurve.of_probe(true, mesh=COARSE)
+
+
+def ramp(bias, **options) -> Ramp:
+    quick = RampOptions(settle_s=0.0, **options)
+    return Ramp(Probe.reference(), np.asarray(bias, dtype=float), quick, PAPER)
+
+
+def test_the_tip_stays_below_the_limit_and_steps_become_finer_before_it(curve):
+    twin, rows = WithoutLine(curve, TwinOptions(seed=1)), []
+    measuring = ramp([1.5, 3.0, 4.5, 6.0, 7.5], stay_below_K=500.0)
+    measured = measuring.measure(twin, lambda reading, step: rows.append((reading, step)))
+    assert measured.complete
+    assert "might be above 500 K" in measured.reason or "5 rows are taken" in measured.reason
+    assert 400.0 < twin.hottest_K < 500.0
+    assert len(rows) <= 5
+    assert rows[-1][0].bias_V not in (6.0, 7.5)
+    for reading, step in rows:
+        assert curve.at(reading.bias_V)[2] < step.tip_limit_K < 500.0
+    assert measured.calibration is not None
+    known = measured.calibration.table.tip_K.values[-1]
+    assert known == pytest.approx(twin.hottest_K, abs=20.0)
+
+
+def test_the_limit_may_be_the_knee(curve):
+    known = ramp([1.0], stay_below_K=KNEE)
+    branch = known._known.surrogate.branch
+    assert known.limit_K == pytest.approx(branch.knee.tip_K)
+
+
+def test_a_fold_is_a_limit_of_its_own():
+    """Without a series resistor the lever jumps at its knee."""
+    bare = Probe.reference().with_(series_resistance_ohm=0.0)
+    measuring = Ramp(bare, np.linspace(1.0, 8.0, 8), RampOptions(stay_below_K=1300.0), PAPER)
+    branch = measuring._known.surrogate.branch
+    assert measuring.limit_K == pytest.approx(branch.knee.tip_K, abs=1.0)
+
+
+def test_compliance_ends_it_without_the_row(curve):
+    class Limited(WithoutLine):
+        def read(self) -> Reading:
+            return super().read()._replace(at_compliance=self.bias_V > 2.0)
+
+    rows = []
+    measured = ramp([1.0, 1.5, 2.5]).measure(Limited(curve), lambda *row: rows.append(row))
+    assert measured.complete
+    assert "compliance" in measured.reason
+    assert [reading.bias_V for reading, _ in rows] == [1.0, 1.5]
+
+
+def test_rows_of_another_lever_end_it(curve):
+    class Doubled(WithoutLine):
+        def read(self) -> Reading:
+            reading = super().read()
+            return reading._replace(current_mA=5.0 * reading.current_mA)
+
+    measured = ramp([1.0, 2.0, 3.0, 4.0, 5.0]).measure(Doubled(curve), lambda *row: None)
+    assert not measured.complete
+    assert "not one like the probe" in measured.reason
+    assert len(measured.readings) == 3
+
+
+def test_biases_that_do_not_rise_are_refused():
+    for wrong in ([], [0.0, 1.0], [2.0, 1.0], [-1.0]):
+        with pytest.raises(InputError, match="biases that rise"):
+            ramp(wrong)
+
+
+def test_rows_are_on_disk_as_they_come_and_can_be_read(tmp_path):
+    path = tmp_path / "iv.csv"
+    with CurveFile(path, Probe.reference(), with_reader=True) as file:
+        for bias in (1.0, 2.0, 3.0):
+            file.add(Reading(bias, 0.1 * bias, 0.05 * bias, False))
+            assert path.read_text().endswith(f"{bias:g},{0.1 * bias:.9g},{0.05 * bias:.9g}\n")
+    data = read_measurement(path)
+    np.testing.assert_allclose(data.bias_V, [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(data.current_mA, [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(data.reader_V, [0.05, 0.1, 0.15])
+    assert data.series_resistance_ohm == Probe.reference().circuit.series_resistance_ohm
+    assert (data.base_temperature_K, data.medium) == (293.0, "vacuum")
+    with pytest.raises(InputError, match="exists"), CurveFile(path, Probe.reference(), False):
+        pass
