@@ -13,9 +13,9 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.estimate import calibrate, read_calibration
-from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.knee_scaling import curve_of_law, curve_of_model
 from hotlever.estimate.power_law import EQ12, read_power_law
+from hotlever.estimate.summary import calibration_text
 from hotlever.estimate.tip_table import TABLE_COLUMNS
 from hotlever.lever import Lever
 from hotlever.materials.departures import DEPARTURES

@@ -10,8 +10,8 @@ import pytest
 from hotlever import Lever, Probe
 from hotlever.errors import InputError
 from hotlever.estimate import Estimate, Measurement, calibrate, read_calibration, read_power_law
-from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.power_law import EQ12
+from hotlever.estimate.summary import calibration_text
 from hotlever.estimate.tip_table import PulseTiming
 from hotlever.lever.lever import COARSE
 

@@ -12,9 +12,9 @@ import pytest
 from hotlever.estimate import calibrate, read_calibration
 from hotlever.estimate.levers import (
     Setting,
-    calibration_statements,
-    calibrations_csv,
-    compare_calibrations,
+    compare_levers,
+    levers_csv,
+    statements,
     tips_along,
 )
 from hotlever.estimate.power_law import EQ12
@@ -79,7 +79,7 @@ def test_levers_are_compared_where_all_were_measured(calibrations):
     shorter = calibrations["c"].table.isel(bias=slice(0, 60))
     levers = {**calibrations, "c": replace(calibrations["c"], table=shorter)}
     highest = float(shorter.bias_V[-1])
-    table = compare_calibrations(levers)
+    table = compare_levers(levers)
     assert table.bias_V.values.tolist() == [highest] * 3
     tip = table.value.sel(quantity="tip_K")
     for name, each in calibrations.items():
@@ -89,19 +89,19 @@ def test_levers_are_compared_where_all_were_measured(calibrations):
     # beyond its range a lever is not drawn, and the mean is that of the others
     assert np.isnan(tips.tip_K.sel(lever="c").values[-1])
     assert np.isfinite(tips.tip_K.mean("lever").values).all()
-    beyond = compare_calibrations(levers, Setting("bias_V", 9.0))
-    statements = calibration_statements(beyond)
-    assert any("c: 9 V is out of its range, 0.5 to" in text for text in statements)
+    beyond = compare_levers(levers, Setting("bias_V", 9.0))
+    said = statements(beyond)
+    assert any("c: 9 V is out of its range, 0.5 to" in text for text in said)
     assert beyond.counts.sel(quantity="tip_K").values.tolist() == [True, True, False]
 
 
 @pytest.mark.parametrize("converged", [True, False])
 def test_a_lever_that_is_not_described_has_no_numbers(calibrations, converged):
     refused = replace(calibrations["a"], reason="current differs by 5%", converged=converged)
-    table = compare_calibrations({**calibrations, "a": refused})
+    table = compare_levers({**calibrations, "a": refused})
     assert np.isnan(table.value.sel(lever="a")).all()
-    assert "lever a is left out: its data are not described" in calibration_statements(table)
-    row = calibrations_csv(table, {}).splitlines()[1]
+    assert "lever a is left out: its data are not described" in statements(table)
+    row = levers_csv(table, {}).splitlines()[1]
     answer = "false" if converged else "unknown"
     assert row.endswith(f"{answer},{refused.doubt},{refused.measurement.path}")
     assert "a" not in tips_along({"a": refused, "b": calibrations["b"]}, "bias_V").lever

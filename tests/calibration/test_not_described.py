@@ -17,12 +17,12 @@ from hotlever.app import showing
 from hotlever.cli import main
 from hotlever.errors import InputError
 from hotlever.estimate import Estimate, estimator, read_calibration
-from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.diagnosis import Diagnosis
+from hotlever.estimate.summary import calibration_text
 from hotlever.files import json_text
 from hotlever.lever import Branch
 from hotlever.measurement import Measurement
-from hotlever.report.calibration_pages import calibration_page
+from hotlever.report.estimate_pages import calibration_page
 from synthetic_curves import measured_curve, measurement_of
 
 ERRORS = ("tip_stderr_K", "tip_low_K", "tip_high_K")

@@ -11,12 +11,12 @@ import pytest
 from hotlever import figures
 from hotlever.errors import InputError
 from hotlever.estimate import Estimate, calibrate, read_calibration
-from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.knee import IVCurve
+from hotlever.estimate.summary import calibration_text
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
-from hotlever.report.calibration_pages import calibration_page
+from hotlever.report.estimate_pages import calibration_page
 from synthetic_curves import measurement_of
 
 #: A heater that is no longer than its border is wide, all within what a fit may vary: its heat

@@ -10,8 +10,8 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.estimate import calibrate, read_calibration
 from hotlever.estimate import pulses as module
-from hotlever.estimate.calibration_summary import calibration_text
 from hotlever.estimate.power_law import EQ12
+from hotlever.estimate.summary import calibration_text
 from hotlever.estimate.tip_table import PULSE_COLUMNS, PulseTiming
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE

@@ -14,11 +14,11 @@ from hotlever import figures
 from hotlever.errors import InputError
 from hotlever.estimate import Estimate, fit, read_fit
 from hotlever.estimate.estimator import undetermined
-from hotlever.estimate.fit_summary import NEAREST, fit_text, parameter_rows
 from hotlever.estimate.profile import profile_likelihood
 from hotlever.estimate.sampling import sample_posterior
+from hotlever.estimate.summary import NEAREST, fit_text, parameter_rows
 from hotlever.files import json_text
-from hotlever.report.fit_pages import fit_page
+from hotlever.report.estimate_pages import fit_page
 
 EXAMPLE = Path(__file__).parents[2] / "src" / "hotlever" / "examples" / "lever-a.csv"
 FIXED = {"a1": None, "p": None, "delta": None, "a0": None}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from dataclasses import replace
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimate.fit_summary import (
+from hotlever.estimate.levers import (
     INVERSION,
     compare_levers,
     lever_rows,
@@ -129,7 +130,10 @@ def test_a_lever_that_is_not_described_is_left_out_and_named(answer):
     assert data["mean"].equals(before["mean"])
     assert "lever other is left out: its data are not described" in statements(data)
     assert set(next(row for row in lever_rows(data) if row[0] == "other")[1:]) == {""}
-    assert set(levers_csv(data).splitlines()[-1].split(",")) == {"other", ""}
+    (*_, last) = csv.DictReader(levers_csv(data).splitlines())
+    assert last["reason"] == fits["other"].doubt
+    said = ("lever", "describes_data", "reason", "file")
+    assert not any(cell for name, cell in last.items() if name not in said)
     only = compare_levers({"other": fits["other"]})
     assert np.isnan(only["mean"]).all()
     assert statements(only) == ["lever other is left out: its data are not described"]

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import xarray as xr
 
-from hotlever.estimate.fit_summary import lever_rows, statements, table_text
+from hotlever.estimate.levers import lever_rows, levers_text
 from hotlever.estimate.uncertainty import Uncertainty
 from made_up import levers
 
@@ -37,7 +37,7 @@ def test_table_has_units_and_ends_with_mean_and_scatter():
     assert re.fullmatch(r"\d\.\d\d\(\d\d?\)", rows[3][3])
     assert float(rows[6][3]) > 0.1
     table = levers(3)
-    text = table_text(lever_rows(table), statements(table)).splitlines()
+    text = levers_text(table).splitlines()
     assert set(text[4]) == {"-"}
 
 

@@ -24,8 +24,8 @@ from hotlever.app.project import file_stamp
 from hotlever.app.workers import Report
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimate import Estimate, read_calibration, read_fit
-from hotlever.estimate.fit_summary import parameter_rows
-from hotlever.estimate.levers import calibration_rows, compare_calibrations
+from hotlever.estimate.levers import compare_levers, lever_rows
+from hotlever.estimate.summary import parameter_rows
 from hotlever.estimate.tip_table import interpolated
 from hotlever.files import read_json
 from hotlever.lever.transient.waveform import waveform_from_text
@@ -45,8 +45,7 @@ from hotlever.raman.series import Line
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.spectrum_reading import read_file, spectrum_files
 from hotlever.raman.spectrum_tables import corrections_text
-from hotlever.report.calibration_pages import budget_page, calibration_page
-from hotlever.report.fit_pages import fit_page
+from hotlever.report.estimate_pages import budget_page, estimate_page
 from hotlever.report.report_page import Page
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.reporter import Silence
@@ -128,7 +127,9 @@ def groups(report: Report, name: str) -> list[str]:
 
 def result(report: Report, name: str) -> dict[str, Any]:
     """Return what a fit or a calibration file says: its kind, data, doubt and page."""
-    kind, estimate, shown = _result(Path(name), file_stamp(Path(name)))
+    path, stamp = Path(name), file_stamp(Path(name))
+    estimate, shown = _estimate(path, stamp), _page(path, stamp)
+    kind = CALIBRATION if estimate.route else FIT
     blocks = [
         {**block, "figure": svg(block["figure"])} if block["kind"] == "figure" else block
         for block in shown.blocks
@@ -139,7 +140,7 @@ def result(report: Report, name: str) -> dict[str, Any]:
 
 def drawn(report: Report, name: str, figure_name: str, suffix: str) -> bytes:
     """Return a figure of a result as the content of a file."""
-    *_, shown = _result(Path(name), file_stamp(Path(name)))
+    shown = _page(Path(name), file_stamp(Path(name)))
     figure = next(block["figure"] for block in shown.blocks if block.get("name") == figure_name)
     return figure_file(figure, suffix)
 
@@ -268,15 +269,15 @@ def levers(report: Report, names: list[str]) -> dict[str, Any]:
     fits, calibrations = dict[str, Estimate](), dict[str, Estimate]()
     for name in names:
         with suppress(InputError):  # being written, or another kind of file
-            kind, estimate, _ = _estimate(Path(name), file_stamp(Path(name)))
-            (calibrations if kind == CALIBRATION else fits)[Path(name).stem] = estimate
+            estimate = _estimate(Path(name), file_stamp(Path(name)))
+            (calibrations if estimate.route else fits)[Path(name).stem] = estimate
     rows, head = [], ["lever"]
     for lever, fit in fits.items():
         cells = parameter_rows(fit)
         head = ["lever", *(f"{label} ({unit})" if unit else label for label, _, unit, _ in cells)]
         rows.append([lever, *(value for _, value, _, _ in cells), fit.doubt])
     if calibrations:
-        head, *all_rows = calibration_rows(compare_calibrations(calibrations))
+        head, *all_rows = lever_rows(compare_levers(calibrations))
         # what follows from all of them is on their page
         rows = [[*row, calibrations[row[0]].doubt] for row in all_rows if row[0] in calibrations]
     return {"head": [*head, "remark"], "rows": rows}
@@ -292,25 +293,20 @@ def packed(report: Report, paths: list[Path]) -> bytes:
 
 
 @lru_cache(maxsize=2000)
-def _estimate(path: Path, stamp: float) -> tuple[str, Any, Any]:
-    """Return the kind of a result, it, and what makes its page."""
-    if "route" in read_json(path):
-        return CALIBRATION, read_calibration(path), calibration_page
-    return FIT, read_fit(path), fit_page
+def _estimate(path: Path, stamp: float) -> Estimate:
+    return read_calibration(path) if "route" in read_json(path) else read_fit(path)
 
 
 @lru_cache(maxsize=_CACHE_SIZE)
-def _result(path: Path, stamp: float) -> tuple[str, Any, Page]:
-    kind, estimate, paged = _estimate(path, stamp)
-    return kind, estimate, paged(estimate)
+def _page(path: Path, stamp: float) -> Page:
+    return estimate_page(_estimate(path, stamp))
 
 
 def _calibration(name: str) -> Estimate:
-    kind, estimate, _ = _estimate(Path(name), file_stamp(Path(name)))
-    if kind != CALIBRATION:
+    estimate = _estimate(Path(name), file_stamp(Path(name)))
+    if not estimate.route:
         raise InputError(f"{name}: is a fit, expected a calibration")
-    calibration: Estimate = estimate
-    return calibration
+    return estimate
 
 
 def _with_room(values: Array) -> list[float]:

@@ -343,7 +343,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
     Parameters
     ----------
     levers : xarray.Dataset
-        From `hotlever.estimate.fit_summary.compare_levers`; without what was held.
+        From `hotlever.estimate.levers.compare_levers`; without what was held.
     """
     count = levers.sizes["lever"]
     many = count > MOST_NAMES
@@ -450,7 +450,7 @@ def calibrated_levers(calibrations: Mapping[str, Estimate], levers: xr.Dataset) 
     calibrations : mapping of str to Estimate
         By lever; those whose data are not described are left out.
     levers : xarray.Dataset
-        From `hotlever.estimate.levers.compare_calibrations`.
+        From `hotlever.estimate.levers.compare_levers`.
     """
     along, count = levers.attrs["along"], levers.sizes["lever"]
     tips, many = tips_along(calibrations, along), count > len(LINES)

@@ -12,7 +12,7 @@ import xarray as xr
 
 from hotlever import figures
 from hotlever.estimate import Estimate, calibrate
-from hotlever.estimate.calibration_summary import calibration_parts
+from hotlever.estimate.summary import calibration_parts
 from hotlever.estimate.tip_table import rms
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes

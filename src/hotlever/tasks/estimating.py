@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -66,7 +66,6 @@ if TYPE_CHECKING:
     from hotlever.estimate.uncertainty import Uncertainty
     from hotlever.measurement import Measurement
     from hotlever.probe import Probe
-    from hotlever.report.report_page import Page
 
 #: Points of a curve that is shown while a fit goes on.
 _DRAWN = 200
@@ -141,8 +140,8 @@ def fit_files(
     command again goes on where it was stopped.
     """
     from hotlever.estimate import FitOptions, fit
-    from hotlever.estimate.fit_summary import fit_text
     from hotlever.estimate.many import fit_many
+    from hotlever.estimate.summary import fit_text
     from hotlever.measurement import parse_columns, read_measurement_of
     from hotlever.probe.priors import is_of_laws
 
@@ -174,7 +173,7 @@ def fit_files(
     if several:
         levers = _Levers(data, column, output, report, processes, scheduler, "fits", LEVERS_TABLE)
         make = partial(fit_many, probe=like, options=options)
-        return _estimate_several(reporter, levers, make, _of_fits)
+        return _estimate_several(reporter, levers, make)
     (path,) = data
     drive = read_drive(step, pulse, period, count, ramp, sine, waveform)
     measurement = read_measurement_of(like, path, parse_columns(column or []), drive)
@@ -205,7 +204,7 @@ def fit_files(
     if output is not None:
         write_text(output, (uncertainty or result).to_json())
     if report is not None:
-        from hotlever.report.fit_pages import fit_page
+        from hotlever.report.estimate_pages import fit_page
 
         texts.append(f"report: {fit_page(result, uncertainty).write(report)}")
     reporter.give("\n".join([*texts, ""]))
@@ -322,11 +321,11 @@ def calibrate_files(
     command again goes on where it was stopped.
     """
     from hotlever.estimate import calibrate, read_fit
-    from hotlever.estimate.calibration_summary import calibration_text
     from hotlever.estimate.levers import Setting
     from hotlever.estimate.many import calibrate_many
     from hotlever.estimate.options import UNKNOWN_MEDIUM
     from hotlever.estimate.power_law import read_power_law
+    from hotlever.estimate.summary import calibration_text
     from hotlever.estimate.uncertainty_budget import check_budget_of
     from hotlever.measurement import parse_columns, read_measurement_of
 
@@ -365,8 +364,8 @@ def calibrate_files(
         levers = _Levers(
             data, column, output, report, processes, scheduler, "calibrations", CALIBRATIONS_TABLE
         )
-        summarise = partial(_of_calibrations, budget_at, table_options)
-        return _estimate_several(reporter, levers, partial(calibrate_many, **how), summarise)
+        make = partial(calibrate_many, **how)
+        return _estimate_several(reporter, levers, make, budget_at, table_options)
     (path,) = data
     measurement = read_measurement_of(like, path, parse_columns(column or []))
     reporter.tell_table(measurement.understood)
@@ -406,7 +405,7 @@ def _table_options(by: str, step: str | None) -> dict[str, Any]:
 
 def _write_pages(result: Estimate, folder: Path) -> Path:
     """Write the page of a calibration, and that of its uncertainty budget; return the former."""
-    from hotlever.report.calibration_pages import budget_page, calibration_page
+    from hotlever.report.estimate_pages import budget_page, calibration_page
 
     page = calibration_page(result)
     if result.gum is not None:
@@ -590,29 +589,12 @@ class _Levers:
     table: str
 
 
-@dataclass(frozen=True)
-class _Summary:
-    """What is told of the results of a batch together.
-
-    Attributes
-    ----------
-    text : str
-    page : callable
-        Makes the report page.
-    files : dict of str to str
-        Texts by the names of files beside the results.
-    """
-
-    text: str
-    page: Callable[[], Page]
-    files: dict[str, str] = field(default_factory=dict)
-
-
 def _estimate_several(
     reporter: Reporter,
     levers: _Levers,
     make: Callable[..., Batch],
-    summarise: Callable[[Batch], _Summary],
+    at: Setting | None = None,
+    table_options: dict[str, Any] | None = None,
 ) -> int:
     """Make a result of each of many measurements and compare them; return the exit status.
 
@@ -624,7 +606,10 @@ def _estimate_several(
     levers : _Levers
     make : callable
         Takes data files, a folder, and how they are worked on: see `estimate_many`.
-    summarise : callable
+    at : Setting, optional
+        Where the tips of calibrations are compared.
+    table_options : dict, optional
+        Of the tables of calibrations for an instrument.
 
     Raises
     ------
@@ -681,13 +666,7 @@ def _estimate_several(
             f"{batch.reused} of {count} levers have their {results} from before, of the same data"
         )
     if batch.results:
-        summary = summarise(batch)
-        texts = [summary.text]
-        for name, text in summary.files.items():
-            write_text(folder / name, text)
-        if report is not None:
-            texts.append(f"report: {summary.page().write(report)}")
-        reporter.give("\n".join([*texts, ""]))
+        _tell_together(reporter, levers, batch, folder, at, table_options)
     for failure in (*map(str, batch.failures.values()), *batch.undescribed.values()):
         reporter.fail(failure)
     return batch.exit_status
@@ -706,40 +685,30 @@ def _is_open(address: str) -> bool:
     return scheme != "tls" and not (host in ("localhost", "::1") or host.startswith("127."))
 
 
-def _of_fits(batch: Batch) -> _Summary:
-    from hotlever.estimate.fit_summary import (
-        compare_levers,
-        lever_rows,
-        levers_csv,
-        statements,
-        table_text,
-    )
-    from hotlever.report.fit_pages import levers_page
+def _tell_together(
+    reporter: Reporter,
+    levers: _Levers,
+    batch: Batch,
+    folder: Path,
+    at: Setting | None,
+    table_options: dict[str, Any] | None,
+) -> None:
+    """Write and say what the estimates of many levers say together.
 
-    table = compare_levers(batch.results)
-    files = {LEVERS_TABLE: levers_csv(table)}
-    text = table_text(lever_rows(table), statements(table))
-    return _Summary(text, lambda: levers_page(batch), files)
+    Each calibration has its table for an instrument beside it, by these options.
+    """
+    from hotlever.estimate.levers import compare_levers, levers_csv, levers_text
 
-
-def _of_calibrations(at: Setting | None, table: dict[str, Any], batch: Batch) -> _Summary:
-    from hotlever.estimate.levers import (
-        calibrations_csv,
-        calibrations_text,
-        compare_calibrations,
-    )
-
-    levers = compare_calibrations(batch.results, at)
-    files, without = {CALIBRATIONS_TABLE: calibrations_csv(levers, batch.failures)}, []
-    for name, each in batch.results.items():
+    compared = compare_levers(batch.results, at)
+    texts = [levers_text(compared)]
+    write_text(folder / levers.table, levers_csv(compared, batch.failures))
+    for name, each in batch.results.items() if table_options is not None else ():
         try:
-            files[f"{name}{TABLE}"] = each.table_csv(**table)
+            write_text(folder / f"{name}{TABLE}", each.table_csv(**table_options or {}))
         except InputError as error:
-            without.append(f"{name}: {error}")
+            texts.append(f"{name}: {error}")
+    if levers.report is not None:
+        from hotlever.report.estimate_pages import levers_page
 
-    def page() -> Page:
-        from hotlever.report.calibration_pages import calibrations_page
-
-        return calibrations_page(batch, levers)
-
-    return _Summary("\n".join([calibrations_text(levers), *without]), page, files)
+        texts.append(f"report: {levers_page(batch, compared).write(levers.report)}")
+    reporter.give("\n".join([*texts, ""]))

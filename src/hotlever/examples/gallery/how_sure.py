@@ -1,7 +1,7 @@
 """How sure is my tip temperature?"""
 
 from hotlever import calibrate, figures, save_figure
-from hotlever.estimate.calibration_summary import calibration_text
+from hotlever.estimate.summary import calibration_text
 
 calibration = calibrate("src/hotlever/examples/lever-a.csv")
 print(calibration_text(calibration))

@@ -12,8 +12,8 @@ import xarray as xr
 from hotlever import figures
 from hotlever import spieser2017 as paper
 from hotlever.estimate import Estimate, Measurement, fit
-from hotlever.estimate.fit_summary import parameter_rows
 from hotlever.estimate.power_law import EQ12, PowerLaw, fit_power_law
+from hotlever.estimate.summary import parameter_rows
 from hotlever.figures import correlation_matrix, judged_calibrations, raman_check, thermometry
 from hotlever.lever import Lever
 from hotlever.lever.fields import heater_profile
@@ -21,7 +21,7 @@ from hotlever.materials import PARAMETERS, PUBLISHED
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import MeshOptions
 from hotlever.raman import Thermometer, calibrate_from, measure, read_lines, read_spectra
-from hotlever.report.fit_pages import add_fit
+from hotlever.report.estimate_pages import add_fit
 from hotlever.report.reproduce.findings import MANY, Findings, example
 from hotlever.spieser2017 import NOMINAL_DOPING
 from hotlever.steps import each

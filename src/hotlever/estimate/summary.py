@@ -1,19 +1,30 @@
-"""The summary of a calibration, as lines of text."""
+"""An estimate in words and tables: its parameters, its tip, and what data leave open."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.fit_summary import NEAREST, prior_lines
 from hotlever.estimate.tip_table import BUDGETS, PulseCalibration, budgets_of
 from hotlever.estimate.uncertainty_budget import TemperatureBudget
-from hotlever.text import aligned, significant, value_with_error
+from hotlever.materials.parameters import scale_of, scaled_unit
+from hotlever.probe.priors import PriorUse
+from hotlever.probe.probe_parameters import parameters_of
+from hotlever.text import NOT_DETERMINED, aligned, significant, value_with_error
 from hotlever.types import Array
 
+#: A prior is named as leaned on where its data narrow it to no less than this share, and as moved
+#: where they move it by so many of its standard deviations.
+_LEANED_ON, _LARGE_SHIFT = 0.9, 1.0
+#: What the numbers of a fit are that does not describe its data.
+NEAREST = (
+    "what follows is of the lever that comes nearest, and no estimate: errors are not stated, "
+    "since they would not hold"
+)
 #: Caption of the temperatures at a contact.
 _OF_THE_APEX = (
     "in contact: the apex with its error by source, and the surface of the sample under it"
@@ -44,6 +55,78 @@ _ADVICE = {
 }
 #: Errors (K) up to which a calibration is called good, and fair.
 _GOOD, _FAIR = 15.0, 40.0
+
+
+# --- of the parameters --------------------------------------------------------------------------
+
+
+def parameter_rows(fit: Estimate) -> list[tuple[str, str, str, str]]:
+    """Return name, value with error, unit and a remark for each parameter of a fit."""
+    rows, declared = [], parameters_of(fit.probe, in_time=True)
+    for name, fitted in fit.parameters.items():
+        stderr, remark = fitted.stderr, "" if fitted.vary else "fixed"
+        if fitted.vary and stderr is None:
+            stderr, remark = np.nan, "no error"
+        value = value_with_error(fitted.value, stderr, scale_of(name), declared[name].bounds)
+        rows.append((name, value, scaled_unit(name), remark))
+    return rows
+
+
+def conclusions(fit: Estimate) -> list[str]:
+    """Say what follows from the parameters of a fit, and how well it describes the data."""
+    lines = [_tip_in_time(fit.band)] if fit.in_time else []
+    if np.isfinite(fit.inversion_temperature_K):
+        inversion = value_with_error(
+            fit.inversion_temperature_K, fit.inversion_temperature_stderr_K
+        )
+        unit = "" if inversion == NOT_DETERMINED else " K"
+        lines.append(f"inversion temperature: {inversion}{unit}")
+    rms = []
+    for column, value in fit.residual_rms.items():
+        name, _, unit = column.rpartition("_")
+        rms.append(f"{name} {value:.3g} {unit}")
+    return [
+        *lines,
+        f"rms of data - model: {', '.join(rms)}",
+        f"fitted to {', '.join(fit.observables)} in {fit.steps} steps, {fit.seconds:.1f} s",
+    ]
+
+
+def _tip_in_time(band: xr.Dataset) -> str:
+    """Say how hot the tip became."""
+    hottest, last = (
+        f"{value_with_error(row.tip_K.item(), row.tip_stderr_K.item())} K after "
+        f"{row.time_us.item():.4g} µs"
+        for row in (band.isel(time=band.tip_K.argmax("time")), band.isel(time=-1))
+    )
+    if hottest == last:
+        return f"tip temperature: {last}, at its hottest and last"
+    return f"tip temperature: {hottest}, at its hottest, {last}, at last"
+
+
+def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:
+    """Say which priors an answer leans on, and which the data moved far."""
+    leaned = [name for name, use in priors.items() if use.spread_ratio > _LEANED_ON]
+    shifts = [
+        f"{name} by {use.shift:+.1f} σ to {use.posterior_value:.4g}"
+        for name, use in priors.items()
+        if abs(use.shift) > _LARGE_SHIFT
+    ]
+    lines = {
+        "moved by the data beyond what was known before": shifts,
+        "as known before, since the data do not tell": leaned,
+    }
+    return [f"{text}: {', '.join(names)}" for text, names in lines.items() if names]
+
+
+def fit_text(fit: Estimate) -> str:
+    """Return the result of a fit as lines of text; first that it describes no data, if so."""
+    lines = [] if fit.describes_data else [fit.doubt, NEAREST]
+    lines += [*aligned(parameter_rows(fit)), *conclusions(fit), *prior_lines(fit.priors)]
+    return "\n".join(lines)
+
+
+# --- of the tip ---------------------------------------------------------------------------------
 
 
 class Parts(NamedTuple):

@@ -1,0 +1,399 @@
+"""The report pages of estimates: of a fit with how sure it is, of a calibration, of many levers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+
+from hotlever import figures
+from hotlever.errors import InputError
+from hotlever.estimate.estimate import Estimate
+from hotlever.estimate.gum import Budget, InputQuantity
+from hotlever.estimate.levers import law_rows, lever_rows, statements
+from hotlever.estimate.many import Batch
+from hotlever.estimate.summary import (
+    NEAREST,
+    calibration_parts,
+    conclusions,
+    linear_words,
+    parameter_rows,
+)
+from hotlever.estimate.tip_table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, even_rows
+from hotlever.estimate.uncertainty import Uncertainty
+from hotlever.estimate.uncertainty_budget import TemperatureBudget
+from hotlever.lever import Lever
+from hotlever.materials.parameters import INVERSION, sentence
+from hotlever.quantities import QUANTITIES
+from hotlever.report.report_page import Block, Page
+from hotlever.text import significant, with_unit
+from hotlever.types import Array
+
+#: Points of a curve without visible corners.
+_POINTS = 110
+#: Rows of a calibration's table that are shown, about.
+_ROWS = 15
+#: Rows of an uncertainty budget that the page of a calibration shows, the others together.
+_CONTRIBUTIONS = 10
+_HEAD = ["quantity", "estimate", "u", "type", "distribution", "sensitivity", "in K", "dof"]
+
+
+def estimate_page(
+    estimate: Estimate,
+    uncertainty: Uncertainty | None = None,
+    added: Callable[[Block], None] | None = None,
+) -> Page:
+    """Return the report page of an estimate, and of what was sampled and profiled of it.
+
+    It takes a second; ``added`` is called with each block as soon as it is there.
+    """
+    if estimate.route:
+        return calibration_page(estimate, added)
+    return fit_page(estimate, uncertainty, added)
+
+
+# --- of a fit -----------------------------------------------------------------------------------
+
+
+def fit_page(
+    fit: Estimate,
+    uncertainty: Uncertainty | None = None,
+    added: Callable[[Block], None] | None = None,
+) -> Page:
+    """Return the report page of one fit, and of what was sampled and profiled of it.
+
+    It takes a second; ``added`` is called with each block as soon as it is there.
+    """
+    page = Page(
+        f"Fit of {fit.measurement.path}",
+        f"Material parameters of a {fit.probe.shape.shape} lever from its measured "
+        f"{', '.join(fit.observables)}.",
+        added,
+    )
+    add_fit(page, fit)
+    if uncertainty is not None:
+        _add_uncertainty(page, uncertainty)
+    return page
+
+
+def add_fit(page: Page, fit: Estimate) -> None:
+    """Add tables and figures of a fit to a page."""
+    if not fit.describes_data:
+        page.sentences(fit.doubt, NEAREST)
+    page.table(
+        ("parameter", "value", "unit", ""),
+        parameter_rows(fit),
+        "Material parameters; standard errors in units of the last digits."
+        if fit.describes_data
+        else "Material parameters of the nearest lever.",
+    )
+    page.sentences(*fit.notes)
+    page.text(f"{'; '.join(conclusions(fit))}.")
+    (_draw_in_time if fit.in_time else _draw_at_rest)(page, fit)
+
+
+def _draw_at_rest(page: Page, fit: Estimate) -> None:
+    measured = fit.measurement.dataset(fit.probe.circuit)
+    # solved once for both
+    lever = Lever(fit.probe)
+    touches = fit.probe.contact is not None
+    model = fit.model().sortby("bias") if touches else lever.sweep(measured.bias.values)
+    page.figure(
+        "fit_data_and_model",
+        figures.data_and_model(measured, model, fit.observables),
+        "Measured and modelled observables against bias, and their difference. "
+        "Grey: the stated error of the measured temperature.",
+    )
+    _add_correlation(page, fit)
+    page.figure(
+        "fit_tip_band",
+        figures.tip_band(fit.band, measured),
+        "The tip temperature that the fit predicts, with the band that follows from the "
+        "covariance of the parameters (model errors not included)."
+        if fit.describes_data
+        else "The tip temperature of the nearest lever, which is no estimate.",
+    )
+    low, high = measured.bias.values[[0, -1]].tolist()
+    curve = lever.sweep(np.linspace(low, high, _POINTS))
+    page.figure(
+        "fit_iv",
+        figures.iv_curves({"model": curve}, measured=measured),
+        "Heater current against lever voltage.",
+    )
+    if not fit.probe.circuit.starts_cold:
+        return
+    base = fit.probe.circuit.base_temperature_K
+    page.figure(
+        "fit_temperature_power",
+        figures.temperature_power(curve, measured=measured, base_temperature_K=base),
+        "Tip temperature against the power dissipated in the lever, beside the published law.",
+    )
+
+
+def _add_correlation(page: Page, fit: Estimate) -> None:
+    if len(fit.names) < 2 or not fit.describes_data:
+        return
+    page.figure(
+        "fit_correlation",
+        figures.correlation_matrix(fit.names, fit.correlation, fit.probe.title),
+        "Correlation of the fitted parameters.",
+    )
+
+
+def _draw_in_time(page: Page, fit: Estimate) -> None:
+    measured = fit.measurement.dataset(fit.probe.circuit)
+    page.figure(
+        "fit_in_time",
+        figures.data_and_model(measured, fit.model(), fit.observables, fit.band),
+        "Measured and modelled observables against time, and their difference; and the tip "
+        + (
+            "temperature that the fit predicts, with the 95 % band that follows from the "
+            "covariance of the parameters (model errors not included)."
+            if fit.describes_data
+            else "temperature of the nearest lever, which is no estimate."
+        ),
+    )
+    _add_correlation(page, fit)
+
+
+def _add_uncertainty(page: Page, uncertainty: Uncertainty) -> None:
+    page.heading("How sure")
+    page.sentences(*uncertainty.statements())
+    for caption, columns, rows in uncertainty.tables():
+        page.table(columns, rows, caption)
+    fit = uncertainty.fit
+    if uncertainty.profiles:
+        page.figure(
+            "profiles",
+            figures.profile_curves(list(uncertainty.profiles.values())),
+            "Profile likelihoods: how much worse the fit gets with one parameter held and the "
+            "others fitted again, beside the parabola of the standard error.",
+        )
+    if uncertainty.posterior is not None:
+        optimum = {name: fit.parameters[name].value for name in fit.names}
+        page.figure(
+            "posterior",
+            figures.posterior_corner(
+                uncertainty.posterior, {**optimum, INVERSION: fit.inversion_temperature_K}
+            ),
+            "Posterior of each quantity and pair. Above each histogram: its median and half of "
+            "its 68 % interval.",
+        )
+    if uncertainty.band is not None:
+        page.figure(
+            "tip_band_posterior",
+            figures.tip_band(uncertainty.band, fit.measurement.dataset(fit.probe.circuit)),
+            "Tip temperature that follows from the posterior, against bias and power (model "
+            "errors not included).",
+        )
+
+
+# --- of a calibration ---------------------------------------------------------------------------
+
+
+def calibration_page(calibration: Estimate, added: Callable[[Block], None] | None = None) -> Page:
+    """Return the report page of a calibration, which two sheets of paper hold.
+
+    ``added`` is called with each block as soon as it is there.
+    """
+    described = calibration.describes_data
+    page = Page(f"Calibration of {calibration.measurement.path}", added=added)
+    parts = calibration_parts(calibration)
+    page.sentences("; ".join(parts.before), *parts.after)
+    for caption, (head, *rows) in parts.tables:
+        page.table(head, rows, caption or "The standard error of the tip temperature, by source.")
+    page.figure(
+        "calibration",
+        figures.calibration_curves(calibration),
+        "Tip temperature against power and bias with its 95 % band, the I-V curve with its knee, "
+        "and the standard error by source."
+        if described
+        else "The nearest lever, which is no estimate: tip temperature against power and bias, the "
+        "I-V curve, and what the data differ by.",
+    )
+    names = [
+        name
+        for name in (*TABLE_COLUMNS, *OF_THE_CONTACT)
+        if name in calibration.table and (described or not (name in STATED or "stderr" in name))
+    ]
+    columns = even_rows(calibration.heating, names, "tip_K", fewest=_ROWS)
+    page.table(
+        [f"{QUANTITIES[name].meaning} ({QUANTITIES[name].unit})" for name in names],
+        [[f"{value:.4g}" for value in row] for row in zip(*columns.values(), strict=True)],
+        "Some rows of the table "
+        + ("for the instrument." if described else "of the nearest lever, not for an instrument."),
+    )
+    if calibration.gum is not None:
+        _add_largest(page, calibration.gum)
+    page.sentences(*calibration.notes)
+    return page
+
+
+def budget_page(calibration: Estimate) -> Page:
+    """Return the uncertainty budget of a temperature, with nothing left out.
+
+    Raises
+    ------
+    InputError
+        If the calibration has none.
+    """
+    stated = calibration.gum
+    if stated is None:
+        raise InputError(
+            "an uncertainty budget: expected a calibration that describes its data, by a probe or "
+            "a fit (of a tip or apex at rest; the errors of a pulse by source are in its table)"
+        )
+    budget = stated.budget.largest_first()
+    page = Page(f"Uncertainty budget of {calibration.measurement.path}", one_sheet=True)
+    page.table(
+        ["", ""],
+        [
+            ["measurand", f"{stated.measurand}, at rest"],
+            ["probe", calibration.probe.title],
+            ["estimate", f"{stated.estimate_K:.1f} K"],
+            ["combined standard uncertainty", f"{significant(budget.u)} K"],
+            ["effective degrees of freedom", _dof(budget.dof) or "not known: rows are correlated"],
+            ["coverage factor", f"{budget.coverage_factor():.2f}, for 95 %"],
+            ["expanded uncertainty", f"{significant(budget.expanded())} K"],
+            ["Monte Carlo method", _linear(stated) or "not done"],
+        ],
+        prose=True,
+    )
+    _add_rows(page, budget)
+    if budget.correlation is not None:
+        _add_row_correlation(page, budget, budget.correlation)
+    page.text(
+        "Evaluated after the GUM (JCGM 100:2008), linearised, and checked after JCGM 101:2008. "
+        "Sensitivities are in K per unit of the quantity; u of an infinite number of degrees of "
+        "freedom is taken as exact. No traceability to standards and no accreditation is claimed."
+    )
+    return page
+
+
+def _add_largest(page: Page, stated: TemperatureBudget) -> None:
+    """Add the largest contributions of an uncertainty budget."""
+    budget = stated.budget.largest_first()
+    free = f"{_dof(budget.dof)} effective degrees of freedom, " if np.isfinite(budget.dof) else ""
+    _add_rows(
+        page,
+        budget,
+        f"The uncertainty budget after the GUM (JCGM 100) of the {stated.measurand}, "
+        f"{stated.estimate_K:.1f} K: standard uncertainty {significant(budget.u)} K, {free}"
+        f"k = {budget.coverage_factor():.2f}, expanded uncertainty "
+        f"{significant(budget.expanded())} K (95 %). {_linear(stated)}".rstrip(),
+        most=_CONTRIBUTIONS,
+    )
+
+
+def _linear(stated: TemperatureBudget) -> str:
+    words = linear_words(stated)
+    return words and sentence(words)
+
+
+def _add_rows(page: Page, budget: Budget, caption: str = "", most: int | None = None) -> None:
+    """Add the rows of a budget, but for `most` of them together; with degrees of freedom.
+
+    Of rows that are correlated these would say nothing.
+    """
+    cells = [_cells(row) for row in budget.inputs[:most]]
+    rest = budget.part(np.arange(len(cells), len(budget.inputs)))
+    if rest.inputs:
+        cells.append([f"{len(rest.inputs)} more, together", *[""] * 5, f"{rest.u:.1f}", ""])
+    columns = len(_HEAD) if budget.correlation is None else -1
+    page.table(_HEAD[:columns], [row[:columns] for row in cells], caption)
+
+
+def _cells(row: InputQuantity) -> list[str]:
+    return [
+        row.quantity,
+        with_unit(f"{row.estimate:.4g}", row.unit),
+        with_unit(significant(row.u), row.unit),
+        row.type,
+        row.distribution,
+        with_unit(f"{row.sensitivity:.3g}", _per(row.unit)),
+        f"{row.contribution:.1f}",
+        _dof(row.dof),
+    ]
+
+
+def _dof(dof: float) -> str:
+    return f"{dof:.0f}" if np.isfinite(dof) else "∞" if np.isinf(dof) else ""
+
+
+def _per(unit: str) -> str:
+    """Return the unit of kelvins per another one."""
+    return {"K": "1", "1": "K"}.get(unit, f"K/({unit})" if " " in unit else f"K/{unit}")
+
+
+def _add_row_correlation(page: Page, budget: Budget, correlation: Array) -> None:
+    """Add the correlation of those rows that are not independent of all others."""
+    numbers = np.flatnonzero(np.count_nonzero(correlation, axis=0) > 1)
+    among = correlation[np.ix_(numbers, numbers)]
+    page.table(
+        ["", *(str(number) for number in range(1, numbers.size + 1))],
+        [
+            [
+                f"{number} {budget.inputs[row].quantity}",
+                *(str(round(100.0 * value)) for value in values),
+            ]
+            for number, (row, values) in enumerate(zip(numbers, among, strict=True), start=1)
+        ],
+        "Correlation in hundredths; all other rows are independent of each other and of these.",
+    )
+
+
+# --- of many levers -----------------------------------------------------------------------------
+
+
+def levers_page(batch: Batch, levers: xr.Dataset) -> Page:
+    """Return the report page of many levers, of which one is estimated or more.
+
+    Parameters
+    ----------
+    batch : Batch
+    levers : xarray.Dataset
+        From `hotlever.estimate.levers.compare_levers`.
+    """
+    count, results = levers.sizes["lever"], batch.results.values()
+    by_tip = "tip_K" in levers.quantity
+    if by_tip:
+        page = Page(
+            f"Calibrations of {count} levers",
+            "Tip temperatures of levers from their I-V curves, and where they differ.",
+        )
+    else:
+        observables = " or ".join(sorted({", ".join(fit.observables) for fit in results}))
+        page = Page(
+            f"Fits of {count} levers",
+            f"Material parameters of levers from their measured {observables}.",
+        )
+    page.sentences(*statements(levers))
+    if by_tip:
+        page.figure(
+            "calibrated_levers",
+            figures.calibrated_levers(batch.results, levers),
+            "Tip temperatures of the levers, how far each is from their mean, and what they are "
+            "compared by, with standard errors.",
+        )
+    else:
+        page.figure(
+            "lever_parameters",
+            figures.lever_parameters(levers),
+            "Each fitted parameter by lever, and the inversion temperature that follows.",
+        )
+    head, *rows = lever_rows(levers)
+    page.table(head, rows, "Standard errors in units of the last digits.")
+    if by_tip:
+        head, *rows = law_rows(levers)
+        page.table(head, rows, "Power laws in vacuum.")
+    noted = [*batch.undescribed.items()]
+    noted += [(name, text) for name, each in batch.results.items() for text in each.notes]
+    if noted:
+        page.heading("What single levers say")
+        page.table(("lever", "note"), noted, prose=True)
+    if batch.failures:
+        page.heading("Not estimated")
+        reasons = [(path, str(error)) for path, error in batch.failures.items()]
+        page.table(("file", "reason"), reasons, prose=True)
+    return page
