@@ -49,6 +49,8 @@ def fit_of(
         inversion_temperature_stderr_K=inversion[1],
         describes_data=described,
         doubt="" if described else "no such lever shows these data: current differs by 5%",
+        route="",
+        measurement=SimpleNamespace(path="lever.csv"),
     )
 
 
