@@ -19,7 +19,7 @@ from made_up import levers
 def test_corner_has_units_on_its_axes(tmp_path):
     rng = np.random.default_rng(0)
     data = {
-        name: (("chain", "draw"), scale * rng.normal(5, 1, size=(8, 100)))
+        name: ("draw", scale * rng.normal(5, 1, size=800))
         for name, scale in (("c_kappa", 1.0), ("n_d", 1e17), ("inversion_temperature", 100.0))
     }
     figure = posterior_corner(xr.Dataset(data, coords={"quantity": list(data)}))

@@ -1,7 +1,7 @@
 """The posterior: what data and priors leave of a lever's parameters, and of any quantity of it.
 
 Linearised at the optimum (Laplace's approximation) it is a covariance and what adds up to it;
-sampled, it is a density (`hotlever.estimate.chains`). The profile of a quantity is
+sampled, it is a density (`hotlever.estimate.sampling`). The profile of a quantity is
 `hotlever.estimate.profile`.
 
 A quantity is curved beyond first order in the errors of data and priors. Errors that move an

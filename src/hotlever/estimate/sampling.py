@@ -1,7 +1,6 @@
 """Posterior samples of a fit's parameters or a calibration's tip, and what follows from them.
 
-Sampled with emcee from the density of `hotlever.estimate.posterior`; levers are taken from a
-surrogate.
+They are weighted trials (`hotlever.estimate.trials`); levers are taken from a surrogate.
 """
 
 from __future__ import annotations
@@ -11,28 +10,19 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
-import emcee
 import numpy as np
 import xarray as xr
 
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.estimate.chains import (
-    FEWEST_EFFECTIVE,
-    HIGHEST_RHAT,
-    Chains,
-    Noise,
-    PosteriorDensity,
-    sample,
-    worth,
-)
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP, ExperimentAtRest, Predictor, experiment_of, named
-from hotlever.estimate.objective import Quantity, Subproblem
+from hotlever.estimate.objective import Objective, Quantity, Subproblem
 from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.posterior import Posterior
 from hotlever.estimate.profile import ErrorProfile, hotter_rows
 from hotlever.estimate.surrogate import ReducedSurrogate
+from hotlever.estimate.trials import Noise, Samples, TrialOptions, Trials, draw_samples
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import full_name
 from hotlever.materials.parameters import INVERSION
@@ -105,30 +95,28 @@ class SampledTip:
     ----------
     profile : ErrorProfile
         From the quantiles of 2.5 and 97.5 %.
-    effective_samples, rhat : float
-        Of the tip temperature where it is hottest.
+    effective_samples : float
     """
 
     profile: ErrorProfile
     effective_samples: float
-    rhat: float
 
     @property
     def enough(self) -> bool:
         """Whether the quantiles can be trusted."""
-        return self.rhat < HIGHEST_RHAT and self.effective_samples >= FEWEST_EFFECTIVE
+        return self.effective_samples >= TrialOptions.fewest_effective
 
     @property
     def note(self) -> str:
         """What the limits are from, or why not from these samples."""
-        worth = f"{self.effective_samples:.0f} effective ones, R̂ {self.rhat:.3f}"
+        worth = f"worth {self.effective_samples:.0f} independent ones"
         if self.enough:
             return (
-                f"95 % of the tip temperatures lie between quantiles of posterior samples ({worth})"
+                f"95 % of the tip temperatures lie between quantiles of posterior samples, {worth}"
             )
         return (
-            f"too few posterior samples: {worth}, where {FEWEST_EFFECTIVE} and less than "
-            f"{HIGHEST_RHAT:g} are expected; the limits are those without samples, take more"
+            f"too few posterior samples: {worth}, where {TrialOptions.fewest_effective} are "
+            "expected; the limits are those without samples, take more"
         )
 
 
@@ -146,40 +134,25 @@ def sample_tip(
     """
     objective, at = posterior.objective, posterior.at
     near = Subproblem(objective, at, predictor.others(at), least=_TELLING)
-    density = PosteriorDensity(objective, at, near.values_at)
-    chains = sample(
-        density.log_probability, density.approximation, samples=samples, progress=progress
-    )
-    points, rows = chains.points.reshape(-1, near.origin.size), hotter_rows(at)
-    # a walker stands still where a proposal is refused
-    different, index = np.unique(points, axis=0, return_inverse=True)
+    drawn, rows = draw_samples(Trials(near), samples, progress=progress), hotter_rows(at)
+    # one that counts for much is there several times
+    different, index = np.unique(drawn.points, axis=0, return_inverse=True)
     tips = np.array([near.values_at(point)[TIP, rows] for point in different])[index]
     middle, stderr = np.transpose([posterior.of(Quantity("tip", int(row))) for row in rows])
     low, high = np.percentile(tips, (2.5, 97.5), axis=0)
-    hottest = tips[:, -1].reshape(chains.points.shape[:3])
     return SampledTip(
         ErrorProfile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),
-        *worth(hottest),
+        drawn.effective,
     )
 
 
 # --- the parameters of a fit --------------------------------------------------------------------
 
 
-def _density_at(fit: Estimate, probe: Probe, noise: Noise) -> tuple[PosteriorDensity, SampledLever]:
-    """Return the density of a fit's parameters, approximated about a probe, and levers near it."""
-    objective = fit.objective(fit.names)
-    residuals = objective.residuals
-    lever = SampledLever.of_fit(fit, probe, residuals.bias, residuals.distance_um)
-    near = Subproblem(objective, lever.at)
-    return PosteriorDensity(objective, lever.at, near.values_at, noise), lever
-
-
 def sample_posterior(
     fit: Estimate,
     *,
-    samples: int = 10_000,
-    walkers: int | None = None,
+    samples: int = 2_000,
     processes: int = 2,
     seed: int = 0,
     noise: Noise = "each",
@@ -191,9 +164,7 @@ def sample_posterior(
     ----------
     fit : Estimate
     samples : int
-        Kept, at least; rounded up to a whole number of steps of all walkers.
-    walkers : int, optional
-        Of each of four independent ensembles; by default 24, or three for each parameter.
+        Trials, and samples that are drawn from them.
     processes : int
         Started by spawn: a script that calls this with more than one needs
         ``if __name__ == "__main__"``. The samples do not depend on their number.
@@ -202,50 +173,50 @@ def sample_posterior(
         One unknown noise scale for each observable (they differ by a factor of ten in real
         data), or one for all scaled residuals, which is what the fit's standard errors assume.
     progress : callable, optional
-        Called with the steps done and their number.
+        Called with the blocks of trials done and their number.
 
     Returns
     -------
     xarray.Dataset
-        On the dimensions ``chain`` and ``draw``: the varied parameters,
-        ``inversion_temperature`` and ``log_probability``; on ``quantity`` (all of these but the
-        last): ``effective_sample_size``, ``rhat``; ``acceptance_fraction``; the coordinate
-        ``ensemble`` of each chain. Attributes give the fixed parameters, the seed, the noise, and
-        by how much the surrogate may be wrong at the outermost samples (``surrogate_error_K``).
+        On the dimension ``draw``: the varied parameters and ``inversion_temperature``, which are
+        named by the coordinate ``quantity``; ``effective_sample_size``. Attributes give the fixed
+        parameters, the seed, the noise, and by how much the surrogate may be wrong at the outermost
+        samples (``surrogate_error_K``).
 
     Raises
     ------
     InputError
         If a number is too small or `noise` unknown, or the fit does not describe its data.
     ComputationError
-        If no start is found or a worker process dies.
+        If no trial finds a lever or a worker process dies.
     """
     if noise not in ("each", "common"):
         raise InputError(f"found noise = {noise!r}, expected 'each' or 'common'")
     fit.need_described("a posterior")
-    at_optimum, _ = _density_at(fit, fit.probe, noise)
-    # with other weights than the fit's, the posterior lies beside the optimum
-    middle = at_optimum.objective.at(fit.probe, at_optimum.approximation.mean)
-    density, lever = _density_at(fit, middle, noise)
-    chains = sample(
-        density.log_probability,
-        density.approximation,
-        samples=samples,
-        walkers=walkers,
-        processes=processes,
-        seed=seed,
-        progress=progress,
-    )
-    objective = density.objective
-    data = _dataset(fit, chains, objective.coordinates.values)
-    points = chains.points.reshape(-1, density.optimum.size)
+    objective = fit.objective(fit.names)
+    trials, lever = _trials_at(fit, objective, fit.probe, noise)
+    if not objective.informed:
+        # with other weights than the fit's, the posterior lies beside the optimum
+        middle = objective.at(fit.probe, trials.optimum)
+        trials, lever = _trials_at(fit, objective, middle, noise)
+    drawn = draw_samples(trials, samples, processes=processes, seed=seed, progress=progress)
+    data = _dataset(fit, drawn, objective.coordinates.values)
     errors = list[float]()
-    for row in _outermost(points):
+    for row in _outermost(drawn.points):
         with suppress(InputError):  # no such lever can be drawn
-            errors.append(lever.error_K(objective.at(middle, points[row])))
+            errors.append(lever.error_K(objective.at(fit.probe, drawn.points[row])))
     error = max(errors, default=np.nan)
     data.attrs |= {"seed": seed, "noise": noise, "surrogate_error_K": error}
     return data
+
+
+def _trials_at(
+    fit: Estimate, objective: Objective, probe: Probe, noise: Noise
+) -> tuple[Trials, SampledLever]:
+    """Return trials with the lever of a probe, and that lever."""
+    residuals = objective.residuals
+    lever = SampledLever.of_fit(fit, probe, residuals.bias, residuals.distance_um)
+    return Trials(Subproblem(objective, lever.at.light), noise), lever
 
 
 def _outermost(points: Array) -> list[int]:
@@ -255,38 +226,22 @@ def _outermost(points: Array) -> list[int]:
     return [int(np.argmin(along)), int(np.argmax(along))]
 
 
-def _dataset(fit: Estimate, chains: Chains, values_of: Callable[[Array], Array]) -> xr.Dataset:
-    ensembles, walkers, draws, _ = chains.points.shape
-    values = values_of(chains.points)
-    columns = {name: values[..., number] for number, name in enumerate(fit.names)}
+def _dataset(fit: Estimate, drawn: Samples, values_of: Callable[[Array], Array]) -> xr.Dataset:
+    columns = dict(zip(fit.names, values_of(drawn.points).T, strict=True))
     silicon, material = fit.probe.heater_silicon, fit.probe.layout().heater.material
     if silicon is not None:
         owned = {full_name(material, own): own for own in ("n_d", "p")}
         sampled = {owned[name]: column for name, column in columns.items() if name in owned}
         if sampled:  # else it is what it was
             columns[INVERSION] = silicon.model_copy(update=sampled).inversion_temperature()
-    sizes, rhat = zip(*map(worth, columns.values()), strict=True)
-    chained = {
-        name: column.reshape(ensembles * walkers, draws)
-        for name, column in (columns | {"log_probability": chains.log_probability}).items()
-    }
     held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
     at_rest = zip(held, fit.probe.values(held).tolist(), strict=True)
     data = labelled(
-        {
-            **chained,
-            "rhat": ("quantity", list(rhat)),
-            "effective_sample_size": ("quantity", list(sizes)),
-            "acceptance_fraction": ((), chains.accepted),
-        },
-        ("chain", "draw"),
-        {
-            "quantity": list(columns),
-            "ensemble": ("chain", np.repeat(np.arange(ensembles), walkers)),
-        },
+        {**columns, "effective_sample_size": ((), drawn.effective)},
+        "draw",
+        {"quantity": list(columns)},
         fixed=", ".join(f"{name} = {value:g}" for name, value in at_rest),
         observables=", ".join(fit.observables),
-        sampler=f"emcee {emcee.__version__}",
         lever=fit.probe.title,
     )
     for name, parameter in parameters_of(fit.probe).items():

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from hotlever.estimate.chains import FEWEST_EFFECTIVE, SETTLED_RHAT
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.profile import profile_likelihood
 from hotlever.estimate.sampling import BAND_QUANTILES, predictive_band, sample_posterior
+from hotlever.estimate.trials import TrialOptions
 from hotlever.files import json_text
 from hotlever.materials.parameters import heading, scale_of
 from hotlever.probe.probe_parameters import parameters_of
@@ -44,8 +44,6 @@ class Marginal:
     mean: float
     standard_deviation: float
     quantiles: dict[str, float]
-    effective_sample_size: float
-    rhat: float
     unit: str
 
 
@@ -99,7 +97,7 @@ class Uncertainty:
         if self.posterior is None:
             return quantities
         for name in self.posterior.quantity.values.tolist():
-            samples, chains = self.posterior[name], self.posterior.sel(quantity=name)
+            samples = self.posterior[name]
             values = np.percentile(samples, BAND_QUANTILES).tolist()
             quantities[name] = Marginal(
                 mean=samples.mean().item(),
@@ -107,8 +105,6 @@ class Uncertainty:
                 quantiles={
                     f"{q:g}": value for q, value in zip(BAND_QUANTILES, values, strict=True)
                 },
-                effective_sample_size=round(chains.effective_sample_size.item(), 1),
-                rhat=round(chains.rhat.item(), 5),
                 unit=samples.attrs["units"],
             )
         return quantities
@@ -126,20 +122,16 @@ class Uncertainty:
             ]
             yield "Confidence intervals of the profile likelihoods.", columns, rows
         if self.posterior is not None:
-            quantities, sizes = self.quantities, self.posterior.sizes
+            quantities = self.quantities
             levels = next(iter(quantities.values())).quantiles
-            columns = ["posterior", *(f"{level} %" for level in levels), "effective samples", "R̂"]
+            columns = ["posterior", *(f"{level} %" for level in levels)]
             rows = [
-                [
-                    heading(name),
-                    *_cells(quantity.quantiles.values(), name),
-                    f"{quantity.effective_sample_size:.0f}",
-                    f"{quantity.rhat:.3f}",
-                ]
+                [heading(name), *_cells(quantity.quantiles.values(), name)]
                 for name, quantity in quantities.items()
             ]
-            count = sizes["chain"] * sizes["draw"]
-            yield f"Quantiles of {count} posterior samples.", columns, rows
+            count, worth = self.posterior.sizes["draw"], self.posterior.effective_sample_size.item()
+            caption = f"Quantiles of {count} posterior samples, worth {worth:.0f} independent ones."
+            yield caption, columns, rows
 
     def text(self) -> str:
         """Return the tables as lines of text."""
@@ -151,10 +143,10 @@ class Uncertainty:
         content = self.fit.content()
         if self.posterior is not None:
             content["posterior"] = {
-                "samples": self.posterior.sizes["chain"] * self.posterior.sizes["draw"],
+                "samples": self.posterior.sizes["draw"],
                 "seed": self.posterior.attrs["seed"],
                 "noise": self.posterior.attrs["noise"],
-                "acceptance_fraction": round(self.posterior.acceptance_fraction.item(), 4),
+                "effective_sample_size": round(self.posterior.effective_sample_size.item(), 1),
                 "quantities": {name: vars(quantity) for name, quantity in self.quantities.items()},
             }
         if self.band is not None:
@@ -208,7 +200,8 @@ def examine(
     InputError
         If a number is too small, or profiles are asked for of the only varied parameter.
     ComputationError
-        If no start for sampling is found, a worker process dies, or the lever cannot be solved.
+        If no trial of the posterior finds a lever, a worker process dies, or the lever cannot be
+        solved.
     """
     processes = processes or PROCESSORS
     curves, posterior, band = {}, None, None
@@ -225,18 +218,13 @@ def examine(
 
 
 def _unsettled(posterior: xr.Dataset) -> list[str]:
-    """Name the quantities whose chains do not agree, or say too little."""
-    rhat, effective = posterior.rhat.values, posterior.effective_sample_size.values
-    names = posterior.quantity.values[
-        (rhat > SETTLED_RHAT) | (effective < FEWEST_EFFECTIVE)
-    ].tolist()
-    if not names:
+    """Say that samples say too little, if they do."""
+    effective, fewest = posterior.effective_sample_size.item(), TrialOptions.fewest_effective
+    if effective >= fewest:
         return []
     return [
-        f"the posterior of {', '.join(names).replace('_temperature', ' temperature')} is not "
-        f"settled: R̂ up to {rhat.max():.3f} (expected at most {SETTLED_RHAT:g}), as few as "
-        f"{effective.min():.0f} effective samples (expected at least {FEWEST_EFFECTIVE}); take "
-        "more samples"
+        f"the posterior is not settled: its samples are worth {effective:.0f} independent ones, "
+        f"expected at least {fewest}; take more samples"
     ]
 
 

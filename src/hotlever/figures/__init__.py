@@ -87,7 +87,7 @@ _FIGURES: dict[str, Callable[[Any], Figure]] = {
     "paper_error reads_at_hottest": raman_check,
     "loss near far": disc_between_planes,
     "moved_nm share_nm": thermoelectric_shift,
-    "log_probability rhat": posterior_corner,
+    "effective_sample_size quantity": posterior_corner,
     "delta_chi_square parabola": lambda profile: profile_curves([profile]),
     "described birge_ratio": lever_parameters,
     "coverage largest_K": judged_calibrations,

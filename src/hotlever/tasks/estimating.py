@@ -71,8 +71,8 @@ if TYPE_CHECKING:
 _DRAWN = 200
 #: The tables of many levers, in the folders of their fits or calibrations.
 LEVERS_TABLE, CALIBRATIONS_TABLE = "levers.csv", "calibrations.csv"
-#: Samples of a posterior, where nothing is said: of a fit, and of a calibration.
-_FIT_SAMPLES, _CALIBRATION_SAMPLES = 10_000, 4_000
+#: Samples of a posterior, where nothing is said.
+_SAMPLES = 2_000
 #: Proposals, unless kinds of measurement are limited.
 _PROPOSALS = 5
 #: What the rows of a table for an instrument are even in, where nothing is said.
@@ -122,7 +122,7 @@ def fit_files(
         bool,
         Option("--posterior", help="Sample the posterior; predict the tip with its band."),
     ] = False,
-    samples: Annotated[int, Option(metavar="N", help="Of the posterior, at least.")] = _FIT_SAMPLES,
+    samples: Annotated[int, Option(metavar="N", help="Of the posterior.")] = _SAMPLES,
     profiles: Annotated[
         bool, Option("--profiles", help="Profile the likelihood of each parameter.")
     ] = False,
@@ -148,7 +148,7 @@ def fit_files(
     several = _check_levers(data, processes, scheduler)
     check_number("--samples", samples, 1, 1_000_000)
     if not posterior:
-        refuse("goes with --posterior", samples=samples != _FIT_SAMPLES)
+        refuse("goes with --posterior", samples=samples != _SAMPLES)
     if several:
         why = "expected a single data file"
         refuse(why, posterior=posterior, profiles=profiles, step=step, pulse=pulse)
@@ -275,9 +275,7 @@ def calibrate_files(
     posterior: Annotated[
         bool, Option("--posterior", help="Take the limits from samples of the posterior.")
     ] = False,
-    samples: Annotated[
-        int, Option(metavar="N", min=1, help="Of the posterior, at least.")
-    ] = _CALIBRATION_SAMPLES,
+    samples: Annotated[int, Option(metavar="N", min=1, help="Of the posterior.")] = _SAMPLES,
     at: Annotated[
         str | None,
         Option(
@@ -331,7 +329,7 @@ def calibrate_files(
 
     several = _check_levers(data, processes, scheduler)
     if not posterior:
-        refuse("goes with --posterior", samples=samples != _CALIBRATION_SAMPLES)
+        refuse("goes with --posterior", samples=samples != _SAMPLES)
     if table is None and not several:
         refuse("goes with --table", table_by=table_by != _EVEN_IN, table_step=table_step)
     check_budget_of(budget_of)
