@@ -100,7 +100,7 @@ def measure_lever(
     the end, whatever ends it; set the instrument's own limits first all the same.
     """
     from hotlever.estimate import calibrate
-    from hotlever.estimate.calibration_summary import calibration_text
+    from hotlever.estimate.summary import calibration_text
     from hotlever.instruments.curve_file import CurveFile
     from hotlever.instruments.ramp import KNEE, Ramp, RampOptions
     from hotlever.instruments.supervisor import Supervisor, Supply
