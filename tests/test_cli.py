@@ -254,7 +254,10 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
         # none of sixty names is alike: those that it ends come first
         (("sweep", "--set", "kind=x"), "'kind' (expected one of: circuit.supply.kind, circuit."),
         (("sweep", "--set", "c_kappa"), "expected NAME=VALUE"),
-        (("sweep", "--set", "c_kappa=high"), "--set c_kappa: found 'high', expected a number"),
+        (
+            ("sweep", "--set", "c_kappa=high"),
+            "--set c_kappa: found 'high', expected a number or thickness",
+        ),
         (("sweep", "--set", "c_kappa=-1"), "expected at least 0.05"),
         (("sweep", "--medium", "water"), "--medium water: expected vacuum or air"),
         (("sweep", "-o", "a.xls"), "expected .csv or .nc"),

@@ -101,6 +101,16 @@ def test_a_voltage_at_compliance_is_found_by_the_current_that_goes_on(branch):
     assert "V_b is clipped at 8 V" in clipped.notes[0]
 
 
+@pytest.mark.parametrize("share", [0.9, 0.5])
+def test_a_bias_set_in_regular_steps_is_clipped_where_the_current_goes_on(branch, share):
+    """The range of its voltmeter ended while the bias rose; it was taken for one that is held."""
+    bias, current = curve(branch, 40, 5e-4)
+    limit = share * bias.max()
+    clipped = without_rows_at_compliance(measurement(np.minimum(bias, limit), current))
+    np.testing.assert_array_equal(clipped.current_mA, current[bias < limit])
+    assert "V_b is clipped" in clipped.notes[0]
+
+
 def test_of_a_voltmeter_that_heats_nothing_its_value_goes_alone(branch):
     bias, current = curve(branch, 30, 1e-3)
     reader = np.minimum(0.02 * bias + 0.004 * bias**2, 0.35)

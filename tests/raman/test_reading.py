@@ -388,3 +388,18 @@ def test_a_line_whose_top_has_no_values_is_saturated(tmp_path, word):
     assert abs(top.peak.centre - 520.7) < 3.0 * top.peak.centre_stderr < 1.0
     # the flanks alone say less of the centre
     assert top.peak.centre_stderr > flank.peak.centre_stderr
+
+
+def test_zeros_at_the_top_of_a_line_are_what_a_detector_writes_beyond_its_range(tmp_path):
+    """They were left out as a cosmic ray is, and the line stood as if it were whole."""
+    x = np.arange(440.0, 600.0, 0.6)
+    y = np.random.default_rng(3).poisson(5.0 + 5000.0 / (1.0 + ((x - 520.7) / 1.6) ** 2))
+    counts = np.where(y > 3500, 0, y)
+    (tmp_path / "top.csv").write_text(
+        "\n".join(f"{place:.3f},{count}" for place, count in zip(x, counts, strict=True))
+    )
+    (line,) = measure(read_spectra([tmp_path]))
+    assert "saturated" in line.flags
+    assert "cosmic-ray" not in line.flags
+    assert line.peak.clipped == pytest.approx((x[y > 3500][0], x[y > 3500][-1]), abs=1e-3)
+    assert abs(line.peak.centre - 520.7) < 3.0 * line.peak.centre_stderr < 1.0

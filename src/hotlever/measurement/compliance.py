@@ -43,6 +43,9 @@ class ComplianceOptions:
         Share of the usual step of the other column within which rows are one.
     regular : float
         Share of a step by which regular steps differ.
+    going_on : float
+        Share of the level rows of what was set in regular steps that differ in the other column,
+        from which on that goes on as if the bias did. What drifts while the bias is held does not.
     multiple : float
         Share of a step by which differences of a coarse column may be off its multiples.
     fewest : int
@@ -59,6 +62,7 @@ class ComplianceOptions:
     finer: float = 10.0
     same: float = 0.3
     regular: float = 0.1
+    going_on: float = 0.4
     multiple: float = 0.15
     fewest: int = 5
     named: int = 8
@@ -158,13 +162,14 @@ def _stops(x: Array, y: Array, level: Mask, options: ComplianceOptions) -> bool:
     steps = steps[steps > options.level * np.ptp(x)]
     if level.sum() < 2 or steps.size < options.fewest - 1:
         return False
-    if _is_regular(y[~level], options) and not _is_regular(x, options):
-        return False  # it was set, and something else was read
     same = options.same * float(np.median(steps))
 
     def different(rows: slice | Mask) -> int:
         return 1 + int(np.sum(np.diff(x[rows]) > same))
 
+    is_set = _is_regular(y[~level], options) and not _is_regular(x, options)
+    if is_set and different(level) < options.going_on * level.sum():
+        return False  # held, while something else was read
     edges = np.flatnonzero(np.diff(level, prepend=False, append=False))
     runs = [slice(first, end) for first, end in edges.reshape(-1, 2).tolist()]
     counts, total = [different(run) for run in runs], different(level)

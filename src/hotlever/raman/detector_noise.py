@@ -140,6 +140,23 @@ def zeros(y: Array) -> slice | None:
     return gap if steps.size and beside > ZEROS_STEPS * np.median(steps) else None
 
 
+def overflows(y: Array) -> Mask:
+    """Zeros that a detector wrote beyond its range: few, at the top of a line.
+
+    Examples
+    --------
+    >>> overflows(np.array([5.0, 40.0, 90.0, 0.0, 0.0, 80.0, 30.0, 5.0, 0.0])).nonzero()[0]
+    array([3, 4])
+    """
+    nothing, hit = y == 0.0, np.zeros(y.size, dtype=bool)
+    base = float(np.median(y[~nothing])) if not nothing.all() else 0.0
+    half = 0.5 * (base + float(y.max(initial=0.0)))
+    for run in runs(nothing):
+        inside = run.start > 0 and run.stop < y.size and _length(run) < ZEROS_MIN_SAMPLES
+        hit[run] = inside and min(y[run.start - 1], y[run.stop]) > half
+    return hit
+
+
 def runs(mask: Mask) -> list[slice]:
     """Runs of True.
 

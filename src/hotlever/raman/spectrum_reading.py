@@ -15,7 +15,7 @@ import numpy as np
 
 from hotlever.errors import InputError
 from hotlever.files import LARGEST_TEXT, read_bytes
-from hotlever.raman.detector_noise import zeros
+from hotlever.raman.detector_noise import overflows, zeros
 from hotlever.raman.lineshape import in_window
 from hotlever.raman.makers import MAKERS, WDF_SIGNATURE, read_makers, refuse_labspec
 from hotlever.raman.spectrum import (
@@ -80,8 +80,10 @@ def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
     names = names_in_file(file.name, [spectrum.name for spectrum in spectra])
     of_file = temperature_in_name(inside.stem)
     for index, (name, spectrum) in enumerate(zip(names, spectra, strict=True)):
-        x, y = _checked(spectrum.x, spectrum.y, str(file.with_name(name)))
-        empty = np.isfinite(spectrum.x) & ~np.isfinite(spectrum.y)
+        empty = ~np.isfinite(spectrum.y) | overflows(np.nan_to_num(spectrum.y))
+        given = np.where(empty, np.nan, spectrum.y)
+        x, y = _checked(spectrum.x, given, str(file.with_name(name)))
+        empty &= np.isfinite(spectrum.x)
         gaps = tuple(np.setdiff1d(spectrum.x[empty], x).tolist())
         stated = (spectrum.temperature, temperature_in_metadata(spectrum.metadata), of_file)
         temperature = next((kelvin for kelvin in stated if kelvin is not None), None)

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.units import NUMBER, bias_setting, setting
@@ -144,7 +144,14 @@ def _as_kind(text: str, kinds: tuple[Any, ...], where: str) -> Any:
         return text
     if StatedLaw in kinds and not NUMBER.fullmatch(text.strip()):
         return text.strip("\"'")  # a formula, or the name of a table's file
-    return parse_number(text, where) if float in kinds else text.strip("\"'")
+    if float not in kinds:
+        return text.strip("\"'")
+    words = [str(word) for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
+    if words and not NUMBER.fullmatch(text.strip()):
+        raise InputError(
+            f"{where}: found {quoted(text)}, expected a number or {' or '.join(words)}"
+        )
+    return parse_number(text, where)
 
 
 def parse_timing(text: str) -> PulseTiming:
