@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimate import Measurement, calibrate
+from hotlever.estimate import Measurement, calibrate, estimator
 from hotlever.estimate.calibration import what_data_lack
 from hotlever.estimate.diagnosis import Diagnosis, _Curve
+from hotlever.estimate.hypotheses import MeasuredRows, hypotheses_of
 from hotlever.estimate.knee import IVCurve
+from hotlever.estimate.options import FitOptions
+from hotlever.estimate.problem import Problem
+from hotlever.estimate.verdict import check_plausible
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
@@ -113,14 +117,59 @@ def test_the_likeliest_cause_is_found_by_the_model(curve, current, probe, questi
 
 
 @pytest.mark.slow
-def test_one_sweep_of_another_lever_is_no_two_sweeps():
+def test_one_sweep_of_another_lever_is_no_two_sweeps(long_u_shape):
     """A U-shape of 120 µm, taken for the reference probe."""
-    lever = Lever(Probe.u_shape().with_(length_um=120.0), COARSE).branch()
-    other = altered_measurement(measured_curve(lever, np.random.default_rng(0)))
-    causes = Diagnosis(other, Probe.reference()).named()
+    causes = Diagnosis(long_u_shape, Probe.reference()).named()
     assert causes.startswith("is the drawing that of another lever, u-shape?")
     assert "sweeps" not in causes
     assert "jump" not in causes
+
+
+@pytest.fixture(scope="module")
+def long_u_shape() -> Measurement:
+    """A U-shape of 120 µm, behind a resistor that the reference probe has too."""
+    lever = Lever(Probe.u_shape().with_(length_um=120.0), COARSE).branch()
+    return altered_measurement(measured_curve(lever, np.random.default_rng(0)))
+
+
+def test_another_lever_is_asked_for_before_one_is_searched_for(long_u_shape, monkeypatch):
+    """It took a minute, and then named two sweeps."""
+    monkeypatch.setattr(estimator, "solve", lambda *_: pytest.fail("a search"))
+    asked = "no lever like the probe shows such currents: is the drawing that of another lever, u-"
+    with pytest.raises(InputError, match=asked):
+        calibrate(long_u_shape, probe=Probe.reference())
+
+
+def test_no_right_lever_is_taken_for_another(curve, long_u_shape):
+    """Neither one that is not the usual one of its shape."""
+    right = Probe.u_shape().with_(length_um=120.0)
+    assert Diagnosis(long_u_shape, right).of_another_lever() == ""
+    assert Diagnosis(altered_measurement(curve), Probe.reference()).of_another_lever() == ""
+
+
+@pytest.mark.parametrize(
+    ("way", "are_two"), [("jittering", False), ("down", False), ("back", True)]
+)
+def test_one_sweep_is_never_asked_to_be_two(way, are_two):
+    bias = np.linspace(0.5, 10.0, 60)
+    bias = {
+        "jittering": bias + 0.3 * np.sin(2.0 * np.arange(60)),
+        "down": bias[::-1],
+        "back": np.append(bias, bias),
+    }[way]
+    rows = MeasuredRows(bias, 0.1 * bias, 5.6, np.ones(bias.size, dtype=bool))
+    questions = [each.asks(20.0) for each in hypotheses_of(rows, Probe.reference(), [])]
+    assert any("two sweeps" in question for question in questions) == are_two
+
+
+@pytest.mark.parametrize("kohm", [2.0, 12.0])
+def test_a_resistor_that_is_hardly_known_may_be_another(curve, kohm):
+    """A cold resistance below the stated resistor alone was refused."""
+    probe = Probe.reference().with_(series_resistance_ohm=1e3 * kohm)
+    priors = {"series_resistance_ohm": "×/ 3"}
+    options = FitOptions(priors=priors, usual_priors=True)
+    problem = Problem.of(altered_measurement(curve), probe, options)
+    check_plausible(problem, Diagnosis(problem.measurement, problem.probe, priors))
 
 
 def test_good_data_have_no_cause(curve):

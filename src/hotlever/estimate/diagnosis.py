@@ -6,7 +6,7 @@ mesh; the likeliest leaves the least unexplained. Only data that contradict a pr
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,7 +17,12 @@ from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimate.hypotheses import Hypothesis, MeasuredRows, hypotheses_of
+from hotlever.estimate.hypotheses import (
+    Hypothesis,
+    MeasuredRows,
+    hypotheses_of,
+    of_another_lever,
+)
 from hotlever.estimate.residuals import Residuals
 from hotlever.estimate.surrogate import CurveSurrogate, Rows
 from hotlever.lever.branch import Reach
@@ -58,6 +63,9 @@ _LEFT_OUT, _UNKNOWN = 1.2, 2.0
 #: A hypothesis has to lower the sum of squares to this share of what it is without, and to no more
 #: than so much for each row and altogether.
 _BETTER, _EACH, _ALTOGETHER = 0.5, 2.0, 10.0
+#: Data that leave so many times that, with all that is known of a lever, are those of another: of
+#: right levers of which little is known the farthest left twice.
+_ANOTHER = 4.0
 #: Hypotheses within a factor or a difference of the best are as likely; so many are named.
 _AS_LIKELY, _AS_LIKELY_BY, _CAUSES_NAMED = 1.3, 4.0, 2
 #: The most promising are solved anew where they lead.
@@ -274,12 +282,34 @@ class Diagnosis:
         """
         if not self._probe.circuit.starts_cold:
             return ""
+        hypotheses = hypotheses_of(self._rows, self._probe, self._curve.names)
+        explanations = self._searched(hypotheses)
+        return self._questions(sorted(map(self._again, explanations[:_AGAIN]), key=_squares))
+
+    def of_another_lever(self) -> str:
+        """Return questions if no lever like the probe is near the data, but one of another drawing.
+
+        Asked before a lever is searched for, since it takes a second or two. What else makes
+        resistances and powers those of another lever is asked with it, if it explains them as well.
+        """
+        if not self._probe.circuit.starts_cold or self._is_near(self._as_stated):
+            return ""
+        drawing, *others = of_another_lever(self._rows, self._probe, self._curve.names)
+        explanations = [] if self._is_near(self._without) else self._searched([drawing])
+        if not explanations or not self._explains(explanations[0]):
+            return ""
+        return self._questions(sorted(explanations + self._searched(others), key=_squares))
+
+    def _searched(self, hypotheses: Sequence[Hypothesis]) -> list[_Explanation]:
+        """Return where searches with hypotheses end, the likeliest first."""
         explanations = []
-        for hypothesis in hypotheses_of(self._rows, self._probe, self._curve.names):
+        for hypothesis in hypotheses:
             with suppress(ComputationError, InputError):  # there may be no such lever
                 explanations.append(self._search(hypothesis))
-        explanations.sort(key=_squares)
-        explanations = sorted(map(self._again, explanations[:_AGAIN]), key=_squares)
+        return sorted(explanations, key=_squares)
+
+    def _questions(self, explanations: Sequence[_Explanation]) -> str:
+        """Return what the likeliest explanations ask; empty if they explain nothing."""
         explanations = [explained for explained in explanations if explained.question]
         best = explanations[0] if explanations else self._without
         if best.squares > _BETTER * self._without.squares or not self._explains(best):
@@ -293,7 +323,12 @@ class Diagnosis:
     @cached_property
     def _without(self) -> _Explanation:
         """What is left unexplained without a hypothesis."""
-        return self._again(self._estimated(Hypothesis(lambda _: ""), 0.0, self._curve))
+        return self._again(self._as_stated)
+
+    @cached_property
+    def _as_stated(self) -> _Explanation:
+        """The same, from the lever that was stated alone."""
+        return self._estimated(Hypothesis(lambda _: ""), 0.0, self._curve)
 
     @cached_property
     def _curve(self) -> _Curve:
@@ -303,7 +338,15 @@ class Diagnosis:
         return _Curve.of(probe, known_beforehand(probe, self._stated))
 
     def _explains(self, explained: _Explanation) -> bool:
-        return explained.squares < _EACH * self._rows.included.size + _ALTOGETHER
+        return explained.squares < self._least_unexplained
+
+    def _is_near(self, explained: _Explanation) -> bool:
+        """Whether a search may explain the data that a coarse lever does not quite."""
+        return explained.squares < _ANOTHER * self._least_unexplained
+
+    @property
+    def _least_unexplained(self) -> float:
+        return _EACH * self._rows.included.size + _ALTOGETHER
 
     def _search(self, hypothesis: Hypothesis) -> _Explanation:
         """Estimate the lever with a hypothesis, from each of its starts; return the best."""

@@ -34,7 +34,7 @@ from hotlever.estimate.tip_temperature import (
     limits_of_range,
 )
 from hotlever.estimate.uncertainty_budget import BudgetOf, check_budget_of, limits_of
-from hotlever.estimate.verdict import check_plausible, no_ramp, verdict_on
+from hotlever.estimate.verdict import check_drawing, check_plausible, no_ramp, verdict_on
 from hotlever.measurement import Measurement, given_measurement, with_measured_circuit
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
@@ -227,6 +227,8 @@ def calibrate(
         causes = Diagnosis(problem.measurement, problem.probe, priors)
         check_plausible(problem, causes)
         check_in_range(at_V, *limits_of_range(problem.measurement, problem.probe))
+        if fit is None:
+            check_drawing(problem, causes)
         try:
             if fit is None:
                 solution = solve(problem, progress)

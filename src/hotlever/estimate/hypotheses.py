@@ -22,6 +22,8 @@ from hotlever.types import Array, Mask
 _LEVEL_ROWS, _BELOW = 2, 5
 #: The range of a meter may be off by such a factor, and its zero by such a share.
 _FACTOR, _OF_THE_ZERO = 50.0, 0.5
+#: A bias that falls by more than this share of its range goes back; less is noise of its meter.
+_BACK = 0.05
 #: The current of one sweep may jump from row to row: by this share of it, and by so many times as
 #: much as usually; rows that tell, and how many jumps are tried.
 _JUMP, _OUTSTANDING, _JUMP_ROWS, _JUMPS_TRIED = 0.01, 5.0, 8, 3
@@ -73,13 +75,22 @@ class Hypothesis:
 
 def hypotheses_of(rows: MeasuredRows, probe: Probe, names: Sequence[str]) -> list[Hypothesis]:
     """Return all that may be wrong; names are those of the parameters that have priors."""
+    return [
+        *of_another_lever(rows, probe, names),
+        *_of_the_meter(rows),
+        *_of_the_rows(rows),
+        _of_the_base(probe),
+    ]
+
+
+def of_another_lever(rows: MeasuredRows, probe: Probe, names: Sequence[str]) -> list[Hypothesis]:
+    """Return what makes resistances and powers those of another lever, from cold on."""
     dimensions = probe.shape.dimensions()
     return [
+        _of_another_drawing(probe),
+        _of_the_medium(probe),
         *_of_units(),
-        *_of_the_meter(rows),
         _of_the_resistor(rows),
-        *_of_the_rows(rows),
-        *_of_the_lever(probe),
         # of those that a user states of a lever
         *(_of_a_parameter(probe, name) for name in names if name in ("n_d", *dimensions)),
     ]
@@ -168,8 +179,9 @@ def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
         return replace(rows, included=(number < cut) == first)
 
     # one sweep is no two; but something may have changed on the way
-    steps = np.diff(bias)
-    monotonic = bool((steps >= 0).all() or (steps <= 0).all())
+    back = _BACK * float(np.ptp(bias))
+    falls, rises = (np.maximum.accumulate(way) - way > back for way in (bias, -bias))
+    monotonic = not (falls.any() and rises.any())
 
     def asks(cut: float) -> str:
         where = f"row {cut + 1:.0f} ({bias[int(cut)]:.3g} V) on"
@@ -181,8 +193,8 @@ def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
         cuts = _jumps(bias, current)
     else:
         # where the bias goes back, or else at some quarter
-        back = (np.flatnonzero(steps < 0)[:1] + 1).tolist()
-        cuts = [*back, *(quarter * number.size // 4 for quarter in (1, 2, 3))]
+        turn = [int(np.argmax(bias[: np.argmax(falls)])) + 1] if falls.any() else []
+        cuts = [*turn, *(quarter * number.size // 4 for quarter in (1, 2, 3))]
     both = [Hypothesis(asks, partial(part, first), starts=cuts) for first in (True, False) if cuts]
     return [*clipped, *both]
 
@@ -207,28 +219,34 @@ def _jumps(bias: Array, current: Array) -> list[int]:
     return [int(row) for row in used[largest[jump[largest] > least] + 2]]
 
 
-def _of_the_lever(probe: Probe) -> list[Hypothesis]:
-    medium, base = probe.surroundings.medium, probe.circuit.base_temperature_K
-    other = "air" if medium == "vacuum" else "vacuum"
+def _of_another_drawing(probe: Probe) -> Hypothesis:
+    """Return that the lever has the usual shape that the probe has not."""
     usual = Probe.reference().shape, Probe.u_shape().shape
     shape = next(each for each in usual if each.shape != probe.shape.shape)
-    return [
-        Hypothesis(
-            lambda _: f"is the lever in {other}, not in {medium}?",
-            probe=lambda probe, _: probe.in_medium(other),
+    return Hypothesis(
+        lambda _: f"is the drawing that of another lever, {shape.shape}?",
+        probe=lambda probe, _: probe.model_copy(
+            update={"shape": shape, "tip": None, "contact": None}
         ),
-        Hypothesis(
-            lambda _: f"is the drawing that of another lever, {shape.shape}?",
-            probe=lambda probe, _: probe.model_copy(
-                update={"shape": shape, "tip": None, "contact": None}
-            ),
-        ),
-        Hypothesis(
-            lambda warmer: f"is the base temperature rather about {base + warmer:.0f} K?",
-            probe=lambda probe, warmer: probe.with_(base_temperature_K=base + warmer),
-            starts=_WARMER,
-        ),
-    ]
+    )
+
+
+def _of_the_medium(probe: Probe) -> Hypothesis:
+    medium = probe.surroundings.medium
+    other = "air" if medium == "vacuum" else "vacuum"
+    return Hypothesis(
+        lambda _: f"is the lever in {other}, not in {medium}?",
+        probe=lambda probe, _: probe.in_medium(other),
+    )
+
+
+def _of_the_base(probe: Probe) -> Hypothesis:
+    base = probe.circuit.base_temperature_K
+    return Hypothesis(
+        lambda warmer: f"is the base temperature rather about {base + warmer:.0f} K?",
+        probe=lambda probe, warmer: probe.with_(base_temperature_K=base + warmer),
+        starts=_WARMER,
+    )
 
 
 def _of_a_parameter(probe: Probe, name: str) -> Hypothesis:

@@ -90,10 +90,13 @@ def check_plausible(problem: Problem, causes: Diagnosis) -> None:
     ratio = cold_kohm / (lever + series)
     if cold_kohm > series and abs(np.log(ratio)) < np.log(_WITHIN):
         return
-    # an owner who knows little of a lever expects no less of it
-    spread = cold_resistance_spread(cold, problem.known) if alone else 0.0
-    if cold_kohm > series and abs(np.log((cold_kohm - series) / lever)) < _UNLIKELY_PULL * spread:
-        return
+    # an owner who knows little of a lever, or of the resistor, expects no less of them
+    if alone:
+        spread = _UNLIKELY_PULL * cold_resistance_spread(cold, problem.known)
+        resistor = problem.known.get("series_resistance_ohm", Prior(1e3 * series, 0.0))
+        least, most = (1e-3 * resistor.at(pull) for pull in (-_UNLIKELY_PULL, _UNLIKELY_PULL))
+        if least + lever * np.exp(-spread) < cold_kohm < most + lever * np.exp(spread):
+            return
     quantity = "V_b / I_h" if alone else "the change of V_b over that of I_h"
     cause = causes.likeliest()
     if not cause and cold_kohm > _OPEN * (lever + series):
@@ -104,6 +107,19 @@ def check_plausible(problem: Problem, causes: Diagnosis) -> None:
         f"{lever + series:.4g} kΩ ({series:g} kΩ in series and {lever:.3g} kΩ of the lever): "
         f"{cause}"
     )
+
+
+def check_drawing(problem: Problem, causes: Diagnosis) -> None:
+    """Refuse data that no lever like the probe is near to, but one of another drawing.
+
+    Raises
+    ------
+    InputError
+        Asking for that drawing, and for what else it may be.
+    """
+    if cause := causes.of_another_lever():
+        where = problem.measurement.path or "measurement"
+        raise InputError(f"{where}: no lever like the probe shows such currents: {cause}")
 
 
 def cold_resistance_spread(probe: Probe, priors: Mapping[str, Prior]) -> float:
