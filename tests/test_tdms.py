@@ -69,7 +69,7 @@ def test_other_files_have_no_groups(tmp_path):
     path = tmp_path / "iv.csv"
     path.write_text("V_b (V),I_h (mA)\n1,0.14\n")
     assert file_groups(path) == []
-    with pytest.raises(InputError, match=r"iv\.csv: is no TDMS file, .* no group 'up'"):
+    with pytest.raises(InputError, match=r"iv\.csv: has no groups, .* no group 'up'"):
         read_measurement(path, {"group": "up"})
 
 

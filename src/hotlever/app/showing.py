@@ -121,7 +121,7 @@ def columns(report: Report, name: str, metadata: Mapping[str, Any]) -> list[File
 
 
 def groups(report: Report, name: str) -> list[str]:
-    """Return the groups of a TDMS file, of which one is a measurement; see `file_groups`."""
+    """Return the groups of a binary file, of which one is a measurement; see `file_groups`."""
     return file_groups(Path(name))
 
 

@@ -25,7 +25,7 @@ _SYMBOLS = {
 }
 #: In place of a quantity: a column that is not used.
 UNUSED = "unused"
-#: In place of a quantity: the group of a TDMS file that the columns are those of.
+#: In place of a quantity: the group of a binary file that the columns are those of.
 GROUP = "group"
 #: µs that a table in time lasts at most, unless one says that it is one: longer ones are slow
 #: sweeps with the time of each row.
@@ -89,7 +89,7 @@ def parse_columns(texts: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     """Parse ``I_h (uA)=Current``: which heading, or number, of a column is which quantity.
 
     ``unused=Current`` is a column that is not used, whatever its heading says, and ``group=up`` the
-    group of a TDMS file that the columns are of. What has no ``=`` is a file of such lines; those
+    group of a binary file that the columns are of. What has no ``=`` is a file of such lines; those
     that start with ``#`` are comments.
 
     Raises

@@ -509,7 +509,7 @@ class FileColumn:
 
 
 def file_groups(path: str | os.PathLike[str]) -> list[str]:
-    """Return the groups of a TDMS file, each a measurement of its own; other files have none.
+    """Return the groups of a binary file, each a measurement of its own; other files have none.
 
     Raises
     ------

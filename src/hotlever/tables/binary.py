@@ -1,54 +1,108 @@
-"""Binary files of instruments, as the lines of a text table.
+"""Binary files of instruments and programs, as the lines of a text table.
 
 Igor Pro's waves (.ibw) have values along a scale of their own, such as a distance, in one column or
 several that may be labelled. LabVIEW's TDMS files have groups of channels, each with properties
-such as its unit. The libraries that read them come with the extras ``hotlever[igor]`` and
-``hotlever[tdms]``.
+such as its unit; HDF5 files, QCoDeS's among them, have groups of datasets with attributes, MATLAB's
+have variables and structures of them, and workbooks (.xlsx) have sheets. Each group, structure and
+sheet is a table of its own. The libraries that read them come with extras (``hotlever[igor]``,
+``hotlever[tdms]``, ``hotlever[hdf5]``, ``hotlever[excel]``).
 """
 
 from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+import zipfile
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice, zip_longest
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from hotlever.errors import InputError, excerpt, quoted, unknown_name
+from hotlever.files import LARGEST_TEXT
 from hotlever.tables.headings import with_units
 from hotlever.tables.table import MOST_LINES, Line, decode
+from hotlever.tables.table import number as decimal
 from hotlever.types import Array
 from hotlever.units import TIMES, conversion, name_and_unit
+
+T = TypeVar("T")
+# The tables of a file by name, whose lines are made when they are asked for.
+Groups = Mapping[str, Callable[[], list[str]]]
 
 #: Content of a TDMS file begins so, that of a wave with the version of the format, in either order
 #: of bytes.
 TDMS = b"TDSm"
 WAVES = tuple(version.to_bytes(2, order) for version in (2, 3, 5) for order in ("little", "big"))
+#: So begin HDF5 files (MATLAB's of version 7.3 behind a block of their own) and MATLAB's before.
+HDF5, MATLAB = b"\x89HDF\r\n\x1a\n", b"MATLAB 5.0 MAT-file"
+_BLOCK = 512
+#: What a packed workbook of Excel's holds.
+_WORKBOOK = b"xl/workbook.xml"
 
 #: Parts of a wave of version 5 whose sizes its header states: data, formula, note, units, labels
 #: and indices.
 _PARTS = 13
-#: What files are called, the extra that brings their library, and this.
-_TDMS, _IGOR = ("TDMS file", "tdms", "npTDMS"), ("Igor wave", "igor", "igor2")
 #: Groups that a question names.
 _MOST_GROUPS = 6
 #: The unit of a channel, as LabVIEW's waveforms and as DAQmx name that property.
 _UNITS = ("unit_string", "NI_UnitDescription")
+#: The same of a dataset of HDF5, as conventions and programs name that attribute.
+_HDF5_UNITS = ("units", "unit", "Units", "Unit")
 #: Time of the first value (s), and between two.
 _OFFSET, _STEP = "wf_start_offset", "wf_increment"
+#: Columns that an array may be; one of more is an image.
+_MOST_COLUMNS = 64
+
+
+@dataclass(frozen=True)
+class _Format:
+    """A format of binary files.
+
+    Attributes
+    ----------
+    what : str
+        A file of it.
+    extra, package : str
+        What brings its library, and this.
+    groups : callable
+        Opens a file's content for as long as a context lasts, and gives its tables.
+    """
+
+    what: str
+    extra: str
+    package: str
+    groups: Callable[[bytes, str], AbstractContextManager[Groups]]
+
+    def read(self, raw: bytes, where: str, take: Callable[[Groups], T]) -> T:
+        """Return what is taken of the tables; errors of the library are those of the input."""
+        try:
+            with self.groups(raw, where) as groups:
+                return take(groups)
+        except ImportError:
+            raise InputError(
+                f"{where}: reading a {self.what} needs the package {self.package}; install it "
+                f"with: pip install 'hotlever[{self.extra}]'"
+            ) from None
+        except InputError:
+            raise
+        except Exception as error:  # whatever a damaged file makes the library raise
+            reason = excerpt(" ".join(str(error).split()), 160) or type(error).__name__
+            raise InputError(f"{where}: not a readable {self.what} ({reason})") from error
 
 
 def lines_of_binary(
     raw: bytes, where: str, group: str | None = None, group_stated_by: str = ""
 ) -> list[Line] | None:
-    """Return comments, header row and rows of a wave or a TDMS file; None of any other file.
+    """Return comments, header row and rows of a binary file; None of any other file.
 
-    Cells are separated by tabs. A TDMS file of several groups needs one of them named, for which
-    an error says how, if there is a way.
+    Cells are separated by tabs. A file of several tables needs one of them named, for which an
+    error says how, if there is a way.
 
     Raises
     ------
@@ -56,48 +110,56 @@ def lines_of_binary(
         If its library is missing, or the file is damaged, too long, no table of numbers, or has
         no such group, or several and none is named.
     """
-    if raw.startswith(TDMS):
-        read = partial(_tdms_lines, group=group, group_stated_by=group_stated_by)
-        return list(enumerate(_read(read, raw, where, *_TDMS), start=1))
-    if group is not None:
-        raise InputError(f"{where}: is no TDMS file, so that it has no group {quoted(group)}")
-    if raw.startswith(WAVES):
-        return list(enumerate(_read(_igor_lines, raw, where, *_IGOR), start=1))
-    return None
+    format_ = _format_of(raw)
+    if format_ is None or format_ is _IGOR:
+        if group is not None:
+            raise InputError(f"{where}: has no groups, and so no group {quoted(group)}")
+        if format_ is None:
+            return None
+    take = partial(_lines_of, where=where, group=group, group_stated_by=group_stated_by)
+    return list(enumerate(format_.read(raw, where, take), start=1))
 
 
 def groups_in(raw: bytes, where: str) -> list[str]:
-    """Return the names of the groups of a TDMS file that have values; of other files, none.
+    """Return the names of the tables of a binary file that has such; of other files, none.
 
     Raises
     ------
     InputError
         As `lines_of_binary`.
     """
-    return _read(_tdms_groups, raw, where, *_TDMS) if raw.startswith(TDMS) else []
+    format_ = _format_of(raw)
+    return [] if format_ in (None, _IGOR) else format_.read(raw, where, list)
 
 
-def _read(
-    read: Callable[[bytes, str], list[str]],
-    raw: bytes,
-    where: str,
-    what: str,
-    extra: str,
-    package: str,
-) -> list[str]:
-    """Return what is read by a library, whose errors become those of the input."""
-    try:
-        return read(raw, where)
-    except ImportError:
+def _format_of(raw: bytes) -> _Format | None:
+    if raw.startswith(TDMS):
+        return _TDMS
+    if raw.startswith(WAVES):
+        return _IGOR
+    if raw.startswith(HDF5) or raw[_BLOCK:].startswith(HDF5):
+        return _HDF5
+    if raw.startswith(MATLAB):
+        return _MATLAB
+    return _EXCEL if raw.startswith(b"PK") and _WORKBOOK in raw else None
+
+
+def _lines_of(groups: Groups, where: str, group: str | None, group_stated_by: str) -> list[str]:
+    """Return the lines of the only table, or of the one that is named."""
+    if not groups:
+        raise InputError(f"{where}: holds no table of numbers")
+    if group is None and len(groups) > 1:
+        some = ", ".join(map(quoted, islice(groups, _MOST_GROUPS)))
+        more = f" and {len(groups) - _MOST_GROUPS} more" if len(groups) > _MOST_GROUPS else ""
+        how = group_stated_by.format(group=excerpt(next(iter(groups))))
         raise InputError(
-            f"{where}: reading a {what} needs the package {package}; install it with: "
-            f"pip install 'hotlever[{extra}]'"
-        ) from None
-    except InputError:
-        raise
-    except Exception as error:  # whatever a damaged file makes the library raise
-        reason = excerpt(" ".join(str(error).split()), 160) or type(error).__name__
-        raise InputError(f"{where}: not a readable {what} ({reason})") from error
+            f"{where}: {len(groups)} groups, each a measurement of its own: {some}{more}; "
+            f"expected {f'one, which {how} says' if how else 'a file of one group'}"
+        )
+    name = next(iter(groups)) if group is None else group
+    if name not in groups:
+        raise unknown_name("group", name, groups, where)
+    return groups[name]()
 
 
 def _check_length(rows: int, where: str) -> None:
@@ -106,6 +168,11 @@ def _check_length(rows: int, where: str) -> None:
 
 
 # --- Igor's waves -------------------------------------------------------------------------------
+
+
+@contextmanager
+def _igor_groups(raw: bytes, where: str) -> Iterator[Groups]:
+    yield {"": partial(_igor_lines, raw, where)}
 
 
 def _igor_lines(raw: bytes, where: str) -> list[str]:
@@ -204,46 +271,23 @@ def _tdms_file(raw: bytes) -> Iterator[Any]:
         console.removeFilter(_refuse)
 
 
-def _tdms_groups(raw: bytes, where: str) -> list[str]:
-    with _tdms_file(raw) as file:
-        return list(_filled_groups(file, where))
+@contextmanager
+def _tdms_groups(raw: bytes, where: str) -> Iterator[Groups]:
+    """Give the groups with values by their names, as these are told.
 
-
-def _tdms_lines(raw: bytes, where: str, group: str | None, group_stated_by: str) -> list[str]:
-    """Return the lines of a group of a TDMS file, which must be named if there are several.
-
-    Each group is a measurement of its own. Where channels are waveforms, and none has the times,
-    a column of these comes first.
+    Where channels are waveforms, and none has the times, a column of these comes first.
     """
     with _tdms_file(raw) as file:
-        groups = _filled_groups(file, where)
-        if group is None and len(groups) > 1:
-            some = ", ".join(map(quoted, islice(groups, _MOST_GROUPS)))
-            more = f" and {len(groups) - _MOST_GROUPS} more" if len(groups) > _MOST_GROUPS else ""
-            how = group_stated_by.format(group=excerpt(next(iter(groups))))
-            raise InputError(
-                f"{where}: {len(groups)} groups, each a measurement of its own: {some}{more}; "
-                f"expected {f'one, which {how} says' if how else 'a file of one group'}"
-            )
-        name = next(iter(groups)) if group is None else group
-        if name not in groups:
-            raise unknown_name("group", name, groups, where)
-        return _lines_of_group(file, groups[name], where)
+        yield {
+            _cell(group.name): partial(_lines_of_group, file, group, where)
+            for group in file.groups()
+            if any(map(len, group.channels()))
+        }
 
 
 def _refuse(record: logging.LogRecord) -> bool:
     """Raise what the library would only print: that a file is cut short, and its values a guess."""
     raise ValueError(record.getMessage())
-
-
-def _filled_groups(file: Any, where: str) -> dict[str, Any]:
-    """Return the groups with values by their names, as these are told."""
-    groups = {
-        _cell(group.name): group for group in file.groups() if any(map(len, group.channels()))
-    }
-    if not groups:
-        raise InputError(f"{where}: no channel has values")
-    return groups
 
 
 def _lines_of_group(file: Any, group: Any, where: str) -> list[str]:
@@ -299,3 +343,231 @@ def _cell(value: Any) -> str:
     return (
         repr(value) if isinstance(value, float) else " ".join(str(value).split()).replace('"', "")
     )
+
+
+# --- HDF5 and MATLAB ----------------------------------------------------------------------------
+
+
+@dataclass
+class _Node:
+    """A group of datasets, or a structure of variables.
+
+    Attributes
+    ----------
+    settings : list of str
+        What is said of it, as comments.
+    columns : dict of int to dict
+        Of so many rows each, by their headings.
+    """
+
+    settings: list[str]
+    columns: dict[int, dict[str, Array]]
+
+    @classmethod
+    def empty(cls, settings: Sequence[str] = ()) -> _Node:
+        """Return one without columns."""
+        return cls(list(settings), defaultdict(dict))
+
+    def add(self, name: str, value: Any, unit: str = "") -> None:
+        """Add what has a name: columns, or a setting; what is neither is said to be left out."""
+        heading = _heading(_cell(name), _cell(unit))
+        values = np.squeeze(np.asarray(value))
+        if values.dtype.kind in "SUO" and values.ndim == 0:
+            self.settings.append(f"# {heading}: {_cell(_decoded(values.item()))}")
+        elif values.dtype.kind not in "iufb" or values.ndim > 2:
+            self.settings.append(f"# left out, no column of real numbers: {heading}")
+        elif values.ndim == 0:
+            self.settings.append(f"# {heading}: {_cell(float(values))}")
+        elif values.ndim == 1:
+            self.columns[values.size][heading] = values.astype(float)
+        elif min(values.shape) <= _MOST_COLUMNS:
+            # a row is as many values as there are columns, whichever way the array lies
+            columns = values if values.shape[0] <= _MOST_COLUMNS < values.shape[1] else values.T
+            for number, column in enumerate(columns, start=1):
+                named = _heading(f"{_cell(name)} {number}", _cell(unit))
+                self.columns[column.size][named] = column.astype(float)
+        else:
+            self.settings.append(f"# left out, an image: {heading}")
+
+    def tables(self, name: str, where: str) -> dict[str, Callable[[], list[str]]]:
+        """Return its tables by name, one for each number of rows."""
+        names = {
+            rows: name if len(self.columns) == 1 else f"{name} ({rows} rows)"
+            for rows in self.columns
+        }
+        return {names[rows]: partial(self._lines, rows, where) for rows in self.columns}
+
+    def _lines(self, rows: int, where: str) -> list[str]:
+        _check_length(rows, where)
+        columns = self.columns[rows]
+        values = zip(*(column.tolist() for column in columns.values()), strict=True)
+        return [*self.settings, "\t".join(columns), *("\t".join(map(repr, row)) for row in values)]
+
+
+def _decoded(text: Any) -> Any:
+    return text.decode("utf-8", errors="replace") if isinstance(text, bytes) else text
+
+
+@contextmanager
+def _hdf5_groups(raw: bytes, where: str) -> Iterator[Groups]:
+    """Give the groups of an HDF5 file that have datasets, and what attributes say of them."""
+    import h5py
+
+    with h5py.File(io.BytesIO(raw), "r") as file:
+        tables: dict[str, Callable[[], list[str]]] = {}
+        _walk_hdf5(file, "/", [], tables, where)
+        yield tables
+
+
+def _walk_hdf5(
+    group: Any,
+    name: str,
+    above: Sequence[str],
+    tables: dict[str, Callable[[], list[str]]],
+    where: str,
+) -> None:
+    """Add the tables of a group, and of those in it."""
+    import h5py
+
+    node = _Node.empty([*above, *_attributes(group)])
+    inner = {}
+    for key in group:
+        # a link may lead nowhere
+        part = group.get(key)
+        if key == "#refs#" or part is None:
+            continue
+        if isinstance(part, h5py.Group):
+            inner[key] = part
+        elif isinstance(part, h5py.Dataset):
+            _add_dataset(node, key, part)
+    tables |= node.tables(name, where)
+    for key, part in inner.items():
+        _walk_hdf5(part, f"{name.rstrip('/')}/{_cell(key)}", node.settings, tables, where)
+
+
+def _add_dataset(node: _Node, key: str, dataset: Any) -> None:
+    units = (_decoded(dataset.attrs[name]) for name in _HDF5_UNITS if name in dataset.attrs)
+    if dataset.dtype.names:
+        # a table of HDF5: its fields are columns
+        for field in dataset.dtype.names:
+            node.add(field, dataset[field])
+    elif dataset.size is None or dataset.size > MOST_LINES * _MOST_COLUMNS:
+        node.settings.append(f"# left out, too large: {_cell(key)}")
+    elif _decoded(dataset.attrs.get("MATLAB_class", b"")) == "char":
+        node.add(key, "".join(map(chr, np.ravel(dataset[()]).tolist())))
+    else:
+        node.add(key, dataset[()], str(next(units, "")))
+
+
+def _attributes(group: Any) -> list[str]:
+    """Return what the attributes of a group say, as comments."""
+    node = _Node.empty()
+    for key, value in group.attrs.items():
+        if np.size(value) == 1:
+            node.add(key, value)
+    return node.settings
+
+
+@contextmanager
+def _matlab_groups(raw: bytes, where: str) -> Iterator[Groups]:
+    """Give the variables of a MATLAB file, and its structures, each a table of its own."""
+    from scipy.io import loadmat
+
+    content = loadmat(io.BytesIO(raw), simplify_cells=True)
+    tables: dict[str, Callable[[], list[str]]] = {}
+    _walk_matlab(content, "/", [], tables, where)
+    yield tables
+
+
+def _walk_matlab(
+    content: Mapping[str, Any],
+    name: str,
+    above: Sequence[str],
+    tables: dict[str, Callable[[], list[str]]],
+    where: str,
+) -> None:
+    """Add the tables of a structure, and of those in it."""
+    node, inner = _Node.empty(above), dict[str, Mapping[str, Any]]()
+    for key, value in content.items():
+        if key.startswith("__"):
+            continue
+        parts = value if isinstance(value, list | np.ndarray) else [value]
+        if len(parts) and all(isinstance(part, dict) for part in parts):
+            many = len(parts) > 1
+            inner |= {f"{key}({n})" if many else key: part for n, part in enumerate(parts, start=1)}
+        else:
+            node.add(key, value)
+    tables |= node.tables(name, where)
+    for key, part in inner.items():
+        _walk_matlab(part, f"{name.rstrip('/')}/{key}", node.settings, tables, where)
+
+
+# --- workbooks ----------------------------------------------------------------------------------
+
+
+@contextmanager
+def _excel_groups(raw: bytes, where: str) -> Iterator[Groups]:
+    """Give the sheets of a workbook that hold numbers, hidden ones too."""
+    import openpyxl
+
+    with zipfile.ZipFile(io.BytesIO(raw)) as parts:
+        size = sum(part.file_size for part in parts.infolist())
+    if size > LARGEST_TEXT:
+        raise InputError(
+            f"{where}: {size / 1e6:.3g} MB unpacked, expected at most {LARGEST_TEXT / 1e6:.3g} MB"
+        )
+    values = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
+    formulas = openpyxl.load_workbook(io.BytesIO(raw), read_only=True)
+    try:
+        yield {
+            _cell(sheet.title): partial(_sheet_lines, sheet, formulas[sheet.title], where)
+            for sheet in values.worksheets
+            if any(isinstance(cell, int | float) for row in _cells(sheet) for cell in row)
+        }
+    finally:
+        values.close()
+        formulas.close()
+
+
+def _cells(sheet: Any) -> Iterator[Sequence[Any]]:
+    rows: Iterator[Sequence[Any]] = sheet.iter_rows(values_only=True)
+    return rows
+
+
+def _sheet_lines(sheet: Any, formulas: Any, where: str) -> list[str]:
+    """Return the rows of a sheet that are not empty.
+
+    Raises
+    ------
+    InputError
+        If a formula has no value, which a program that does not calculate has left out.
+    """
+    rows: list[list[str]] = []
+    pairs = zip_longest(_cells(sheet), _cells(formulas), fillvalue=())
+    for number, (row, stated) in enumerate(pairs, start=1):
+        for column, (cell, formula) in enumerate(zip_longest(row, stated), start=1):
+            if cell is None and str(formula or "").startswith("="):
+                raise InputError(
+                    f"{where}: sheet {quoted(sheet.title)}, row {number}, column {column}: a "
+                    "formula without its value, expected a workbook that was saved by what "
+                    "calculates it"
+                )
+        cells = ["" if cell is None else _cell(cell) for cell in row]
+        if any(cells):
+            rows.append(cells)
+        _check_length(len(rows), where)
+    width = max(max(column for column, cell in enumerate(cells, 1) if cell) for cells in rows)
+    lines = []
+    for cells in rows:
+        # words alone in the first cell are what text files have as comments
+        alone = cells[0] and not any(cells[1:]) and decimal(cells[0]) is None
+        cells += [""] * (width - len(cells))
+        lines.append(f"# {cells[0]}" if alone else "\t".join(cells[:width]))
+    return lines
+
+
+_TDMS = _Format("TDMS file", "tdms", "npTDMS", _tdms_groups)
+_IGOR = _Format("Igor wave", "igor", "igor2", _igor_groups)
+_HDF5 = _Format("HDF5 file", "hdf5", "h5py", _hdf5_groups)
+_MATLAB = _Format("MATLAB file", "hdf5", "scipy", _matlab_groups)
+_EXCEL = _Format("workbook", "excel", "openpyxl", _excel_groups)

@@ -51,8 +51,7 @@ def read_table(
     """Read a table of cells separated by tabs, semicolons, commas or, some, by blanks.
 
     Numbers may have decimal commas unless these separate the cells. Lines that start with ``#``
-    are comments. The channels of a TDMS file are columns too, and an Igor wave is a table
-    (`hotlever.tables.binary`).
+    are comments. Some binary files hold tables too (`hotlever.tables.binary`).
 
     Parameters
     ----------
@@ -67,7 +66,7 @@ def read_table(
         alone have none, and lines without numbers between it and the first row are remarks. Else
         it is the first line that is no comment, and rows may be words alone.
     group : str, optional
-        Of a TDMS file, if it has several.
+        Of a binary file, if it has several tables.
     group_stated_by : str, optional
         How a user names it, as ``--column 'group={group}'``; left out where there is no way.
 

@@ -25,7 +25,7 @@ _UNITS = {
 class ColumnPicker:
     """Which column is which; `tell` is told the words of ``--column`` for those that are picked.
 
-    Of a TDMS file of several groups that whose columns they are is picked first.
+    Of a binary file of several groups that whose columns they are is picked first.
 
     Fields stay while the file is read anew: the next one may be open meanwhile.
     """
