@@ -105,7 +105,8 @@ def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
     """
     if raw.startswith(_WORKBOOKS):
         raise InputError(
-            f"{where}: a workbook such as Excel's, expected .xlsx or a table in text: save the sheet as CSV"
+            f"{where}: a workbook such as Excel's, expected .xlsx or a table in text: save the "
+            "sheet as CSV"
         )
     text = decode(raw, where)
     if _MARKUP.match(text):
