@@ -31,6 +31,7 @@ from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.experiment import TIP, Predictor
 from hotlever.estimate.objective import Objective
 from hotlever.estimate.optimiser import Optimiser, SearchOptions
+from hotlever.estimate.options import CalibrationOptions
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import Solution, solve
 from hotlever.estimate.verdict import verdict_on
@@ -111,7 +112,8 @@ def judged(number: int, draws: int, known: bool, always: bool) -> tuple[str, ...
     rng = np.random.default_rng(number)
     measurement, nominal, tip_K = lever_of(number, known)
     estimate = solve(Problem.of(measurement, nominal, FitOptions(usual_priors=True)))
-    calibration = calibrated(estimate, Estimate.of(estimate, *verdict_on(estimate)), measurement)
+    one = Estimate.of(estimate, *verdict_on(estimate))
+    calibration = calibrated(estimate, one, measurement, CalibrationOptions())
     gum = calibration.gum
     if gum is None:
         return str(number), "not described", *[""] * 6

@@ -12,7 +12,7 @@ from experiments import on_coarse_meshes
 from hotlever import Measurement, Probe, fit, read_calibration
 from hotlever.contact.law import INTERFACE
 from hotlever.errors import InputError
-from hotlever.estimate import Estimate, FitOptions
+from hotlever.estimate import CalibrationOptions, Estimate, FitOptions
 from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.estimate.experiment import ExperimentAtRest
@@ -136,7 +136,7 @@ def calibration(probe, measured):
     with on_coarse_meshes():
         found = solve(Problem.of(measured, probe, FitOptions(fixed=held, priors=known)))
         one = Estimate.of(found, *verdict_on(found))
-        return calibrated(found, one, measured, at_V=8.0, budget_of="apex")
+        return calibrated(found, one, measured, CalibrationOptions(at_V=8.0, budget_of="apex"))
 
 
 def test_the_apex_joins_the_calibration_with_its_error_by_source(calibration, touching):

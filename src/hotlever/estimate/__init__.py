@@ -18,12 +18,13 @@ from hotlever.estimate.estimate import Estimate, read_calibration, read_fit
 from hotlever.estimate.estimator import calibrate, fit
 from hotlever.estimate.file import FittedParameter
 from hotlever.estimate.next_measurement import Plan, plan_next
-from hotlever.estimate.options import FitOptions
+from hotlever.estimate.options import CalibrationOptions, FitOptions
 from hotlever.estimate.power_law import EQ12, PowerLaw, read_power_law
 from hotlever.measurement import Measurement, read_measurement
 
 __all__ = [
     "EQ12",
+    "CalibrationOptions",
     "Estimate",
     "FitOptions",
     "FittedParameter",

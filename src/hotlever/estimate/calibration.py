@@ -15,11 +15,12 @@ from hotlever.estimate.diagnosis import outlier_notes
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP, PredictionAtRest
 from hotlever.estimate.knee import Knee
+from hotlever.estimate.options import CalibrationOptions
 from hotlever.estimate.power_law import law_of_model, power_turns
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import rms
 from hotlever.estimate.tip_temperature import tip_by_bias
-from hotlever.estimate.uncertainty_budget import BudgetOf, budget_of_estimate
+from hotlever.estimate.uncertainty_budget import budget_of_estimate
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import Measurement
@@ -44,11 +45,8 @@ def calibrated(
     solution: Solution,
     estimate: Estimate,
     measured: Measurement,
-    *,
+    options: CalibrationOptions,
     route: str = "probe",
-    samples: int = 0,
-    at_V: float | None = None,
-    budget_of: BudgetOf = "tip",
     progress: Progress | None = None,
 ) -> Estimate:
     """Return an estimate with the tip temperature of its lever.
@@ -60,12 +58,14 @@ def calibrated(
         Of that solution.
     measured : Measurement
         What is calibrated: the same bias and current, or all that was estimated with.
-    route, samples, at_V, budget_of, progress
-        See `hotlever.estimate.estimator.calibrate`.
+    options : CalibrationOptions
+    route : str
+        See `Estimate`.
+    progress : callable, optional
     """
     probe, reason = estimate.probe, estimate.reason
-    circuit, medium = probe.circuit, probe.surroundings.medium
-    tip = tip_by_bias(solution, samples, at_V, progress)
+    circuit, medium, at_V = probe.circuit, probe.surroundings.medium, options.at_V
+    tip = tip_by_bias(solution, options.samples, at_V, progress)
     notes = [*estimate.notes, *what_data_lack(measured, circuit, tip.table.tip_K.values)]
     notes += [tip.asymmetry] if tip.asymmetry and not reason else []
     notes += [jump.note for jump in tip.jumps]
@@ -100,6 +100,7 @@ def calibrated(
         notes.append("the outline is taken to be as drawn: no error of it is in the result")
     bias = tip.table.bias_V.values
     row = int(np.nanargmax(tip.table.tip_K) if at_V is None else np.searchsorted(bias, at_V))
+    at_row = tip.table.isel(bias=slice(row, row + 1))
     if by_power:
         law, residual = law_of_model(vacuum, None if threshold is None else threshold.power_mW)
     return replace(
@@ -107,7 +108,7 @@ def calibrated(
         measurement=measured,
         notes=notes,
         table=tip.table,
-        gum=budget_of_estimate(solution, tip.table.isel(bias=slice(row, row + 1)), budget_of),
+        gum=budget_of_estimate(solution, at_row, options.budget_of),
         route=route,
         power_law=law,
         law_residual_K=residual,

@@ -15,17 +15,17 @@ from typing import Any, get_args
 
 import numpy as np
 
-from hotlever.errors import ComputationError, InputError, unknown_name
+from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.diagnosis import Diagnosis, outlier_notes
 from hotlever.estimate.estimate import Estimate, read_fit
 from hotlever.estimate.experiment import Experiment, Prediction
 from hotlever.estimate.knee_scaling import calibrated_by_knee
-from hotlever.estimate.options import UNKNOWN_MEDIUM, FitOptions
+from hotlever.estimate.options import UNKNOWN_MEDIUM, CalibrationOptions, FitOptions, chosen
 from hotlever.estimate.power_law import PowerLaw
 from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.problem import Problem
-from hotlever.estimate.pulses import PulseTiming, pulse_calibration
+from hotlever.estimate.pulses import pulse_calibration
 from hotlever.estimate.search import Solution, solve
 from hotlever.estimate.tip_table import BUDGETS, budgets_of, table_with_budgets
 from hotlever.estimate.tip_temperature import (
@@ -33,7 +33,7 @@ from hotlever.estimate.tip_temperature import (
     check_in_range,
     limits_of_range,
 )
-from hotlever.estimate.uncertainty_budget import BudgetOf, check_budget_of, limits_of
+from hotlever.estimate.uncertainty_budget import limits_of
 from hotlever.estimate.verdict import check_drawing, check_plausible, no_ramp, verdict_on
 from hotlever.measurement import Measurement, given_measurement, with_measured_circuit
 from hotlever.measurement.rows import averaged, note_on_averages
@@ -101,7 +101,7 @@ def fit(
     ComputationError
         If the lever cannot be solved at the start, or the fit does not converge.
     """
-    options = _chosen(options, choices)
+    options = chosen("fit", options or FitOptions(), choices)
     nominal = Probe.reference() if probe is None else Probe.coerce(probe)
     whole = given_measurement(measurement, nominal)
 
@@ -129,14 +129,9 @@ def calibrate(
     *,
     probe: Probe | str | os.PathLike[str] | None = None,
     fit: Estimate | str | os.PathLike[str] | None = None,
-    law: PowerLaw | None = None,
-    medium: str | None = None,
-    priors: Mapping[str, Prior | str] | None = None,
-    pulse: PulseTiming | None = None,
-    samples: int = 0,
-    at_V: float | None = None,
-    budget_of: BudgetOf = "tip",
+    options: CalibrationOptions | None = None,
     progress: Progress | None = None,
+    **choices: Any,
 ) -> Estimate:
     """Find the tip temperature of a lever from its I-V curve.
 
@@ -152,29 +147,12 @@ def calibrate(
     fit : Estimate or path, optional
         A fit of the measured lever itself, in vacuum or in air. Not together with `probe`. Its data
         count, not what it made of them.
-    law : PowerLaw, optional
-        A power law in vacuum, in place of a model. It takes a lever that only the swept supply
-        heats.
-    medium : {"vacuum", "air", "unknown"}, optional
-        What the lever is in; by default what the data file says, or else the fit or the probe. If
-        it is unknown both are tried. With vacuum for data from air the paper's rule is used: the
-        temperatures that the probe has in vacuum, at k times the power.
-    priors : mapping of str to Prior or str, optional
-        What is known beforehand, in place of some of the usual priors, such as
-        ``{"n_d": "3.3e17 ± 15%"}``; see `hotlever.probe.priors`. If empty there are none, and
-        dimensions are held.
-    pulse : PulseTiming, optional
-        Of pulses whose tip temperature is wanted too (`hotlever.estimate.pulses`).
-    samples : int
-        Of the posterior, at least, from which the limits of the tip temperature are taken; by
-        default they follow from its linearised error, or estimates of hotter and colder levers.
-    at_V : float, optional
-        Bias of the uncertainty budget; that of the hottest tip by default.
-    budget_of : {"tip", "apex"}
-        What the uncertainty budget is of: the tip, or its apex that touches a sample.
+    options : CalibrationOptions, optional
     progress : callable, optional
         Called with solved branches, then with steps of the sampler and followed pulses, and how
         many there usually are.
+    **choices
+        Fields of `CalibrationOptions`, such as ``medium="air"``.
 
     Raises
     ------
@@ -183,18 +161,15 @@ def calibrate(
     ComputationError
         If no lever near the probe has states at all measured biases.
     """
-    if (probe is not None) + (fit is not None) + (law is not None) > 1:
+    options = chosen("calibrate", options or CalibrationOptions(), choices)
+    if (probe is not None) + (fit is not None) + (options.law is not None) > 1:
         raise InputError("a fit, a probe and a power law exclude each other")
-    if law is not None and medium not in (None, "vacuum"):
-        raise InputError("a power law holds in vacuum; with one, leave the medium out")
-    if law is not None and priors is not None:
-        raise InputError("a power law takes no priors; a probe or a fit does")
     if fit is not None:
         fit = fit if isinstance(fit, Estimate) else read_fit(fit)
         fit.measurement.need_rest("a calibration with a fit")
         route, origin = f"fit in {fit.medium}", fit.probe
     else:
-        route = "probe" if law is None else "power law"
+        route = "probe" if options.law is None else "power law"
         origin = Probe.reference() if probe is None else Probe.coerce(probe)
     whole = given_measurement(measurement, origin)
     whole.need_rest("a calibration")
@@ -203,47 +178,38 @@ def calibrate(
             f"{whole.path}: no values of I_h, which a calibration needs beside V_b, or of "
             "V_bridge, of a probe with bridge_upper_ohm and bridge_lower_ohm in [circuit]"
         )
-    check_budget_of(budget_of, origin.contact is not None)
-    if law is not None or (medium == "vacuum" and whole.medium == "air"):
-        lacks = {
-            "has no posterior": samples > 0,
-            "has no uncertainty budget": at_V is not None or budget_of != "tip",
-            "says nothing about a pulse": pulse is not None,
-        }
-        for lack, is_requested in lacks.items():
-            if is_requested:
-                raise InputError(
-                    f"the paper's rule {lack}; expected a probe or a fit, in the medium of the data"
-                )
-        return _by_the_rule(whole, origin, law, route)
-    if pulse is not None:
+    if options.budget_of == "apex" and origin.contact is None:
+        raise InputError(
+            "an uncertainty budget of the apex: expected a probe in contact with a sample "
+            "([contact] in the probe file)"
+        )
+    if options.law is not None or (options.medium == "vacuum" and whole.medium == "air"):
+        options.need_none_of_the_rule()
+        return _by_the_rule(whole, origin, options.law, route)
+    if options.pulse is not None:
         origin.circuit.need_cold_start("a calibration for pulses")
 
     def within(medium: Any) -> tuple[Solution, Estimate]:
         """Calibrate the lever in a medium."""
-        known = priors is None or bool(priors)
-        options = FitOptions(priors=priors or {}, usual_priors=known, medium=medium)
-        problem = Problem.of(whole, origin, options)
-        causes = Diagnosis(problem.measurement, problem.probe, priors)
+        problem = Problem.of(whole, origin, replace(options.of_lever, medium=medium))
+        causes = Diagnosis(problem.measurement, problem.probe, options.priors)
         check_plausible(problem, causes)
-        check_in_range(at_V, *limits_of_range(problem.measurement, problem.probe))
+        check_in_range(options.at_V, *limits_of_range(problem.measurement, problem.probe))
         if fit is None:
             check_drawing(problem, causes)
         try:
             if fit is None:
                 solution = solve(problem, progress)
             else:
-                solution = _beside_a_fit(problem, fit, priors, progress)
+                solution = _beside_a_fit(problem, fit, options.priors, progress)
             converged, reason = verdict_on(solution)
             result = calibrated(
                 solution,
                 Estimate.of(solution, converged, reason or no_ramp(solution)),
                 problem.measurement,
-                route=route,
-                samples=samples,
-                at_V=at_V,
-                budget_of=budget_of,
-                progress=progress,
+                options,
+                route,
+                progress,
             )
         except ComputationError as error:
             raise ComputationError(f"{error}; {causes.named(fit is not None)}") from error
@@ -253,28 +219,13 @@ def calibrate(
         notes = list(dict.fromkeys([*problem.notes, *result.notes]))
         return solution, replace(result, notes=notes)
 
-    solution, result = in_medium(medium, within)
-    if pulse is not None and result.describes_data:
-        return replace(result, pulse=pulse_calibration(solution, pulse, progress))
-    if pulse is not None:
+    solution, result = in_medium(options.medium, within)
+    if options.pulse is not None and result.describes_data:
+        return replace(result, pulse=pulse_calibration(solution, options.pulse, progress))
+    if options.pulse is not None:
         note = "the pulse was not followed, since it would be that of another lever"
         return replace(result, notes=[*result.notes, note])
     return result
-
-
-def _chosen(options: FitOptions | None, choices: dict[str, Any]) -> FitOptions:
-    """Return options with some of them chosen by name.
-
-    Raises
-    ------
-    InputError
-        If there is no such option; the text gives the nearest one.
-    """
-    names = list(FitOptions.__dataclass_fields__)
-    for name in choices:
-        if name not in names:
-            raise unknown_name("option", name, names, "fit")
-    return replace(options or FitOptions(), **choices)
 
 
 def _by_the_rule(whole: Measurement, origin: Probe, law: PowerLaw | None, route: str) -> Estimate:

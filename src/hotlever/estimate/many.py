@@ -6,7 +6,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,7 @@ from hotlever.errors import HotleverError, InputError
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.estimator import calibrate, fit
 from hotlever.estimate.file import EstimateFile
-from hotlever.estimate.options import FitOptions
-from hotlever.estimate.power_law import PowerLaw
-from hotlever.estimate.tip_table import PulseTiming
-from hotlever.estimate.uncertainty_budget import BudgetOf
+from hotlever.estimate.options import CalibrationOptions, FitOptions
 from hotlever.files import (
     CALIBRATION,
     FOLDER,
@@ -32,7 +29,6 @@ from hotlever.lever.lever import Lever
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced
 from hotlever.measurement import Measurement, read_measurement_of, with_measured_circuit
 from hotlever.probe import Probe
-from hotlever.probe.priors import Prior
 from hotlever.processes import PROCESSORS, Executor, guarded, local_executor, run_all
 from hotlever.types import Progress
 
@@ -107,13 +103,7 @@ def calibrate_many(
     paths: Sequence[str | os.PathLike[str]],
     folder: str | os.PathLike[str],
     probe: Probe | None = None,
-    *,
-    law: PowerLaw | None = None,
-    medium: str | None = None,
-    priors: Mapping[str, Prior | str] | None = None,
-    pulse: PulseTiming | None = None,
-    samples: int = 0,
-    budget_of: BudgetOf = "tip",
+    options: CalibrationOptions | None = None,
     **how: Any,
 ) -> Batch:
     """Calibrate many levers and write a file of each as soon as it is done; see `estimate_many`.
@@ -126,32 +116,16 @@ def calibrate_many(
         Where the files go, named after the data files.
     probe : Probe, optional
         What the levers are like; the reference probe by default.
-    law, medium, priors, pulse, samples, budget_of
-        See `hotlever.estimate.estimator.calibrate`.
+    options : CalibrationOptions, optional
     **how
         As `estimate_many` has them.
     """
-    like, usual = probe or Probe.reference(), priors is None or bool(priors)
+    options, like = options or CalibrationOptions(), probe or Probe.reference()
     # what it is for each lever, whatever its file says of circuit and medium
-    options = FitOptions(priors=priors or {}, usual_priors=usual, medium=medium)  # type: ignore[arg-type]
-    options.of(like)
-    settings = {
-        "power_law": None if law is None else law.model_dump(),
-        "pulse": None if pulse is None else asdict(pulse),
-        "samples": samples,
-        "budget_of": budget_of,
-    }
-    make = partial(
-        calibrate,
-        probe=None if law is not None else like,
-        law=law,
-        medium=medium,
-        priors=priors,
-        pulse=pulse,
-        samples=samples,
-        budget_of=budget_of,
-    )
-    return estimate_many(paths, folder, "calibration", make, like, options, settings, **how)
+    of_lever = options.of_lever.of(like)
+    make = partial(calibrate, probe=None if options.law is not None else like, options=options)
+    of_tip = options.values()
+    return estimate_many(paths, folder, "calibration", make, like, of_lever, of_tip, **how)
 
 
 def estimate_many(

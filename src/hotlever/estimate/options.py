@@ -1,12 +1,14 @@
-"""What users ask of a fit."""
+"""What users ask of a fit, and of a calibration."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal, cast, get_args
+from typing import Any, Literal, TypeVar, cast, get_args
 
 from hotlever.errors import InputError, unknown_name
+from hotlever.estimate.power_law import PowerLaw
+from hotlever.estimate.tip_table import PulseTiming
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.priors import SCALES, Prior
@@ -20,6 +22,8 @@ from hotlever.probe.surroundings import Medium
 from hotlever.quantities import FITTED
 
 Weights = Literal["maximum", "errors"]
+#: Of what there are uncertainty budgets: a tip, or its apex that touches a sample.
+BudgetOf = Literal["tip", "apex"]
 #: What the medium is called if nobody knows it: either is tried.
 UNKNOWN_MEDIUM = "unknown"
 
@@ -139,3 +143,103 @@ class FitOptions:
         if tuple(values.pop("usual")) != tuple(PARAMETERS):
             values["usual"] = list(self.usual)
         return values
+
+
+@dataclass(frozen=True)
+class CalibrationOptions:
+    """What a calibration is asked.
+
+    Attributes
+    ----------
+    law : PowerLaw, optional
+        A power law in vacuum, in place of a model. It takes a lever that only the swept supply
+        heats.
+    medium : {"vacuum", "air", "unknown"}, optional
+        What the lever is in; by default what the data file says, or else the fit or the probe. If
+        it is unknown both are tried. With vacuum for data from air the paper's rule is used: the
+        temperatures that the probe has in vacuum, at k times the power.
+    priors : mapping of str to Prior or str, optional
+        What is known beforehand, in place of some of the usual priors, such as
+        ``{"n_d": "3.3e17 ± 15%"}``; see `hotlever.probe.priors`. If empty there are none, and
+        dimensions are held.
+    pulse : PulseTiming, optional
+        Of pulses whose tip temperature is wanted too (`hotlever.estimate.pulses`).
+    samples : int
+        Of the posterior, at least, from which the limits of the tip temperature are taken; by
+        default they follow from its linearised error, or estimates of hotter and colder levers.
+    at_V : float, optional
+        Bias of the uncertainty budget; that of the hottest tip by default.
+    budget_of : {"tip", "apex"}
+        What the uncertainty budget is of: the tip, or its apex that touches a sample.
+
+    Raises
+    ------
+    InputError
+        If a name does not exist, with the nearest that does, or options exclude each other.
+    """
+
+    law: PowerLaw | None = None
+    medium: Medium | Literal["unknown"] | None = None
+    priors: Mapping[str, Prior | str] | None = None
+    pulse: PulseTiming | None = None
+    samples: int = 0
+    at_V: float | None = None
+    budget_of: BudgetOf = "tip"
+
+    def __post_init__(self) -> None:
+        if self.law is not None and self.medium not in (None, "vacuum"):
+            raise InputError("a power law holds in vacuum; with one, leave the medium out")
+        if self.law is not None and self.priors is not None:
+            raise InputError("a power law takes no priors; a probe or a fit does")
+        if self.budget_of not in get_args(BudgetOf):
+            raise InputError(
+                f"an uncertainty budget of '{self.budget_of}': expected "
+                f"{' or '.join(get_args(BudgetOf))}, of which it is at rest (the errors of a pulse "
+                "by source are in its table)"
+            )
+
+    @property
+    def of_lever(self) -> FitOptions:
+        """What of the lever is estimated, and beside which priors."""
+        usual = self.priors is None or bool(self.priors)
+        return FitOptions(priors=self.priors or {}, usual_priors=usual, medium=self.medium)
+
+    def need_none_of_the_rule(self) -> None:
+        """Raise an error if something is asked that the paper's rule has not."""
+        lacks = {
+            "has no posterior": self.samples > 0,
+            "has no uncertainty budget": self.at_V is not None or self.budget_of != "tip",
+            "says nothing about a pulse": self.pulse is not None,
+        }
+        for lack, is_requested in lacks.items():
+            if is_requested:
+                raise InputError(
+                    f"the paper's rule {lack}; expected a probe or a fit, in the medium of the data"
+                )
+
+    def values(self) -> dict[str, Any]:
+        """Return as plain values what does not say of the lever what is estimated."""
+        return {
+            "power_law": None if self.law is None else self.law.model_dump(),
+            "pulse": None if self.pulse is None else asdict(self.pulse),
+            "samples": self.samples,
+            "budget_of": self.budget_of,
+        }
+
+
+Options = TypeVar("Options", FitOptions, CalibrationOptions)
+
+
+def chosen(kind: str, options: Options, choices: Mapping[str, Any]) -> Options:
+    """Return the options of a fit or a calibration with some of them chosen by name.
+
+    Raises
+    ------
+    InputError
+        If there is no such option; the text gives the nearest one.
+    """
+    names = list(type(options).__dataclass_fields__)
+    for name in choices:
+        if name not in names:
+            raise unknown_name("option", name, names, kind)
+    return replace(options, **choices)

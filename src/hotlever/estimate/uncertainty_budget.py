@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 import xarray as xr
 
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import ComputationError
 from hotlever.estimate.experiment import TIP
 from hotlever.estimate.gum import Budget, CoverageInterval, InputQuantity, propagate
+from hotlever.estimate.options import BudgetOf
 from hotlever.estimate.posterior import CurvedQuantity
 from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.search import Solution
@@ -31,8 +32,6 @@ from hotlever.quantities import FITTED, OBSERVABLES
 from hotlever.text import BAND
 from hotlever.types import Array
 
-#: Of what there are budgets: a tip, or its apex that touches a sample.
-BudgetOf = Literal["tip", "apex"]
 #: Where the density of priors comes from an earlier estimate.
 _FIT = "fit"
 #: Where the Monte Carlo method fails.
@@ -116,21 +115,6 @@ class TemperatureBudget:
         united = None if own is None or others is None else own.united(others)
         return replace(
             self, budget=Budget(inputs, correlation), limits_K=limits_K, monte_carlo=united
-        )
-
-
-def check_budget_of(of: str, in_contact: bool = True) -> None:
-    """Raise an error if there is no uncertainty budget of a quantity."""
-    expected = get_args(BudgetOf)
-    if of not in expected:
-        raise InputError(
-            f"an uncertainty budget of '{of}': expected {' or '.join(expected)}, of which it is at "
-            "rest (the errors of a pulse by source are in its table)"
-        )
-    if of == "apex" and not in_contact:
-        raise InputError(
-            "an uncertainty budget of the apex: expected a probe in contact with a sample "
-            "([contact] in the probe file)"
         )
 
 

@@ -321,10 +321,9 @@ def calibrate_files(
     from hotlever.estimate import calibrate, read_fit
     from hotlever.estimate.levers import Setting
     from hotlever.estimate.many import calibrate_many
-    from hotlever.estimate.options import UNKNOWN_MEDIUM
+    from hotlever.estimate.options import UNKNOWN_MEDIUM, CalibrationOptions
     from hotlever.estimate.power_law import read_power_law
     from hotlever.estimate.summary import calibration_text
-    from hotlever.estimate.uncertainty_budget import check_budget_of
     from hotlever.measurement import parse_columns, read_measurement_of
 
     several = _check_levers(data, processes, scheduler)
@@ -332,7 +331,6 @@ def calibrate_files(
         refuse("goes with --posterior", samples=samples != _SAMPLES)
     if table is None and not several:
         refuse("goes with --table", table_by=table_by != _EVEN_IN, table_step=table_step)
-    check_budget_of(budget_of)
     at_most_one(fit=fit, probe=probe, power_law=power_law)
     if fit or power_law:
         refuse("goes with --probe, expected neither --fit nor --power-law", physics=physics)
@@ -349,28 +347,30 @@ def calibrate_files(
     law = None if power_law is None else read_power_law(power_law)
     of_lever = None if fit is None else read_fit(fit)
     like = of_lever.probe if of_lever else read_probe(reporter, probe, physics=physics)
-    how: dict[str, Any] = {
-        "probe": like if of_lever is None and law is None else None,
-        "law": law,
-        "priors": parse_priors(with_laws(prior, laws), like),
-        "medium": medium,
-        "budget_of": budget_of,
-        "pulse": None if pulse is None else parse_timing(pulse),
-        "samples": samples if posterior else 0,
-    }
+    choices: dict[str, Any] = {"medium": medium, "budget_of": budget_of}
+    options = CalibrationOptions(
+        law=law,
+        priors=parse_priors(with_laws(prior, laws), like),
+        pulse=None if pulse is None else parse_timing(pulse),
+        samples=samples if posterior else 0,
+        at_V=None if budget_at is None or several else budget_at.value,
+        **choices,
+    )
+    like_probe = like if of_lever is None and law is None else None
     if several:
         levers = _Levers(
             data, column, output, report, processes, scheduler, "calibrations", CALIBRATIONS_TABLE
         )
-        make = partial(calibrate_many, **how)
+        make = partial(calibrate_many, probe=like_probe, options=options)
         return _estimate_several(reporter, levers, make, budget_at, table_options)
     (path,) = data
     measurement = read_measurement_of(like, path, parse_columns(column or []))
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes, *measurement.unused)
     with reporter.progress("calibrate") as update:
-        at_V = None if budget_at is None else budget_at.value
-        result = calibrate(measurement, fit=of_lever, at_V=at_V, progress=update, **how)
+        result = calibrate(
+            measurement, probe=like_probe, fit=of_lever, options=options, progress=update
+        )
     reporter.note(*result.notes)
     texts = [calibration_text(result)]
     if output is not None:
