@@ -13,7 +13,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.materials.heat import thermal_conductivity
 from hotlever.probe import Probe
 from hotlever.studies.linear_branch import (
-    Line,
+    BranchLine,
     all_cases,
     linear_branch_study,
     reach,
@@ -39,12 +39,12 @@ class Curve:
 
 
 def test_a_straight_line_is_recovered_and_one_through_the_base_is_not():
-    line = Line.of(Curve(2000.0), 900.0, 1150.0)
+    line = BranchLine.of(Curve(2000.0), 900.0, 1150.0)
     assert line.slope_K_per_mW == pytest.approx(250.0)
     # at 200 K there is no power
     assert line.offset_K == pytest.approx(200.0 - 293.0)
     assert line.off_K == pytest.approx(0.0, abs=1e-9)
-    through = Line.of(Curve(2000.0), 900.0, 1150.0, offset=False)
+    through = BranchLine.of(Curve(2000.0), 900.0, 1150.0, offset=False)
     assert through.offset_K == 0.0
     # of lines through the base the best one touches the curve in between
     assert 5.0 < through.off_K < 20.0

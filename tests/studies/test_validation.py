@@ -15,7 +15,7 @@ from hotlever.probe import Probe
 from hotlever.studies.validation.case import QUANTITIES, Case, cases, johnson_noise, sought
 from hotlever.studies.validation.prediction import (
     OUTSIDE,
-    Prediction,
+    PredictedNumber,
     comparison,
     computed,
     predict,
@@ -46,7 +46,7 @@ def case_of(tmp_path):
 
 
 def stored(case):
-    return Prediction.as_stored(case.prediction, case.definition.is_share)
+    return PredictedNumber.as_stored(case.prediction, case.definition.is_share)
 
 
 def test_every_case_is_complete(published):
@@ -105,15 +105,15 @@ def test_noise_of_a_cold_lever_is_that_of_its_resistance():
 
 def test_shares_stay_between_zero_and_one():
     draws = 1 / (1 + np.exp(-np.linspace(-2.0, 4.0, 31)))
-    prediction = Prediction.of(draws, is_share=True)
+    prediction = PredictedNumber.of(draws, is_share=True)
     assert prediction.median == pytest.approx(1 / (1 + math.exp(-1.0)))
     assert 0 < prediction.band_95[0] < prediction.band_95[1] < 1
     # the error of a published share counts as its logit's
-    assert prediction.deviation(0.9, 0.1) < Prediction.of(draws, True).deviation(0.9, 0.001)
+    assert prediction.deviation(0.9, 0.1) < PredictedNumber.of(draws, True).deviation(0.9, 0.001)
 
 
 def test_verdicts_are_by_prediction_and_published_error():
-    tenth = Prediction(math.log(100.0), 0.1)
+    tenth = PredictedNumber(math.log(100.0), 0.1)
     assert tenth.verdict(109.0, 1e-6) == "inside 68 %"
     assert tenth.verdict(120.0, 1e-6) == "inside 95 %"
     assert tenth.verdict(130.0, 1e-6) == OUTSIDE

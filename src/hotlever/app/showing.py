@@ -41,7 +41,7 @@ from hotlever.measurement import (
 from hotlever.quantities import FITTED
 from hotlever.raman import Correction, measure, read_lines, read_spectra
 from hotlever.raman.lineshape import WINDOW, in_window
-from hotlever.raman.series import Line
+from hotlever.raman.series import MeasuredLine
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.spectrum_reading import read_file, spectrum_files
 from hotlever.raman.spectrum_tables import corrections_text
@@ -316,7 +316,7 @@ def _with_room(values: Array) -> list[float]:
     return [low - room, high + room]
 
 
-def _summary(line: Line, table: Any) -> str:
+def _summary(line: MeasuredLine, table: Any) -> str:
     """Say what was read from a line, with the digits of the command's table."""
     flags = ", ".join(line.flags)
     if line.peak is None:

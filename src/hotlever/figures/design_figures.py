@@ -18,7 +18,7 @@ from hotlever.studies.design import label_of
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hotlever.studies.optimisation import Optimum
+    from hotlever.studies.optimisation import OptimalDesign
 
 #: Contours of a map, about.
 _LEVELS = 8
@@ -112,7 +112,7 @@ def _curves(data: xr.Dataset, labels: dict[str, str]) -> Figure:
     return fig
 
 
-def design_optimum(optimum: Optimum) -> Figure:
+def design_optimum(optimum: OptimalDesign) -> Figure:
     """Draw the best design within bounds beside the one it began with, and their I-V curves."""
     designs = {"start": (optimum.start, BLUE), "best": (optimum.best, VERMILION)}
     with figure(9.0, 4.6, 2, 2, width_ratios=(1.1, 1.0)) as (fig, grid):

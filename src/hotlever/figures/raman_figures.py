@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from hotlever.figures.style import BLACK, BLUE, GREEN, VERMILION, figure, panel_letters
 from hotlever.raman.lineshape import WINDOW, Peak, in_window
 from hotlever.raman.raman_calibration import RamanCalibration
-from hotlever.raman.series import Line
+from hotlever.raman.series import MeasuredLine
 from hotlever.spieser2017 import RAMAN_ERROR_K, RAMAN_ERROR_SHARE
 from hotlever.studies.raman_check import conclusion
 from hotlever.types import Array
@@ -29,22 +29,22 @@ _BAND = f"±({RAMAN_ERROR_K:g} K + {RAMAN_ERROR_SHARE:g} ΔT)"
 
 
 def thermometry(
-    lines: Sequence[Line],
+    lines: Sequence[MeasuredLine],
     table: xr.Dataset,
     calibration: RamanCalibration | None = None,
-    series: Sequence[Line] = (),
+    series: Sequence[MeasuredLine] = (),
 ) -> Figure:
     """Spectra stacked by temperature, calibration, residuals: like figure 2 of the paper.
 
     Parameters
     ----------
-    lines : sequence of Line
+    lines : sequence of MeasuredLine
         The measured spectra.
     table : xarray.Dataset
         What was read from them, see `hotlever.raman.series.read_lines`.
     calibration : RamanCalibration, optional
         Without one only the spectra are drawn.
-    series : sequence of Line
+    series : sequence of MeasuredLine
         The hot-plate spectra, to be stacked in place of `lines`.
     """
     used = np.array([line.correction.use for line in lines], dtype=bool)
@@ -73,12 +73,12 @@ def thermometry(
     return fig
 
 
-def _in_window(line: Line) -> tuple[Array, Array]:
+def _in_window(line: MeasuredLine) -> tuple[Array, Array]:
     inside = in_window(line.spectrum.x, f"{line.spectrum.name}: ")
     return line.spectrum.x[inside], line.spectrum.y[inside]
 
 
-def _stack(axes: Axes, stacked: Sequence[tuple[str, Line]]) -> None:
+def _stack(axes: Axes, stacked: Sequence[tuple[str, MeasuredLine]]) -> None:
     """Spectra above each other, each scaled to its line, with the fit."""
     if len(stacked) > STACKED:
         chosen = np.unique(np.linspace(0, len(stacked) - 1, STACKED).round().astype(int))
@@ -196,7 +196,7 @@ def raman_check(check: xr.Dataset) -> Figure:
     return fig
 
 
-def one_spectrum(line: Line) -> Figure:
+def one_spectrum(line: MeasuredLine) -> Figure:
     """One spectrum with its fit and what the fit leaves."""
     x, y = _in_window(line)
     residual: Array = y - float(np.median(y))

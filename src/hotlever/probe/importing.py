@@ -29,8 +29,8 @@ from hotlever.probe.drawing.partition import Partition, partitioned
 from hotlever.probe.drawing.shape import TOLERANCE_UM, relative
 from hotlever.probe.drawing.sheet import (
     UNITS,
-    Layer,
     Sheet,
+    SheetLayer,
     doubt,
     extent_of,
     is_lever,
@@ -182,7 +182,7 @@ class _Silicon:
             piece for piece in parts_of(shape) if piece.area > 10 * self.tolerance * piece.length
         ]
 
-    def ends_of(self, name: str, sheet: Sheet, layer: Layer) -> bool:
+    def ends_of(self, name: str, sheet: Sheet, layer: SheetLayer) -> bool:
         """Whether a layer touches the outline along an edge."""
         try:
             return bool(

@@ -98,7 +98,7 @@ EXAMPLE = Tip(height_um=0.7)
 # --- in contact ---------------------------------------------------------------------------------
 
 
-class Layer(NamedTuple):
+class SampleLayer(NamedTuple):
     """A layer of a sample."""
 
     material: str  #: as it is written
@@ -138,12 +138,12 @@ class SampleContact(Record):
         return text
 
     @cached_property
-    def layers(self) -> tuple[Layer, ...]:
+    def layers(self) -> tuple[SampleLayer, ...]:
         """The layers, from the top."""
         return parsed_layers(self.sample, "")
 
 
-def parsed_layers(text: str, where: str) -> tuple[Layer, ...]:
+def parsed_layers(text: str, where: str) -> tuple[SampleLayer, ...]:
     """Return the layers of a text such as ``polymer,100nm,silicon``, from the top.
 
     Raises
@@ -174,7 +174,7 @@ def parsed_layers(text: str, where: str) -> tuple[Layer, ...]:
             f"{where}: nothing under {excerpt(parts[-1])} of {excerpt(materials[-1])}, expected a "
             "material without a thickness"
         )
-    return tuple(map(Layer, materials, kappas, [*lengths, None]))
+    return tuple(map(SampleLayer, materials, kappas, [*lengths, None]))
 
 
 def length_um(text: str) -> float | None:

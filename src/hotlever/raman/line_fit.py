@@ -29,10 +29,10 @@ from hotlever.raman.lineshape import (
     SIGMA_PER_FWHM,
     At,
     Band,
+    LineProblem,
     NoSiliconLine,
     Peak,
     PeakOptions,
-    Problem,
     Solution,
     in_window,
     observed_width,
@@ -239,7 +239,7 @@ def _likely_spikes(x: Array, y: Array, base: float, start: float | None) -> Mask
     return spikes & ~_in_range(x) if _step(x) > _COARSE_AXIS else spikes
 
 
-def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | None:
+def _start(x: Array, y: Array, options: PeakOptions) -> tuple[LineProblem, Array] | None:
     """The model, and start values from the spectrum itself; None without a line to see."""
     background, slope = _coarse_background(x, y)
     origin = float(0.5 * (x[0] + x[-1]))
@@ -283,7 +283,7 @@ def _start(x: Array, y: Array, options: PeakOptions) -> tuple[Problem, Array] | 
         priors = [(At.LOG_FWHM, *_NATURAL_WIDTH), (At.LOG_SIGMA, log_sigma, _SIGMA_SPREAD)]
         free.append(At.LOG_SIGMA)
     line = [float(x[top]), math.log(fwhm), height, background, slope, 0.0, log_sigma]
-    problem = Problem(x, y, origin, tuple(free), tuple(priors), clipped)
+    problem = LineProblem(x, y, origin, tuple(free), tuple(priors), clipped)
     return problem, np.array([*line, *_NO_BAND])
 
 
@@ -297,7 +297,7 @@ def _coarse_background(x: Array, y: Array) -> tuple[float, float]:
 
 
 def _refine(
-    problem: Problem, start: Array, use: Mask, variance: Array, passes: int = 8
+    problem: LineProblem, start: Array, use: Mask, variance: Array, passes: int = 8
 ) -> Solution:
     """Fit, judge noise and spikes by the fit, and again until neither changes."""
     y, p = problem.y, start

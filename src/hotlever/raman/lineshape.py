@@ -12,8 +12,8 @@ D and X are real and imaginary part of one analytic function, 1/(1 − ie), so a
 turns both into real and imaginary part of the Faddeeva function w(z): Abramowitz and
 Stegun, Handbook of Mathematical Functions, 7.1 and 7.4.13, with w'(z) = −2z·w(z) + 2i/√π.
 
-With a background, and perhaps a band, the line is the model of a spectrum (`Problem`), whose ten
-parameters are, by place: the line's centre, ln fwhm and height, the background's level and slope,
+With a background, and perhaps a band, the line is the model of a spectrum (`LineProblem`), whose
+ten parameters are, by place: the line's centre, ln fwhm and height, the background's level and slope,
 the line's asymmetry, ln sigma of the spectrometer's response, and the band's height, centre and
 ln fwhm.
 """
@@ -123,7 +123,7 @@ def width_of(logarithm: float) -> float:
 
 
 @dataclass(frozen=True)
-class Problem:
+class LineProblem:
     """A spectrum, the parameters that are free (ascending), and what is known of them before.
 
     ``priors`` are places of parameters, with mean and standard deviation. ``clipped`` are the
@@ -212,7 +212,7 @@ class Problem:
 class Solution:
     """Parameters that fit a spectrum, the curve, the noise it leaves, and the samples used."""
 
-    problem: Problem
+    problem: LineProblem
     p: Array
     value: Array
     variance: Array

@@ -40,7 +40,7 @@ COLUMNS = ("file", *(name.replace("_per_cm", "_cm-1") for name in DIGITS), "flag
 
 
 @dataclass(frozen=True)
-class Line:
+class MeasuredLine:
     """A spectrum and its silicon line, None where it has none or is left out."""
 
     spectrum: Spectrum
@@ -66,7 +66,7 @@ def measure(
     options: PeakOptions | None = None,
     progress: Progress | None = None,
     corrections: Mapping[str, Correction] | None = None,
-) -> list[Line]:
+) -> list[MeasuredLine]:
     """Fit the silicon line of each spectrum.
 
     Whether there is a band beside it is asked of all of them together, unless the options say what
@@ -83,7 +83,7 @@ def measure(
 
     Returns
     -------
-    list of Line
+    list of MeasuredLine
 
     Raises
     ------
@@ -98,16 +98,16 @@ def measure(
     return lines if options.band_evidence is not None else _together(lines, options)
 
 
-def _line(spectrum: Spectrum, correction: Correction, options: PeakOptions) -> Line:
+def _line(spectrum: Spectrum, correction: Correction, options: PeakOptions) -> MeasuredLine:
     peak = None
     if correction.use:
         with suppress(NoSiliconLine):
             fitted = fit_peak(spectrum.x, spectrum.y, correction.of(options), spectrum.name)
             peak = with_hidden_top(fitted, spectrum.x, spectrum.gaps)
-    return Line(spectrum, peak, correction)
+    return MeasuredLine(spectrum, peak, correction)
 
 
-def _together(lines: Sequence[Line], options: PeakOptions) -> list[Line]:
+def _together(lines: Sequence[MeasuredLine], options: PeakOptions) -> list[MeasuredLine]:
     """Fit again what is in doubt by itself, with what the others say for a band."""
     total, together = band_evidence(lines), []
     for line in lines:
@@ -120,12 +120,12 @@ def _together(lines: Sequence[Line], options: PeakOptions) -> list[Line]:
     return together
 
 
-def band_evidence(lines: Iterable[Line]) -> float:
+def band_evidence(lines: Iterable[MeasuredLine]) -> float:
     """Return what spectra together say for a band beside the line, see `Peak.band_evidence`."""
     return sum(line.peak.band_evidence for line in lines if line.peak is not None)
 
 
-def read_lines(lines: Sequence[Line], thermometer: Thermometer | None) -> xr.Dataset:
+def read_lines(lines: Sequence[MeasuredLine], thermometer: Thermometer | None) -> xr.Dataset:
     """Table of lines and, with a thermometer, of shifts and temperatures.
 
     Returns
@@ -181,7 +181,7 @@ def calibrate_from(
     progress: Progress | None = None,
     source: str = "hot-plate series",
     corrections: Mapping[str, Correction] | None = None,
-) -> tuple[RamanCalibration, list[Line]]:
+) -> tuple[RamanCalibration, list[MeasuredLine]]:
     """Calibrate from hot-plate spectra, each with its temperature by header or file name.
 
     Parameters
@@ -196,7 +196,7 @@ def calibrate_from(
     Returns
     -------
     RamanCalibration
-    list of Line
+    list of MeasuredLine
         Without those that are left out.
 
     Raises

@@ -20,7 +20,7 @@ Law = Literal["linear", "anharmonic"]
 
 
 @dataclass(frozen=True)
-class Reading:
+class LineTemperature:
     """Temperatures of n spectra."""
 
     shift: Array  #: (n,), against the line at room temperature, cm⁻¹
@@ -91,7 +91,7 @@ class Thermometer:
             reference_stderr=float(np.sum(weights) ** -0.5),
         )
 
-    def read(self, centre: ArrayLike, stderr: ArrayLike) -> Reading:
+    def read(self, centre: ArrayLike, stderr: ArrayLike) -> LineTemperature:
         """Temperatures of lines.
 
         Parameters
@@ -139,7 +139,7 @@ class Thermometer:
         error = np.where(exists, np.sqrt(variance), np.nan)
         low, high = calibration.range_K
         outside = (temperature < low - 2.0 * error) | (temperature > high)
-        return Reading(shift, temperature, error, np.where(exists, own, np.nan), outside)
+        return LineTemperature(shift, temperature, error, np.where(exists, own, np.nan), outside)
 
     def _model_error(self, temperature: Array, slope: Array) -> Array:
         """How far the anharmonic law may be off, K: a second law through the same points.

@@ -21,7 +21,7 @@ from hotlever.studies.validation.case import Case, cases, sought
 from hotlever.studies.validation.prediction import (
     DRAWS,
     OUTSIDE,
-    Prediction,
+    PredictedNumber,
     comparison,
     computed,
     predict,
@@ -133,7 +133,9 @@ def _row(case: Case, row: xr.Dataset) -> list[str]:
     ]
 
 
-def _lost_draws_and_changes(page: Page, every: Sequence[Case], now: Sequence[Prediction]) -> None:
+def _lost_draws_and_changes(
+    page: Page, every: Sequence[Case], now: Sequence[PredictedNumber]
+) -> None:
     """Say which draws did not count, and where a prediction is another than was written down."""
     for draws, are in (
         ("impossible", "are no lever that can be drawn, or beyond what a parameter may be"),
@@ -145,7 +147,7 @@ def _lost_draws_and_changes(page: Page, every: Sequence[Case], now: Sequence[Pre
     changes = []
     for case, today in zip(every, now, strict=True):
         assert case.prediction is not None
-        before = Prediction.as_stored(case.prediction, case.definition.is_share)
+        before = PredictedNumber.as_stored(case.prediction, case.definition.is_share)
         if abs(today.centre - before.centre) > _LEAST_CHANGE * before.spread:
             changes.append(
                 f"{case.name}: {_number(before.median)} then, {_number(today.median)} now"

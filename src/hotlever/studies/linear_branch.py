@@ -60,7 +60,7 @@ _BORON = (1e17, 2e17, 5.75e17, 1e18, 2e18)
 
 
 @dataclass(frozen=True)
-class Case:
+class BranchCase:
     """A lever of the study.
 
     Attributes
@@ -80,20 +80,20 @@ class Case:
     changed: str
 
 
-def all_cases() -> dict[str, Case]:
+def all_cases() -> dict[str, BranchCase]:
     """Return the levers of the study by what is changed."""
     cases = {}
     for start in (Probe.reference(), Probe.u_shape()):
         name = start.shape.shape
-        cases[name] = Case(start, start.shape, "n", "")
+        cases[name] = BranchCase(start, start.shape, "n", "")
         fields = {*type(start.shape).model_fields, "n_d", "delta"}
         for key in (key for key in _VARIED if key in fields):
             for value in _VARIED[key]:
                 probe = start.with_(**{key: value})
-                cases[f"{name}, {key} = {value:g}"] = Case(probe, probe.shape, "n", key)
+                cases[f"{name}, {key} = {value:g}"] = BranchCase(probe, probe.shape, "n", key)
         for n_a in _BORON:
             probe = with_heater_of(start, kind="p-silicon", n_d=n_a)
-            cases[f"{name}, boron {n_a:g}"] = Case(probe, start.shape, "p", "n_d")
+            cases[f"{name}, boron {n_a:g}"] = BranchCase(probe, start.shape, "p", "n_d")
     return cases
 
 
@@ -132,7 +132,7 @@ def squares(shape: Shape) -> float:
 
 
 @dataclass(frozen=True)
-class Line:
+class BranchLine:
     """A straight line T = T_base + offset + slope P by least squares, over even temperatures.
 
     Attributes
@@ -147,7 +147,9 @@ class Line:
     off_K: float
 
     @classmethod
-    def of(cls, branch: Branch, coldest_K: float, hottest_K: float, *, offset: bool = True) -> Line:
+    def of(
+        cls, branch: Branch, coldest_K: float, hottest_K: float, *, offset: bool = True
+    ) -> BranchLine:
         """Fit a line to a branch; without an offset it passes through the base temperature."""
         tip = np.linspace(coldest_K, hottest_K, _POINTS)
         power, rise = branch.power(tip), tip - branch.base_temperature_K
@@ -161,20 +163,20 @@ def reach(branch: Branch, coldest_K: float) -> float:
     """Return how far (K) above a temperature a line stays within `WITHIN_K` of the branch."""
     reached, longest = 0.0, min(branch.hottest_K, HOTTEST) - coldest_K
     for length in [*np.arange(_STEP_K, longest, _STEP_K).tolist(), longest]:
-        if Line.of(branch, coldest_K, coldest_K + length).off_K > WITHIN_K:
+        if BranchLine.of(branch, coldest_K, coldest_K + length).off_K > WITHIN_K:
             break
         reached = length
     return reached
 
 
 def linear_branch_study(
-    cases: Mapping[str, Case], *, progress: Progress | None = None
+    cases: Mapping[str, BranchCase], *, progress: Progress | None = None
 ) -> xr.Dataset:
     """Fit lines to levers above their knees, and find what their slopes may depend on.
 
     Parameters
     ----------
-    cases : mapping of str to Case
+    cases : mapping of str to BranchCase
         Of `all_cases`.
     progress : callable, optional
         Called with the levers done and their number.
@@ -189,7 +191,7 @@ def linear_branch_study(
         `WITHIN_K`; ``slope_ratio``, dT/dP at the end over that
         at the knee, and ``kappa_ratio``, the same of κ_Si; ``resistance_K_per_mW``, R;
         ``knee_share`` and ``end_share``, the heater's of the power. As coordinates ``shape``,
-        ``dopant`` and ``changed`` of each `Case`.
+        ``dopant`` and ``changed`` of each `BranchCase`.
     """
     rows = [_row(case) for case in each(cases.values(), progress)]
     names = max(rows, key=len)
@@ -203,13 +205,13 @@ def linear_branch_study(
     return labelled(columns, "case", coordinates)
 
 
-def _row(case: Case) -> dict[str, float]:
+def _row(case: BranchCase) -> dict[str, float]:
     branch = Lever(case.probe, COARSE).branch()
     if branch.knee is None:
         return {"knee_K": np.nan}
     knee = branch.knee.tip_K
     end = min(knee + SPAN_K, branch.hottest_K, HOTTEST)
-    line, ends = Line.of(branch, knee, end), np.array([knee, end])
+    line, ends = BranchLine.of(branch, knee, end), np.array([knee, end])
     silicon, across = case.probe.heater_silicon, np.array([knee, (knee + end) / 2, end])
     conducted, _ = (
         thermal_conductivity(across)
@@ -226,7 +228,7 @@ def _row(case: Case) -> dict[str, float]:
         "slope_K_per_mW": line.slope_K_per_mW,
         "offset_K": line.offset_K,
         "straight_K": line.off_K,
-        "proportional_K": Line.of(branch, knee, end, offset=False).off_K,
+        "proportional_K": BranchLine.of(branch, knee, end, offset=False).off_K,
         "reach_K": reach(branch, knee),
         "slope_ratio": float(slopes[1] / slopes[0]),
         "kappa_ratio": float(conducted[2] / conducted[0]),

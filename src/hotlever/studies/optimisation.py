@@ -50,7 +50,7 @@ Bounds = tuple[float | None, float | None]
 
 
 @dataclass(frozen=True)
-class Optimum:
+class OptimalDesign:
     """A design, and the best within bounds.
 
     Attributes
@@ -95,7 +95,7 @@ def optimise(
     *,
     greatest: bool = False,
     progress: Progress | None = None,
-) -> Optimum:
+) -> OptimalDesign:
     """Find the design within bounds whose quantity is least, or greatest.
 
     Parameters
@@ -153,7 +153,7 @@ def optimise(
     best = SolvedDesign(SimilarLevers(Lever(improved)), improved, point, search.names)
     limits = search.limits(search.best, best)
     first = SolvedDesign(SimilarLevers(Lever(probe)), probe, point)
-    return Optimum(quantity, point, bounds, first, best, limits, search.designs, reason)
+    return OptimalDesign(quantity, point, bounds, first, best, limits, search.designs, reason)
 
 
 def _check(probe: Probe, quantity: str, bounds: Mapping[str, Bounds]) -> None:
@@ -342,7 +342,7 @@ class _Search:
         return (*texts, *quantities)
 
 
-def optimum_text(optimum: Optimum) -> str:
+def optimum_text(optimum: OptimalDesign) -> str:
     """Return start and best of a design, and what limits it, as lines of text."""
     start, best = optimum.values(optimum.start), optimum.values(optimum.best)
     width = max(map(len, start))

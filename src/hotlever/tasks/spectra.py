@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from hotlever.raman.lineshape import PeakOptions
     from hotlever.raman.raman_calibration import RamanCalibration
-    from hotlever.raman.series import Line
+    from hotlever.raman.series import MeasuredLine
     from hotlever.raman.spectrum import Spectrum
     from hotlever.raman.spectrum_tables import Correction
     from hotlever.raman.thermometer import Thermometer
@@ -207,12 +207,12 @@ class Thermometry:
     options: PeakOptions
     calibration: RamanCalibration | None = None
     thermometer: Thermometer | None = None
-    hot_plate: Sequence[Line] = ()
+    hot_plate: Sequence[MeasuredLine] = ()
     spectra: Sequence[Spectrum] = ()
     corrections: Mapping[str, Correction] = field(default_factory=dict)
     corrected_by: str = ""  #: name of the table
 
-    def measure(self, paths: Sequence[Path]) -> tuple[list[Line], xr.Dataset]:
+    def measure(self, paths: Sequence[Path]) -> tuple[list[MeasuredLine], xr.Dataset]:
         """Read and fit spectra; return their lines and the table of `read_lines`.
 
         Raises
@@ -269,7 +269,7 @@ def _measure(
     options: PeakOptions,
     corrections: Mapping[str, Correction],
     label: str,
-) -> list[Line]:
+) -> list[MeasuredLine]:
     """Fit the lines of spectra; those of many that have none are noted."""
     from hotlever.raman import series
 
@@ -319,7 +319,7 @@ def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
     options = _peak_options(listener, chosen, asked.shape, asked.resolution)
     by_hand = read_corrections(asked.corrections) if asked.corrections else {}
     corrected_by = str(asked.corrections)
-    hot_plate: list[Line] = []
+    hot_plate: list[MeasuredLine] = []
     spectra: list[Spectrum] = []
     if asked.calibrate_from:
         stated = asked.temperatures

@@ -20,7 +20,7 @@ from hotlever.app.pages.chosen_lever import (
 )
 from hotlever.app.pages.frame import ErrorBanner, caption, figure
 from hotlever.app.pages.plots import compare_histories
-from hotlever.app.pages.task_page import FILM, KINDS, DrawnPage, Work
+from hotlever.app.pages.task_page import FILM, KINDS, DrawnPage, JobView
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 
@@ -70,7 +70,7 @@ class Pulses(DrawnPage):
                 for key, (label, unit, kinds, empty) in _FIELDS.items():
                     field = self.number(key, label, unit, empty)
                     field.bind_visibility_from(kind, "value", backward=partial(contains, kinds))
-        Work(session, _BESIDE, self._beside_ended)
+        JobView(session, _BESIDE, self._beside_ended)
         self.show_result()
 
     def _values(self) -> dict[str, str]:

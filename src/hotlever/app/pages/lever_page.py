@@ -25,7 +25,7 @@ from hotlever.app.pages.frame import (
     table,
     two_columns,
 )
-from hotlever.app.pages.task_page import Page, Work
+from hotlever.app.pages.task_page import JobView, TaskPage
 from hotlever.app.probe_fields import (
     FILM,
     TERMINALS,
@@ -59,7 +59,7 @@ _LAWS = (
 )
 
 
-class LeverPage(Page):
+class LeverPage(TaskPage):
     """One tab of the page."""
 
     name = "lever"
@@ -82,7 +82,7 @@ class LeverPage(Page):
                 small_button("New: two legs (U)", self._take_u_shape)
                 self._fields = ProbeFields(self, self._edit)
             with right:
-                Work(session, self.name, self._proposed)
+                JobView(session, self.name, self._proposed)
                 mesh = ui.switch("mesh", value=self.chosen["mesh"], on_change=self._set_mesh)
                 mesh.tooltip("The triangles that the lever is solved on")
                 self._picture = ui.column().classes("w-full gap-1")
@@ -274,7 +274,7 @@ def proposal(session: Session, drawing: str) -> Task:
 class ProbeFields:
     """What can be set in the probe that is open; `edited` is told its sections with it set."""
 
-    def __init__(self, page: Page, edited: Callable[[Sections], Awaitable[None]]) -> None:
+    def __init__(self, page: TaskPage, edited: Callable[[Sections], Awaitable[None]]) -> None:
         self._session, self._banner, self._edited = page.session, page.banner, edited
         self._sections: Sections = {}
         self._turn = 0

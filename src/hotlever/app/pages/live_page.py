@@ -15,7 +15,7 @@ from nicegui import background_tasks, ui
 from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import ErrorBanner, caption, number_shown, two_columns
 from hotlever.app.pages.plots import redraw
-from hotlever.app.pages.task_page import Page, Work
+from hotlever.app.pages.task_page import JobView, TaskPage
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
@@ -82,7 +82,7 @@ def slider(
     return number
 
 
-class LivePage(Page):
+class LivePage(TaskPage):
     """A page whose task is shown at once, at a state that sliders move, and gives its table.
 
     Attributes
@@ -244,7 +244,7 @@ class LivePage(Page):
             ui.label("Take it with you").classes("text-bold")
             self.about_table()
             self.kind_buttons(lambda kind: self.run(self._writing(kind)))
-            Work(self.session, self.name, self.give)
+            JobView(self.session, self.name, self.give)
             self.command()
 
     @property

@@ -26,7 +26,7 @@ from hotlever.app.pages.frame import (
 )
 from hotlever.app.pages.plots import MeasuredPlots
 from hotlever.app.pages.results import show_result
-from hotlever.app.pages.task_page import MEDIA, Page, Work, several
+from hotlever.app.pages.task_page import MEDIA, JobView, TaskPage, several
 from hotlever.app.project import CALIBRATIONS, DATA, EXAMPLES, FIT, FITS
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
@@ -57,7 +57,7 @@ _OF_FOLDER = (
 )
 
 
-class MeasurementsPage(Page):
+class MeasurementsPage(TaskPage):
     """One tab of the page."""
 
     name = "measurements"
@@ -110,7 +110,7 @@ class MeasurementsPage(Page):
                     names = {"": "–"} | {name: name for name in results}
                     self.choice("opened", "Or open a result of the folder", names)
             with right:
-                Work(session, self.name, self._ended, during=self._follow, notes=False)
+                JobView(session, self.name, self._ended, during=self._follow, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
                 self._columns = ColumnPicker(partial(self._tell, "columns"))
                 opened = ui.expansion(_UNDERSTOOD, value=True)

@@ -23,7 +23,7 @@ from hotlever.app.pages.frame import (
 from hotlever.app.pages.lever_page import LeverPage, proposal
 from hotlever.app.pages.measurements import MeasurementsPage
 from hotlever.app.pages.simulate import SimulatePage
-from hotlever.app.pages.task_page import Page
+from hotlever.app.pages.task_page import TaskPage
 from hotlever.app.project import DRAWINGS, EXAMPLES
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
@@ -131,7 +131,7 @@ def serve_pictures() -> None:
     app.add_static_files(_ADDRESS, _SCRIPTS)
 
 
-class StartPage(Page):
+class StartPage(TaskPage):
     """One tab of the page."""
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:

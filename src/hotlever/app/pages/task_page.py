@@ -48,7 +48,7 @@ _OTHER = "Something else is chosen now; this is still the result of:"
 _LOOK_S = 0.1
 
 
-class Page:
+class TaskPage:
     """One tab of a page, or of a part of one.
 
     Attributes
@@ -293,7 +293,7 @@ def outputs(stem: str, kind: str) -> dict[str, str]:
     return {"output": f"{stem}.csv", "plot": f"{stem}.{kind.lower()}"}
 
 
-class Work:
+class JobView:
     """The job that runs for a page, or ran last: progress, notes, its line, and cancelling.
 
     Parameters
@@ -378,7 +378,7 @@ class Work:
             self._during(job)
 
 
-class DrawnPage(Page):
+class DrawnPage(TaskPage):
     """A page, or a part of one, that shows the figure of its task and gives what it computed."""
 
     #: What the figure shows.
@@ -386,7 +386,7 @@ class DrawnPage(Page):
 
     def show_result(self) -> None:
         """Show the work here, what it drew last, and the command line."""
-        Work(self.session, self.name, self._ended)
+        JobView(self.session, self.name, self._ended)
         self._result = ui.column().classes("w-full gap-3")
         self.command()
         self._show()

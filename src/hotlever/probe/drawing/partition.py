@@ -21,7 +21,7 @@ Edge = frozenset[Point]
 
 
 @dataclass(frozen=True)
-class Piece:
+class PartitionPiece:
     """One connected part of the lever, of the same layers.
 
     Attributes
@@ -42,12 +42,12 @@ class Partition:
 
     Attributes
     ----------
-    pieces : list of Piece
+    pieces : list of PartitionPiece
     shared : dict of (int, int) to list of Edge
         The edges that two pieces share, by their numbers, the lower first.
     """
 
-    pieces: list[Piece]
+    pieces: list[PartitionPiece]
     shared: dict[tuple[int, int], list[Edge]]
 
     def neighbours(self, number: int) -> set[int]:
@@ -155,7 +155,7 @@ def partitioned(
             kinds[part, *on_it].append(face)
     order = [*names, body_name]
     pieces = [
-        Piece(kind, orient(shape))
+        PartitionPiece(kind, orient(shape))
         for kind in sorted(kinds, key=lambda kind: order.index(kind[0]))
         for shape in sorted(parts_of(shapely.union_all(kinds[kind])), key=lambda shape: -shape.area)
     ]

@@ -45,7 +45,7 @@ from hotlever.probe.drawing.outlines import (
     snapped,
     together,
 )
-from hotlever.probe.drawing.partition import Partition, Piece, partitioned
+from hotlever.probe.drawing.partition import Partition, PartitionPiece, partitioned
 from hotlever.probe.drawing.sheet import (
     FARTHEST_UM,
     LARGEST_UM,
@@ -165,7 +165,7 @@ def _healed_on(
 
 
 def _check_piece(
-    piece: Piece,
+    piece: PartitionPiece,
     borders: dict[str, BaseGeometry],
     drawn: dict[str, list[Polygon]],
     narrowest: float,

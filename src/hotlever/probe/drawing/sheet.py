@@ -37,7 +37,7 @@ UNITS = {"um": 1.0, "mm": 1e3, "nm": 1e-3, "m": 1e6, "cm": 1e4, "inch": 25_400.0
 
 
 @dataclass(frozen=True)
-class Layer:
+class SheetLayer:
     """One layer of a sheet.
 
     Attributes
@@ -65,7 +65,7 @@ class Sheet:
         All cells, and those that no other refers to.
     cell : str or None
         The one whose layers these are; None in a DXF file.
-    layers : dict of str to Layer
+    layers : dict of str to SheetLayer
     labels : list of (str, str, Point)
         Layer, text and place of each text.
     unit_um : float
@@ -84,14 +84,14 @@ class Sheet:
     cells: list[str]
     top: list[str]
     cell: str | None
-    layers: dict[str, Layer]
+    layers: dict[str, SheetLayer]
     labels: list[tuple[str, str, Point]]
     unit_um: float = 1.0
     unit_stated: bool = True
     remarks: list[tuple[str, str]] = field(default_factory=list)
     hidden: dict[str, str] = field(default_factory=dict)
 
-    def layer(self, name: str, where: str) -> Layer:
+    def layer(self, name: str, where: str) -> SheetLayer:
         """Return a layer by its name, which in DXF does not differ by case.
 
         Raises
@@ -121,7 +121,7 @@ class Sheet:
         names = (*self.layers, *self.hidden)
         return next((own for own in names if own.lower() == name.lower()), name)
 
-    def rings(self, layer: Layer, *, lines: bool = False) -> tuple[Ring, ...]:
+    def rings(self, layer: SheetLayer, *, lines: bool = False) -> tuple[Ring, ...]:
         """Return the outlines of a layer; with `lines` the steps of open ones too."""
         closed = layer.rings if self.kind == "DXF" else without_nested(layer.rings)
         steps = (step for line in layer.lines for step in pairwise(line))
@@ -162,7 +162,9 @@ def read_sheet(
     for name, outlines in sorted(parsed["layers"].items()):
         joined, lines = _joined(_rings(outlines["lines"]), tolerance_um)
         fills = [(_rings(fill["rings"]), fill["rule"]) for fill in outlines["fills"]]
-        layer = Layer(united((*_rings(outlines["rings"]), *joined), fills, tolerance_um), lines)
+        layer = SheetLayer(
+            united((*_rings(outlines["rings"]), *joined), fills, tolerance_um), lines
+        )
         if layer.rings or layer.lines:
             layers[name] = layer
     labels = [(layer, text, (x, y)) for layer, text, x, y in parsed["labels"]]

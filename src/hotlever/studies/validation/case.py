@@ -45,7 +45,7 @@ _PER_AREA = 1e9
 _SHARE = "share"
 
 
-class Quantity(NamedTuple):
+class PredictedQuantity(NamedTuple):
     """What is predicted: a positive number, or a share."""
 
     unit: str
@@ -232,7 +232,7 @@ def heat_conductance_of_contact(
 
 #: By the names that cases have for them.
 QUANTITIES = {
-    function.__name__: Quantity(unit, (function.__doc__ or "").partition(".")[0], function)
+    function.__name__: PredictedQuantity(unit, (function.__doc__ or "").partition(".")[0], function)
     for function, unit in (
         (power_ratio_in_air, "1"),
         (share_into_air, _SHARE),
@@ -254,7 +254,7 @@ QUANTITIES = {
 }
 
 
-class Stored(Record):
+class StoredPrediction(Record):
     """A prediction as it was written down: the median, and within what it is with 95 %."""
 
     median: float = Field(gt=0)
@@ -288,7 +288,7 @@ class Case(Record):
     assumed: str
     given: dict[str, float | str] = Field(default_factory=dict)
     lever: dict[str, Any] = Field(default_factory=dict)
-    prediction: Stored | None = None
+    prediction: StoredPrediction | None = None
     published: Published | None = None
     remark: str = ""
     outside: str = Field(default="", description="why the published value is not in the band")
@@ -325,7 +325,7 @@ class Case(Record):
         return case
 
     @property
-    def definition(self) -> Quantity:
+    def definition(self) -> PredictedQuantity:
         """The quantity."""
         return QUANTITIES[self.quantity]
 

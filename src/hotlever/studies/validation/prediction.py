@@ -19,7 +19,7 @@ from scipy.stats import norm, qmc
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.probe.priors import Prior, as_known, default_priors
 from hotlever.steps import each
-from hotlever.studies.validation.case import Case, Stored
+from hotlever.studies.validation.case import Case, StoredPrediction
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
@@ -34,7 +34,7 @@ OUTSIDE = "outside"
 
 
 @dataclass(frozen=True)
-class Prediction:
+class PredictedNumber:
     """What a case predicts: a normal distribution of the quantity's logarithm, of a share's logit.
 
     Attributes
@@ -63,14 +63,14 @@ class Prediction:
     @classmethod
     def of(
         cls, values: ArrayLike, is_share: bool, impossible: int = 0, silent: int = 0
-    ) -> Prediction:
+    ) -> PredictedNumber:
         """Return the prediction that draws of the quantity make."""
         transformed = _transformed(np.asarray(values), is_share)
         centre, spread = float(transformed.mean()), float(transformed.std(ddof=1))
         return cls(centre, spread, is_share, impossible, silent)
 
     @classmethod
-    def as_stored(cls, stored: Stored, is_share: bool) -> Prediction:
+    def as_stored(cls, stored: StoredPrediction, is_share: bool) -> PredictedNumber:
         """Return a prediction as it was written down."""
         numbers = np.array([stored.median, stored.low_95, stored.high_95])
         centre, low, high = _transformed(numbers, is_share).tolist()
@@ -137,7 +137,7 @@ def computed(case: Case, changes: dict[str, Any] | None = None) -> float:
     return value
 
 
-def predict(case: Case, progress: Progress | None = None) -> Prediction:
+def predict(case: Case, progress: Progress | None = None) -> PredictedNumber:
     """Draw from the priors of a case, and return median and spread of its quantity.
 
     Raises
@@ -167,7 +167,7 @@ def predict(case: Case, progress: Progress | None = None) -> Prediction:
         raise ComputationError(
             f"{case.name}: {missing} of {DRAWS} draws from the priors show no {case.quantity}"
         )
-    return Prediction.of(values, case.definition.is_share, impossible, missing - impossible)
+    return PredictedNumber.of(values, case.definition.is_share, impossible, missing - impossible)
 
 
 def comparison(cases: list[Case]) -> xr.Dataset:
@@ -183,7 +183,7 @@ def comparison(cases: list[Case]) -> xr.Dataset:
         assert case.prediction is not None
         assert case.published is not None
         value, error = case.published.value, case.published.error
-        stored = Prediction.as_stored(case.prediction, case.definition.is_share)
+        stored = PredictedNumber.as_stored(case.prediction, case.definition.is_share)
         low, high = stored.band_95
         rows.append(
             {
