@@ -44,19 +44,56 @@ from hotlever.tables import groups_in
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS, name_and_unit
 
-#: Times the largest resistance of a lever: in series, it makes the bias rise along its curve.
-_ENOUGH = 2.0
-#: Part of the largest bias by which it may fall along the curve, for noise.
-_FALLS = 0.002
-#: Part of the largest current below which resistances are noise.
-_COLD = 0.1
 #: What changes its sign with the polarity.
 _TURNED = ("V_b", LEVER, "I_h", "V_r", "V_bridge")
-#: Part by which V_b - V_l may be off what R_s I_h says, of the largest bias.
-_VOLTAGES_AGREE = 0.05
 
 
-def find_bias(contents: Contents, circuit: Circuit | None, waveform: Waveform | None) -> None:
+@dataclass(frozen=True)
+class BiasOptions:
+    """How a bias follows from voltages, currents and times.
+
+    Attributes
+    ----------
+    in_series : float
+        Times the largest resistance of a lever: in series, it makes the bias rise along its curve.
+    fall : float
+        Share of the largest bias by which it may fall along the curve, for noise.
+    cold : float
+        Share of the largest current below which resistances are noise.
+    agreement : float
+        Share of the largest bias by which V_b - V_l may be off R_s I_h.
+    straight : float
+        Share of the largest bias by which it may be off straight lines.
+    deviations : float
+        The same in standard deviations of its noise.
+    noise : float
+        Share of the largest bias up to which these count.
+    same_time : float
+        Share of a time within which it is the same.
+    jump : float
+        Share of the largest bias by which it jumps from one row to the next.
+    most_lines : int
+        Straight lines that a wave form may have.
+    """
+
+    in_series: float = 2.0
+    fall: float = 2e-3
+    cold: float = 0.1
+    agreement: float = 0.05
+    straight: float = 1e-3
+    deviations: float = 5.0
+    noise: float = 0.03
+    same_time: float = 1e-9
+    jump: float = 0.1
+    most_lines: int = 500
+
+
+def find_bias(
+    contents: Contents,
+    circuit: Circuit | None,
+    waveform: Waveform | None,
+    options: BiasOptions,
+) -> None:
     """Complete bias, current and R_s from the voltage over the lever and the wave form, if given.
 
     Raises
@@ -78,19 +115,22 @@ def find_bias(contents: Contents, circuit: Circuit | None, waveform: Waveform | 
         values["V_b"] = np.full_like(values["V_b"], bias)
         contents.origin["V_b"] = "a comment, the same for all rows"
     else:
-        _bias_of_lever_voltage(contents, circuit)
+        _bias_of_lever_voltage(contents, circuit, options)
     if LEVER in columns and TIME in columns and "I_h" not in columns:
         _current_of_voltages(contents, circuit)
     elif LEVER in columns and "V_b" in columns and waveform is None:
-        _compare_voltages(contents)
+        _compare_voltages(contents, options)
 
 
-def _bias_of_lever_voltage(contents: Contents, circuit: Circuit | None) -> None:
+def _bias_of_lever_voltage(
+    contents: Contents, circuit: Circuit | None, options: BiasOptions
+) -> None:
     lever, current = contents.values[LEVER], contents.values["I_h"]
     for symbol, missing in ((LEVER, np.isnan(lever)), ("I_h", np.isnan(current))):
         contents.refuse(missing, f"a number, since V_b follows from {LEVER}", symbol)
     kohm = _series_kohm(contents, circuit, f"{LEVER} without R_s, from which the bias follows")
-    if TIME not in contents.columns and (more := _telling_kohm(lever, current, kohm)) > kohm:
+    more = _telling_kohm(lever, current, kohm, options)
+    if TIME not in contents.columns and more > kohm:
         contents.note(
             f"V_b = V_l + R_s I_h with R_s = {1000.0 * kohm:g} ohm does not tell the points beyond "
             f"the knee apart; {more:g} kOhm are reckoned with instead, which changes nothing that "
@@ -132,26 +172,26 @@ def _put_resistance(contents: Contents, ohm: float, what: str, origin: str) -> N
     contents.settings.put("series_resistance_ohm", ohm, origin)
 
 
-def _telling_kohm(lever: Array, current: Array, kohm: float) -> float:
+def _telling_kohm(lever: Array, current: Array, kohm: float, options: BiasOptions) -> float:
     """Return a resistance behind which no two points of a curve have one bias: its own if it can.
 
     Beyond the knee voltage and current fall and rise again, each on its own; behind a resistance
     of the lever's size or more the bias rises all the way.
     """
-    warm = np.abs(current) > _COLD * np.abs(current).max()
-    enough = _ENOUGH * float(np.max(np.abs(lever[warm] / current[warm]), initial=0.0))
+    warm = np.abs(current) > options.cold * np.abs(current).max()
+    enough = options.in_series * float(np.max(np.abs(lever[warm] / current[warm]), initial=0.0))
     order = np.argsort(np.abs(lever + enough * current), kind="stable")
     bias = np.abs(lever + kohm * current)[order]
-    falls = np.max(np.maximum.accumulate(bias) - bias) > _FALLS * bias.max()
+    falls = np.max(np.maximum.accumulate(bias) - bias) > options.fall * bias.max()
     return float(f"{enough:.2g}") if falls and enough > kohm else kohm
 
 
-def _compare_voltages(contents: Contents) -> None:
+def _compare_voltages(contents: Contents, options: BiasOptions) -> None:
     """Take R_s from bias and lever voltage, or check that the one given agrees with them."""
     path, values = contents.table.path, contents.values
     settings = contents.settings.values
     behind, current = values["V_b"] - values[LEVER], values["I_h"]
-    warm = np.abs(current) > _COLD * np.nanmax(np.abs(current), initial=0.0)
+    warm = np.abs(current) > options.cold * np.nanmax(np.abs(current), initial=0.0)
     warm &= np.isfinite(behind)
     if not warm.any():
         contents.note(f"{LEVER} is not used beside V_b without I_h")
@@ -159,7 +199,7 @@ def _compare_voltages(contents: Contents) -> None:
     kohm = float(np.median(behind[warm] / current[warm]))
     ohm = settings.get("series_resistance_ohm", 1000.0 * kohm)
     off = np.abs(behind[warm] - ohm / 1000.0 * current[warm])
-    if kohm < 0.0 or np.median(off) > _VOLTAGES_AGREE * np.abs(values["V_b"]).max():
+    if kohm < 0.0 or np.median(off) > options.agreement * np.abs(values["V_b"]).max():
         raise InputError(
             f"{path}: V_b - {LEVER} is {kohm:.4g} kOhm times I_h, expected R_s = "
             f"{ohm:.4g} ohm; is a unit wrong?"
@@ -191,17 +231,6 @@ def mirror(contents: Contents) -> None:
     contents.note_rows(sign < 0.0, f"V_b is negative, and counts as positive with {others}")
 
 
-#: By what a bias may differ from straight lines: a share of the largest, and so many standard
-#: deviations of its noise, but no larger a share.
-_STRAIGHT, _NOISE, _MOST_NOISE = 1e-3, 5.0, 0.03
-#: Share of a time within which it is the same.
-_SAME = 1e-9
-#: Share of the largest bias by which it jumps from one row to the next.
-_JUMP = 0.1
-#: Straight lines that a wave form may have at most.
-_MOST_LINES = 500
-
-
 def check_times(contents: Contents) -> None:
     """Refuse times that are missing or do not rise.
 
@@ -219,18 +248,19 @@ def check_times(contents: Contents) -> None:
         raise InputError(f"{contents.table.path}: found one row, expected two or more times")
 
 
-def leave_out_jumps(contents: Contents, waveform: Waveform) -> None:
+def leave_out_jumps(contents: Contents, waveform: Waveform, options: BiasOptions) -> None:
     """Leave out what was measured when the bias jumps: nobody can tell if before or behind."""
     times, values = contents.values[TIME], contents.values
-    pieces = waveform.pieces(float(times[-1]) * (1.0 + _SAME) + _SAME)
+    same = options.same_time
+    pieces = waveform.pieces(float(times[-1]) * (1.0 + same) + same)
     jumps = np.array([piece.start for piece in pieces if piece.jumps])
-    at_jump = np.isclose(times[:, None], jumps, rtol=_SAME, atol=0.0).any(axis=1)
+    at_jump = np.isclose(times[:, None], jumps, rtol=same, atol=0.0).any(axis=1)
     for column in FITTED.values():
         values[column.symbol] = np.where(at_jump, np.nan, values[column.symbol])
     contents.note_rows(at_jump, "the bias jumps at this time, so that the row is not used")
 
 
-def find_waveform(contents: Contents) -> Waveform:
+def find_waveform(contents: Contents, options: BiasOptions) -> Waveform:
     """Return the straight lines that biases lie on within their noise; times count from 0 on.
 
     Raises
@@ -241,7 +271,8 @@ def find_waveform(contents: Contents) -> Waveform:
     table, times, bias = contents.table, contents.values[TIME], contents.values["V_b"]
     largest = float(np.abs(bias).max())
     noise = noise_about_neighbours(bias) if bias.size > 4 else 0.0
-    tolerance = max(_STRAIGHT * largest, min(_NOISE * noise, _MOST_NOISE * largest))
+    scatter = min(options.deviations * noise, options.noise * largest)
+    tolerance = max(options.straight * largest, scatter)
     begins_on = abs(float(bias[0])) > tolerance
     if begins_on and times[0] < 0.0:
         raise InputError(
@@ -250,11 +281,11 @@ def find_waveform(contents: Contents) -> Waveform:
         )
     if not begins_on:
         times = contents.values[TIME] = times - times[0]
-    corners = _corners(times, bias, tolerance)
+    corners = _corners(times, bias, tolerance, options.most_lines)
     if corners is None:
         raise InputError(
-            f"{table.path}: V_b has more than {_MOST_LINES} straight parts, expected fewer, or the "
-            "wave form beside the file, such as --pulse 10V,5us"
+            f"{table.path}: V_b has more than {options.most_lines} straight parts, expected fewer, "
+            "or the wave form beside the file, such as --pulse 10V,5us"
         )
     from scipy.interpolate import make_lsq_spline  # takes half a second
 
@@ -269,7 +300,7 @@ def find_waveform(contents: Contents) -> Waveform:
             at, volts = np.append(0.0, at), np.append(volts[0], volts)
     else:
         volts[0] = 0.0
-    steep = (np.diff(corners) == 1) & (np.abs(np.diff(bias[corners])) > _JUMP * largest)
+    steep = (np.diff(corners) == 1) & (np.abs(np.diff(bias[corners])) > options.jump * largest)
     if steep.any():
         row = int(corners[:-1][steep][0]) + 1
         contents.notes.append(
@@ -281,7 +312,7 @@ def find_waveform(contents: Contents) -> Waveform:
     return Polyline(text, tuple(at.tolist()), tuple(volts.tolist()), float(at[-1]))
 
 
-def _corners(times: Array, bias: Array, tolerance: float) -> Array | None:
+def _corners(times: Array, bias: Array, tolerance: float, most_lines: int) -> Array | None:
     """Return the rows between which all others lie near straight lines; None if these are many.
 
     By Douglas and Peucker (Cartographica 10, 112 (1973)): where a line misses a row by most, there
@@ -296,7 +327,7 @@ def _corners(times: Array, bias: Array, tolerance: float) -> Array | None:
             corner = int(rows[away.argmax()])
             corners.add(corner)
             open_ends += [(first, corner), (corner, last)]
-        if len(corners) > _MOST_LINES:
+        if len(corners) > most_lines:
             return None
     return np.array(sorted(corners))
 
@@ -400,12 +431,13 @@ def _complete_in_time(
     contents: Contents, circuit: Circuit | None, waveform: Waveform | None
 ) -> tuple[Waveform, str]:
     """Complete what was measured in time; return its wave form, and its order in words."""
+    options = BiasOptions()
     check_times(contents)
-    find_bias(contents, circuit, waveform)
+    find_bias(contents, circuit, waveform, options)
     if waveform is None:
-        waveform = find_waveform(contents)
+        waveform = find_waveform(contents, options)
     else:
-        leave_out_jumps(contents, waveform)
+        leave_out_jumps(contents, waveform, options)
     check(contents, signed=True)
     return waveform, f"in time, {counted(len(contents.table.rows), 'row')}; {waveform.text}"
 
@@ -414,7 +446,7 @@ def _complete_at_rest(
     contents: Contents, circuit: Circuit | None, series_ohm: float, *, symmetric: bool
 ) -> str:
     """Complete a slow sweep, of either polarity; return the order of its rows in words."""
-    find_bias(contents, circuit, None)
+    find_bias(contents, circuit, None, BiasOptions())
     bias = contents.values["V_b"]
     if symmetric:
         mirror(contents)

@@ -9,7 +9,7 @@ the mean bias, some mK of the tip temperature.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -19,22 +19,47 @@ from hotlever.measurement.data import MEASURED, Measurement
 from hotlever.quantities import FITTED
 from hotlever.types import Array, Index, Mask
 
-#: A turn is where the bias goes back by more than this part of its range.
-_BACK = 0.1
-#: Sweeps of fewer rows are none.
-_FEWEST = 3
-#: Sweeps differ if they do so by this part of the largest value, and by more than noise, at so many
-#: rows. Noise has von Neumann's ratio of 1 within so many of its standard deviations, 1/√n (Ann.
-#: Math. Stat. 12, 367 (1941)): half the mean square between neighbours over that of all.
-_DIFFERENT, _DEVIATIONS, _ENOUGH = 0.001, 3.0, 8
-#: Rows up to which all are used as they are, and steps of the bias in which more are averaged.
-MANY, STEPS = 2000, 1000
-#: For a robust fit a datum is left out of its mean beyond so many standard deviations
-#: (median-based) of the data of its step, of which it takes some to tell.
-_OUTLIER, _FEWEST_IN_STEP = 8.0, 5
+
+@dataclass(frozen=True)
+class RowOptions:
+    """What counts as a sweep, as a difference of sweeps, and as many rows.
+
+    Attributes
+    ----------
+    turn : float
+        Share of the range of the bias by which it goes back where it turns.
+    fewest : int
+        Rows of a sweep.
+    different : float
+        Share of the largest value by which sweeps differ (rms).
+    deviations : float
+        Noise has von Neumann's ratio of 1 within so many of its standard deviations, 1/√n (Ann.
+        Math. Stat. 12, 367 (1941)): half the mean square between neighbours over that of all.
+    compared : int
+        Rows that two sweeps have in common, from which on they are compared.
+    many : int
+        Rows up to which all are used as they are.
+    steps : int
+        Of the bias, in which more rows are averaged.
+    outlier : float
+        Standard deviations (median-based) of the data of a step, beyond which a datum is left out
+        of a robust mean.
+    fewest_in_step : int
+        Rows of a step that tell these.
+    """
+
+    turn: float = 0.1
+    fewest: int = 3
+    different: float = 1e-3
+    deviations: float = 3.0
+    compared: int = 8
+    many: int = 2000
+    steps: int = 1000
+    outlier: float = 8.0
+    fewest_in_step: int = 5
 
 
-def sweeps_of(bias: Array) -> list[slice]:
+def sweeps_of(bias: Array, options: RowOptions | None = None) -> list[slice]:
     """Return the rows of each sweep: from turn to turn, and on either side of zero.
 
     `bias` has its sign. Rows in no order are one sweep.
@@ -44,20 +69,21 @@ def sweeps_of(bias: Array) -> list[slice]:
     >>> sweeps_of(np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0]))
     [slice(0, 4, None), slice(4, 7, None)]
     """
+    options = options or RowOptions()
     # rows at which the bias has another sign than before
     signed = np.flatnonzero(bias != 0.0)
     crossings = signed[1:][np.diff(np.sign(bias[signed])) != 0.0].tolist()
-    ends = sorted({0, *_turns(bias), *crossings, bias.size})
-    if np.median(np.diff(ends)) < _FEWEST:
+    ends = sorted({0, *_turns(bias, options.turn), *crossings, bias.size})
+    if np.median(np.diff(ends)) < options.fewest:
         return [slice(0, bias.size)]
     # what is too short for a sweep belongs to the one before
-    begins = [at for at, end in pairwise(ends) if at == 0 or end - at >= _FEWEST]
+    begins = [at for at, end in pairwise(ends) if at == 0 or end - at >= options.fewest]
     return [slice(begin, end) for begin, end in pairwise([*begins, bias.size])]
 
 
-def _turns(bias: Array) -> list[int]:
+def _turns(bias: Array, share: float) -> list[int]:
     """Rows with which a sweep begins because the bias turns."""
-    back = _BACK * np.ptp(bias) if bias.size else 0.0
+    back = share * np.ptp(bias) if bias.size else 0.0
     turns: list[int] = []
     farthest, way = 0, 0
     for row in range(1, bias.size):
@@ -70,7 +96,7 @@ def _turns(bias: Array) -> list[int]:
         elif abs(step) > back:
             turns.append(farthest + 1)
             # one row back at the start is a sweep in the same direction
-            jumped = row == farthest + 1 and abs(step) > (1.0 - _BACK) * np.ptp(bias)
+            jumped = row == farthest + 1 and abs(step) > (1.0 - share) * np.ptp(bias)
             way, farthest = way if jumped else -way, row
     return turns
 
@@ -88,16 +114,23 @@ def described(bias: Array, sweeps: list[slice]) -> str:
 
 
 def disagreements(
-    bias: Array, sweeps: list[slice], data: dict[str, Array], symmetric: bool = True
+    bias: Array,
+    sweeps: list[slice],
+    data: dict[str, Array],
+    symmetric: bool = True,
+    options: RowOptions | None = None,
 ) -> list[str]:
     """Say by how much sweeps differ from the first, if by more than noise.
 
     Polarities are compared if the circuit is symmetric.
     """
+    options = options or RowOptions()
     texts, along = [], np.abs(bias) if symmetric else bias
     for name, values in data.items():
         largest = np.nanmax(np.abs(values), initial=0.0)
-        sizes = [_difference(along, values, sweeps[0], sweep, largest) for sweep in sweeps[1:]]
+        sizes = [
+            _difference(along, values, sweeps[0], sweep, largest, options) for sweep in sweeps[1:]
+        ]
         if max(sizes, default=0.0) > 0.0:
             texts.append(
                 f"{name} of sweep {2 + np.argmax(sizes)} differs from that of sweep 1 by "
@@ -107,19 +140,26 @@ def disagreements(
     return texts
 
 
-def _difference(along: Array, values: Array, first: slice, other: slice, largest: float) -> float:
+def _difference(
+    along: Array,
+    values: Array,
+    first: slice,
+    other: slice,
+    largest: float,
+    options: RowOptions,
+) -> float:
     """Return what one sweep has beside another (rms); 0 where that is noise, or next to nothing."""
     (x, y), (at, others) = (_rising(along[rows], values[rows]) for rows in (first, other))
-    if x.size < _FEWEST:
+    if x.size < options.fewest:
         return 0.0
     difference = others - np.interp(at, x, y, np.nan, np.nan)
     difference = difference[np.isfinite(difference)]
-    if difference.size < _ENOUGH:
+    if difference.size < options.compared:
         return 0.0
     noise, square = 0.5 * np.mean(np.diff(difference) ** 2), np.mean(difference**2)
-    beyond = square - noise > _DEVIATIONS / np.sqrt(difference.size) * square
+    beyond = square - noise > options.deviations / np.sqrt(difference.size) * square
     size = float(np.sqrt(square))
-    return size if beyond and size > _DIFFERENT * largest else 0.0
+    return size if beyond and size > options.different * largest else 0.0
 
 
 def _rising(x: Array, y: Array) -> tuple[Array, Array]:
@@ -132,7 +172,9 @@ def _rising(x: Array, y: Array) -> tuple[Array, Array]:
 # --- many rows averaged to some -----------------------------------------------------------------
 
 
-def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
+def averaged(
+    measurement: Measurement, robust: bool = False, options: RowOptions | None = None
+) -> Measurement:
     """Average the rows of equal or nearly equal bias, if there are very many.
 
     Parameters
@@ -140,6 +182,7 @@ def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
     measurement : Measurement
     robust : bool
         Whether data far off the others of their step are left out.
+    options : RowOptions, optional
 
     Returns
     -------
@@ -147,19 +190,20 @@ def averaged(measurement: Measurement, robust: bool = False) -> Measurement:
         As it was, if it has few rows, is one of averages or in time. Else its ``rows`` say of how
         many each is the mean; in the order of the file.
     """
-    averaged_before = measurement.rows is not None
-    if measurement.bias_V.size <= MANY or averaged_before or measurement.time_us is not None:
+    options = options or RowOptions()
+    few = measurement.bias_V.size <= options.many
+    if few or measurement.rows is not None or measurement.time_us is not None:
         return measurement
     columns = {column.name: getattr(measurement, column.name) for column in MEASURED}
     columns = {name: values for name, values in columns.items() if values is not None}
-    step = _steps(measurement.bias_V)
+    step = _steps(measurement.bias_V, options.steps)
     if measurement.distance_um is not None:
         # other distances from a sample are other states of the lever
         distance = np.nan_to_num(measurement.distance_um)
         step = np.unique([step, distance], axis=1, return_inverse=True)[1]
     if robust:
         for name in (FITTED[observable].name for observable in measurement.observables):
-            columns[name] = np.where(_far_off(columns[name], step), np.nan, columns[name])
+            columns[name] = np.where(_far_off(columns[name], step, options), np.nan, columns[name])
     observed = [columns[FITTED[name].name] for name in measurement.observables]
     has_data = np.isfinite(observed).any(axis=0)
     used = {name: values[has_data] for name, values in columns.items()}
@@ -190,16 +234,16 @@ def note_on_averages(whole: Measurement, used: Measurement) -> list[str]:
     ]
 
 
-def _steps(bias: Array) -> Index:
+def _steps(bias: Array, most: int) -> Index:
     """Return for each row the number of its bias, or of its step if there are too many biases."""
     levels, step = np.unique(bias, return_inverse=True)
-    if levels.size <= STEPS:
+    if levels.size <= most:
         return step
-    width = (levels[-1] - levels[0]) / STEPS
-    return np.minimum((bias - levels[0]) / width, STEPS - 1).astype(np.intp)
+    width = (levels[-1] - levels[0]) / most
+    return np.minimum((bias - levels[0]) / width, most - 1).astype(np.intp)
 
 
-def _far_off(values: Array, step: Index) -> Mask:
+def _far_off(values: Array, step: Index, options: RowOptions) -> Mask:
     """Return which data are far off the others of their step."""
     finite = np.isfinite(values)
     data, (steps, group) = values[finite], np.unique(step[finite], return_inverse=True)
@@ -208,8 +252,8 @@ def _far_off(values: Array, step: Index) -> Mask:
     numbers = np.arange(steps.size)
     away = np.abs(data - median(data, group, numbers)[group])
     scatter = 1.4826 * median(away, group, numbers)[group]
-    enough = np.bincount(group)[group] >= _FEWEST_IN_STEP
+    enough = np.bincount(group)[group] >= options.fewest_in_step
     usual = np.median(scatter[enough & (scatter > 0)]) if np.any(enough & (scatter > 0)) else 0.0
     far = np.zeros(values.size, dtype=bool)
-    far[finite] = enough & (away > _OUTLIER * np.maximum(scatter, usual))
+    far[finite] = enough & (away > options.outlier * np.maximum(scatter, usual))
     return far

@@ -13,9 +13,9 @@ turns both into real and imaginary part of the Faddeeva function w(z): Abramowit
 Stegun, Handbook of Mathematical Functions, 7.1 and 7.4.13, with w'(z) = −2z·w(z) + 2i/√π.
 
 With a background, and perhaps a band, the line is the model of a spectrum (`LineProblem`), whose
-ten parameters are, by place: the line's centre, ln fwhm and height, the background's level and slope,
-the line's asymmetry, ln sigma of the spectrometer's response, and the band's height, centre and
-ln fwhm.
+ten parameters are, by place: the line's centre, ln fwhm and height, the background's level and
+slope, the line's asymmetry, ln sigma of the spectrometer's response, and the band's height, centre
+and ln fwhm.
 """
 
 from __future__ import annotations
