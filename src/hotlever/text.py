@@ -9,13 +9,13 @@ from collections.abc import Sequence
 #: What is written of a quantity whose error says that it may be anything.
 NOT_DETERMINED = "not determined"
 #: Numbers between these are written without a power of ten.
-_PLAIN = 1e-4, 1e5
+_WITHOUT_POWER = 1e-4, 1e5
 #: Standard errors that 95 % of a normal distribution lie within.
 BAND = 1.96
 #: A bound this many times as large as the value is none.
-_FAR = 10.0
+_NO_BOUND = 10.0
 #: Characters beyond which a list takes several lines.
-_LONG = 100
+_LINE_LENGTH = 100
 
 
 def value_with_error(
@@ -61,7 +61,7 @@ def value_with_error(
     if stderr >= abs(value):
         return _interval(value, stderr, scale, bounds)
     value, error = value / scale, stderr / scale
-    if not _PLAIN[0] <= abs(value) < _PLAIN[1]:
+    if not _WITHOUT_POWER[0] <= abs(value) < _WITHOUT_POWER[1]:
         power = math.floor(math.log10(abs(value)))
         return f"{value_with_error(value / 10.0**power, error / 10.0**power)}e{power}"
     # one digit of the error, two where the first is a 1, and two of the value
@@ -78,7 +78,7 @@ def _interval(value: float, stderr: float, scale: float, bounds: tuple[float, fl
     told_low, told_high = low > bounds[0], high < bounds[1]
     if told_low and told_high:
         return f"{significant(low / scale)} to {significant(high / scale)}"
-    if told_high and (math.isfinite(bounds[1]) or high < _FAR * value):
+    if told_high and (math.isfinite(bounds[1]) or high < _NO_BOUND * value):
         return f"below {significant(high / scale)}"
     if told_low:
         return f"above {significant(low / scale)}"
@@ -95,7 +95,7 @@ def significant(value: float) -> str:
     """
     rounded = f"{value:.1e}"
     mantissa, _, power = rounded.partition("e")
-    if value and not _PLAIN[0] <= abs(float(rounded)) < _PLAIN[1]:
+    if value and not _WITHOUT_POWER[0] <= abs(float(rounded)) < _WITHOUT_POWER[1]:
         return f"{mantissa}e{int(power)}"
     return f"{value:.{max(0, 1 - int(power))}f}"
 
@@ -134,7 +134,7 @@ def as_toml(value: object) -> str:
     """
     # JSON writes all of these as TOML does
     text = json.dumps(value, ensure_ascii=False)
-    if len(text) <= _LONG or not isinstance(value, list | tuple):
+    if len(text) <= _LINE_LENGTH or not isinstance(value, list | tuple):
         return text
     inner = ",\n".join(as_toml(entry) for entry in value)
     return f"[\n{inner},\n]"

@@ -108,7 +108,7 @@ def test_another_mobility_changes_the_lever_and_nobody_else_s():
 def test_raman_temperatures_have_the_errors_that_they_state(solved_once):
     data, tip = data_of(0, [], "raman"), solved_once.tip_K.values
     measured = np.isfinite(data.tip_K)
-    assert measured.sum() == study.RAMAN_POINTS
+    assert measured.sum() == study.LaboratoryOptions().raman_points
     assert np.all(np.abs(data.tip_K - tip)[measured] < 4 * data.tip_error_K[measured])
     assert tip[measured].min() > 390
 

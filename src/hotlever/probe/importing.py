@@ -47,13 +47,25 @@ from hotlever.text import aligned, as_toml
 SUPPLY, GROUND, READER = "supply", "ground", "reader"
 #: A film that is heater and legs in one, on a body that is not of silicon.
 FILM = "film"
-#: Share of the silicon that a low-doped layer does not exceed.
-_LARGEST_SHARE = 0.6
-#: Of a film's greatest distance from the terminals, the share from which on its tip may be.
-_FAR = 0.95
 
 #: A layer by its name, or outlines.
 Drawn = str | tuple[Ring, ...]
+
+
+@dataclass(frozen=True)
+class InferenceOptions:
+    """What the layers of a drawing are told by.
+
+    Attributes
+    ----------
+    low_doped_share : float
+        Share of the silicon that a low-doped layer does not exceed.
+    tip_distance : float
+        Of a film's greatest distance from the terminals, the share from which on its tip may be.
+    """
+
+    low_doped_share: float = 0.6
+    tip_distance: float = 0.95
 
 
 @dataclass
@@ -77,11 +89,14 @@ class LayerInference:
     doubts: list[str] = field(default_factory=list)
 
 
-def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
+def infer_layers(
+    sheet: Sheet, tolerance: float, options: InferenceOptions | None = None
+) -> LayerInference:
     """Say which layer of a drawing is what, and why."""
+    options = options or InferenceOptions()
     inferred = LayerInference()
     shapes = _shapes(sheet, tolerance, inferred.doubts)
-    judged = [_Silicon(name, sheet, shapes, tolerance) for name in shapes]
+    judged = [_Silicon(name, sheet, shapes, tolerance, options) for name in shapes]
     best = max(judged, key=lambda candidate: candidate.merit, default=None)
     if best is None:
         inferred.doubts.append("no layer holds a closed outline")
@@ -109,7 +124,7 @@ def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
             "and what it and the body are made of, the drawing does not say"
         )
     _terminals(best, sheet, inferred)
-    _tip(best, sheet, shapes, inferred)
+    _tip(best, sheet, shapes, inferred, options)
     return inferred
 
 
@@ -141,9 +156,14 @@ class _Silicon:
     """
 
     def __init__(
-        self, name: str, sheet: Sheet, shapes: dict[str, BaseGeometry], tolerance: float
+        self,
+        name: str,
+        sheet: Sheet,
+        shapes: dict[str, BaseGeometry],
+        tolerance: float,
+        options: InferenceOptions,
     ) -> None:
-        self.name, self.tolerance = name, tolerance
+        self.name, self.tolerance, self._options = name, tolerance, options
         self.pieces = sorted(parts_of(shapes[name]), key=lambda piece: -piece.area)
         self.shape: Polygon = self.pieces[0]
         self.areas = shapes
@@ -162,7 +182,7 @@ class _Silicon:
         """Whether the silicon falls apart, or has one more hole, without another layer."""
         inside = self._sizable(self.shape.intersection(other))
         area = sum(piece.area for piece in inside)
-        if not 0 < area < _LARGEST_SHARE * self.shape.area:
+        if not 0 < area < self._options.low_doped_share * self.shape.area:
             return False
         rest = self._sizable(self.shape.difference(other.buffer(self.tolerance)))
         holes = sum(len(piece.interiors) for piece in rest)
@@ -361,7 +381,11 @@ def _base(silicon: Polygon, heater: BaseGeometry) -> list[tuple[Point, Point]]:
 
 
 def _tip(
-    best: _Silicon, sheet: Sheet, shapes: dict[str, BaseGeometry], inferred: LayerInference
+    best: _Silicon,
+    sheet: Sheet,
+    shapes: dict[str, BaseGeometry],
+    inferred: LayerInference,
+    options: InferenceOptions,
 ) -> None:
     """Find the place of the tip."""
     for _, text, point in sheet.labels:
@@ -380,7 +404,7 @@ def _tip(
         ]
         near = shapely.union_all(ends or [best.shape]).centroid
         reach = shapely.hausdorff_distance(near, shapes[film].boundary)
-        area = shapes[film].difference(near.buffer(_FAR * reach))
+        area = shapes[film].difference(near.buffer(options.tip_distance * reach))
         why = "where the film is farthest from the terminals"
     else:
         return

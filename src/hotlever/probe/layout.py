@@ -29,10 +29,6 @@ Point = tuple[float, float]
 # carries no current: the reader branch, and all that insulates.
 Part = Literal["heater", "leg 1", "leg 2", "reader branch"]
 
-#: Beyond a straight line by less (rad), a corner is as good as none: there slopes of the fields
-#: grow with the distance r from it as r^−0.08 at most.
-_HARDLY = 0.27
-
 
 @dataclass(frozen=True)
 class Taper:
@@ -310,22 +306,27 @@ class Layout:
         """Corners of the outlines of all regions (µm), shape (n, 2)."""
         return np.array([corner for region in self.regions for corner in region.outline])
 
-    def reentrant_corners(self) -> list[Point]:
+    def reentrant_corners(self, least: float = 0.27) -> list[Point]:
         """Corners where lever or conductor spans more than 180°, at which fields are singular.
 
-        Corners that are hardly any, as where an arc is made of short edges, are left out.
+        Parameters
+        ----------
+        least : float
+            Angle (rad) beyond 180° from which on a corner counts: of less, as where an arc is made
+            of short edges, slopes of the fields grow with the distance r from it as r^−0.08 at
+            most.
         """
         conducting = tuple(region for region in self.regions if not region.insulates)
-        corners_of = [_reentrant(some) for some in dict.fromkeys((self.regions, conducting))]
+        corners_of = [_reentrant(some, least) for some in dict.fromkeys((self.regions, conducting))]
         return list(dict.fromkeys(corner for corners in corners_of for corner in corners))
 
 
-def _reentrant(regions: tuple[Region, ...]) -> list[Point]:
-    """Return the corners at which some regions together span more than 180°."""
+def _reentrant(regions: tuple[Region, ...], least: float) -> list[Point]:
+    """Return the corners at which some regions together span more than 180° by an angle."""
     rings = [ring for region in regions for ring in region.rings]
     corners = np.unique(np.concatenate([np.array(ring) for ring in rings]).round(6), axis=0)
     angle = sum(_angles_at(corners, np.array(ring)) for ring in rings)
-    reentrant = (angle > math.pi + _HARDLY) & (angle < 2 * math.pi - 1e-6)
+    reentrant = (angle > math.pi + least) & (angle < 2 * math.pi - 1e-6)
     return [(float(x), float(y)) for x, y in corners[reentrant]]
 
 

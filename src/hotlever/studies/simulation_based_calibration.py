@@ -14,6 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar
 
@@ -58,11 +59,9 @@ KINDS = ("iv", "reader", "raman")
 #: Ways of calibrating; all but the estimate need the knee.
 ESTIMATE = "estimate with priors"
 WAYS = (ESTIMATE, "model of the drawing at k", "Eq. 12 at k", "knee at T_i")
-POINTS, NOISE, DRIFT = 40, 2e-3, 5e-4
-#: Share of the levers that have outliers, and how far these are off, in standard deviations.
-_SOME, _FAR = 1 / 3, (10.0, 50.0)
-#: Errors of Raman temperatures, as shares of the rise: of each, and common to all.
-RAMAN, RAMAN_POINTS = (0.01, 0.02), 5
+#: Noise of instruments, as a share, and errors of Raman temperatures, as shares of the rise: of
+#: each, and common to all.
+NOISE, RAMAN = 2e-3, (0.01, 0.02)
 HIGHEST_V = {"vacuum": 11.0, "air": 13.0}
 #: Tip temperature (K) above which errors count.
 HOT = 400.0
@@ -70,7 +69,31 @@ FINER = MeshOptions(refinement=1.3)
 #: Levels of confidence, and their limits in standard deviations.
 LEVELS = {0.68: 0.994, 0.95: BAND}
 PERCENTILES = (50, 90, 100)
-_DECILES, _ROWS = 10, 101  # of the bias, and even biases of a calibration
+
+
+@dataclass(frozen=True)
+class LaboratoryOptions:
+    """How levers are measured in the virtual laboratory.
+
+    Attributes
+    ----------
+    points : int
+        Biases of a ramp.
+    drift : float
+        Share by which a gain drifts over the ramp.
+    outlier_share : float
+        Share of the levers that have outliers.
+    outlier : tuple of float
+        How far these are off, from and to, in standard deviations.
+    raman_points : int
+        Raman temperatures.
+    """
+
+    points: int = 40
+    drift: float = 5e-4
+    outlier_share: float = 1 / 3
+    outlier: tuple[float, float] = (10.0, 50.0)
+    raman_points: int = 5
 
 
 class MinimosSilicon(NSilicon):
@@ -133,6 +156,7 @@ def measure(
     departures: Collection[str] = ALL,
     highest: float | None = None,
     noise: float = NOISE,
+    laboratory: LaboratoryOptions | None = None,
 ) -> tuple[Measurement, Array, Lever]:
     """Measure a lever up to a bias (V), or as far as it goes; return its true temperatures (K) too.
 
@@ -144,34 +168,37 @@ def measure(
     ComputationError
         If a state of the lever was not found.
     """
+    laboratory = laboratory or LaboratoryOptions()
+    points = laboratory.points
     if "mobility" in departures:
         true = true.with_material("material", MinimosMaterial)
     lever = Lever(true, FINER if "mesh" in departures else None)
-    even = np.linspace(1.0 / POINTS, 1.0, POINTS)
+    even = np.linspace(1.0 / points, 1.0, points)
     try:
         sweep = lever.sweep((highest or HIGHEST_V[true.surroundings.medium]) * even)
     except BranchEndError as error:
         sweep = lever.sweep(0.97 * error.bias_reached * even)
-    tip, drifting = sweep.tip_K.values, DRIFT * ("drift" in departures)
+    tip, drifting = sweep.tip_K.values, laboratory.drift * ("drift" in departures)
 
     def noisy(values: Array) -> Array:
-        drift = drifting * rng.standard_normal() * np.linspace(0.0, 1.0, POINTS)
-        return np.asarray(values * (1.0 + noise * rng.standard_normal(POINTS) + drift))
+        drift = drifting * rng.standard_normal() * np.linspace(0.0, 1.0, points)
+        return np.asarray(values * (1.0 + noise * rng.standard_normal(points) + drift))
 
-    nothing = np.full(POINTS, np.nan)
+    nothing = np.full(points, np.nan)
     reader = noisy(sweep.reader_V.values) if what == "reader" else nothing
     tips, errors = nothing.copy(), nothing.copy()
     if what == "raman":
-        at = np.linspace(HOT, 0.98 * tip.max(), RAMAN_POINTS)
-        some = np.searchsorted(tip, at).clip(0, POINTS - 1)
+        at = np.linspace(HOT, 0.98 * tip.max(), laboratory.raman_points)
+        some = np.searchsorted(tip, at).clip(0, points - 1)
         (alone, common), base = RAMAN, true.circuit.base_temperature_K
         scale = 1.0 + common * rng.standard_normal() * ("thermometer" in departures)
         rise = (tip - base)[some] * scale * (1.0 + alone * rng.standard_normal(some.size))
         tips[some], errors[some] = base + rise, alone * (tip[some] - base)
     current = noisy(sweep.current_mA.values)
-    if "outliers" in departures and rng.random() < _SOME:
-        outliers = rng.choice(POINTS, rng.integers(1, 3), replace=False)
-        off = rng.choice((-1.0, 1.0), outliers.size) * rng.uniform(*_FAR, outliers.size)
+    if "outliers" in departures and rng.random() < laboratory.outlier_share:
+        outliers = rng.choice(points, rng.integers(1, 3), replace=False)
+        sizes = rng.uniform(*laboratory.outlier, outliers.size)
+        off = rng.choice((-1.0, 1.0), outliers.size) * sizes
         current[outliers] *= 1.0 + noise * off
     return Measurement(sweep.bias.values, current, reader, tips, errors), tip, lever
 
@@ -207,10 +234,12 @@ def judge(
     departures: Collection[str] = ALL,
     noise: float = NOISE,
     laws: str = UNCERTAIN,
+    rows: int = 101,
 ) -> xr.Dataset:
     """Simulate the lever of a number, calibrate it, and compare with its true temperature.
 
-    The calibration takes the laws of silicon to be uncertain, or the paper's (`ALL_LAWS`).
+    The calibration takes the laws of silicon to be uncertain, or the paper's (`ALL_LAWS`), and is
+    compared at so many even biases, its rows.
 
     Returns
     -------
@@ -230,7 +259,7 @@ def judge(
     rng = np.random.default_rng(number)
     true, nominal = draw(rng, number, medium, departures)
     data, _, lever = measure(true, rng, what, departures, noise=noise)
-    off, refused, doubted = np.full((len(WAYS), _ROWS), np.nan), "", ""
+    off, refused, doubted = np.full((len(WAYS), rows), np.nan), "", ""
     tip, stated = off[0], off[0]
     began = time.process_time()
     try:
@@ -241,7 +270,7 @@ def judge(
     if not refused:
         doubted = calibration.reason
         bias = calibration.table.bias_V.values
-        even = np.linspace(bias[0], bias[-1], _ROWS)
+        even = np.linspace(bias[0], bias[-1], rows)
         table = calibration.table.sel(bias=even, method="nearest")
         tip = lever.sweep(table.bias_V.values).tip_K.values
         off[0] = table.tip_K.values - tip
@@ -279,7 +308,7 @@ def coverage_by_decile(ratios: Sequence[Array]) -> Array:
     -------
     ndarray, shape (levels, 10)
     """
-    levers = [np.array_split(ratio, _DECILES) for ratio in ratios]
+    levers = [np.array_split(ratio, 10) for ratio in ratios]
     within = [
         [[np.mean(decile < limit) for decile in lever] for lever in levers]
         for limit in LEVELS.values()

@@ -38,7 +38,7 @@ _STYLE = {"cap_style": "flat", "join_style": "mitre"}
 #: reaches beyond its corners.
 _BEYOND, _ASIDE = 2.0, 3.0
 #: How far off (µm) a point is still a corner, or on a line.
-_NEAR = 1e-6
+_SAME_UM = 1e-6
 #: Cosine of the angle between a border and the outline's normal below which it runs along it.
 _ALONG = 0.3
 
@@ -313,7 +313,8 @@ class Etching:
         direction = _unit(end - start)
         outward = 2 * _ASIDE * self._far * np.array([direction[1], -direction[0]])
         aside = [
-            _ASIDE * self._far if turn > 0 else -self._far / max(abs(turn), _NEAR) for turn in turns
+            _ASIDE * self._far if turn > 0 else -self._far / max(abs(turn), _SAME_UM)
+            for turn in turns
         ]
         corners = [start - aside[0] * direction, end + aside[1] * direction]
         return Polygon([*corners, corners[1] + outward, corners[0] + outward])
@@ -323,7 +324,7 @@ class Etching:
         start, final = np.array(end.start), np.array(end.end)
         corners = shapely.get_coordinates(self.drawn)
         longer = _ASIDE * self._far * _unit(final - start)
-        whole = [np.linalg.norm(corners - at, axis=1).min() < _NEAR for at in (start, final)]
+        whole = [np.linalg.norm(corners - at, axis=1).min() < _SAME_UM for at in (start, final)]
         line = (tuple(start - longer * whole[0]), tuple(final + longer * whole[1]))
         return [
             Terminal(end.name, *segment)
@@ -339,19 +340,19 @@ class Etching:
         band = self.outline.difference(self.drawn)
         reaches = shape.intersection(self.drawn.boundary)
         borders = shape.boundary.intersection(self.drawn).difference(
-            self.drawn.boundary.buffer(_NEAR)
+            self.drawn.boundary.buffer(_SAME_UM)
         )
         added = []
         for line in _lines(reaches):
-            strip = line.buffer(self._far * (1 + _NEAR), **_STYLE)
+            strip = line.buffer(self._far * (1 + _SAME_UM), **_STYLE)
             if not line.is_ring:
                 for points in (np.array(line.coords), np.array(line.coords)[::-1]):
                     strip = self._along_border(strip, points, borders)
             added += [
                 # without hairs, and a bit into the layer
-                piece.buffer(-2 * _NEAR, **_STYLE).buffer(3 * _NEAR, **_STYLE)
+                piece.buffer(-2 * _SAME_UM, **_STYLE).buffer(3 * _SAME_UM, **_STYLE)
                 for piece in parts_of(strip.intersection(band))
-                if piece.area > 10 * _NEAR * piece.length
+                if piece.area > 10 * _SAME_UM * piece.length
             ]
         whole = shapely.union_all([shape, *added])
         return whole.simplify(STANDS_OUT * self._tolerance)
@@ -361,7 +362,7 @@ class Etching:
     ) -> BaseGeometry:
         """Return a strip along the outline whose end goes on where the layer's border does."""
         at, back = points[0], _unit(points[0] - points[1])
-        near = (line for line in _lines(borders) if line.distance(shapely.Point(at)) < 3 * _NEAR)
+        near = (line for line in _lines(borders) if line.distance(shapely.Point(at)) < 3 * _SAME_UM)
         line = next(near, None)
         if line is None:
             return strip
@@ -375,7 +376,7 @@ class Etching:
             return strip
         far = 2 * self._far
         wedge = Polygon([at, at + far * normal / lean, at + far * border / lean])
-        if wedge.area < _NEAR * far:
+        if wedge.area < _SAME_UM * far:
             return strip
         return strip.union(wedge) if border @ back > 0 else strip.difference(wedge)
 
