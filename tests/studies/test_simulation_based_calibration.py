@@ -34,7 +34,7 @@ def coarse_levers(monkeypatch):
 @pytest.fixture
 def solved_once(monkeypatch):
     """A lever that is not solved for every number anew."""
-    sweep = Lever(Probe.reference(), COARSE).sweep(np.linspace(0.275, 11.0, study.POINTS))
+    sweep = Lever(Probe.reference(), COARSE).sweep(np.linspace(0.275, 11.0, study.LaboratoryOptions().points))
     monkeypatch.setattr(Lever, "sweep", lambda *_: sweep)
     return sweep
 
@@ -89,7 +89,7 @@ def test_drift_grows_over_the_ramp(solved_once):
     ]
     spread = np.std(off, axis=0)
     assert spread[0] == pytest.approx(0.0, abs=1e-12)
-    assert spread[-1] == pytest.approx(study.DRIFT, rel=0.25)
+    assert spread[-1] == pytest.approx(study.LaboratoryOptions().drift, rel=0.25)
 
 
 def test_another_mobility_changes_the_lever_and_nobody_else_s():
