@@ -34,7 +34,8 @@ def coarse_levers(monkeypatch):
 @pytest.fixture
 def solved_once(monkeypatch):
     """A lever that is not solved for every number anew."""
-    sweep = Lever(Probe.reference(), COARSE).sweep(np.linspace(0.275, 11.0, study.LaboratoryOptions().points))
+    points = study.LaboratoryOptions().points
+    sweep = Lever(Probe.reference(), COARSE).sweep(np.linspace(0.275, 11.0, points))
     monkeypatch.setattr(Lever, "sweep", lambda *_: sweep)
     return sweep
 
