@@ -15,6 +15,7 @@ chip      ends of the legs warm up by 0 to 4 K/mW of the lever's power
 This referee and the priors of hotlever.materials.departures are two readings of the literature: it
 goes evenly from the paper's law to one other law, they are the spread of many, and neither was
 changed to suit the other. Where they differ, errors are not what is stated, and that is the answer.
+Of the profile both know one source, by which it solves for the diffusion and they shift erfc.
 
 Their parameters, dimensions and doping are off the owner's probe file by what is usual (dimensions
 5 %, doping 15 %), currents and reader have 0.2 % of noise, and five Raman temperatures have 5 K
@@ -255,11 +256,9 @@ def here_on_coarse_meshes(folder: Path, options: list[str]) -> tuple[dict[str, A
 
     parser = argparse.ArgumentParser()
     parser.add_argument("--prior", action="append", default=[])
-    parser.add_argument("--laws", default=[], type=lambda text: [f"laws={text}"])
+    parser.add_argument("--laws", dest="prior", action="append", type=lambda text: f"laws={text}")
     told = parser.parse_args(options)
-    priors = dict(text.split("=") for text in told.prior) | (
-        {"laws": told.laws} if told.laws else {}
-    )
+    priors = dict(text.split("=") for text in told.prior)
     plain = OurLever.__init__
 
     def on_coarse_mesh(self: Any, probe: Any, mesh: Any = None, **others: Any) -> None:
