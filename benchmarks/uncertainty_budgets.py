@@ -22,11 +22,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from hotlever.estimate.inverse_problem import Estimate
 from numpy.random import Generator
 
 from hotlever.errors import HotleverError
-from hotlever.estimate import FitOptions
+from hotlever.estimate import Estimate, FitOptions
 from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.experiment import TIP, Predictor
 from hotlever.estimate.objective import Objective
