@@ -147,7 +147,7 @@ def levers(count: int) -> None:
 
 
 def _small_files() -> None:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (700, 700))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (450, 450))
 
 
 def end(kind: str, twin: TwinBench, folder: Path, rng: np.random.Generator) -> tuple[float, str]:

@@ -71,7 +71,7 @@ class Supervisor:
         self.identity = ""
 
     def __enter__(self) -> Supervisor:
-        self._start(turn_on=True)
+        self._start()
         try:
             self.identity = self._answer(self._supply.start_s)
         except BaseException:
@@ -96,20 +96,16 @@ class Supervisor:
     ) -> None:
         confirmed = self._end()
         if not confirmed:
-            # whoever owned the instrument has died: another one may reach it
-            with suppress(HotleverError, OSError):
-                self._start(turn_on=False)
-                confirmed = self._end()
+            # whoever owned the instrument may have died
+            confirmed = _turned_off(None, self._supply)
         if not confirmed:
             before = f"{error}; " if error is not None and str(error) else ""
             raise InstrumentError(f"{before}{_still_on(self._supply.source)}") from error
 
-    def _start(self, turn_on: bool) -> None:
+    def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(
-            target=supervise, args=(theirs, self._supply, turn_on), daemon=False
-        )
+        self._process = context.Process(target=supervise, args=(theirs, self._supply), daemon=False)
         self._process.start()
         theirs.close()
 
@@ -156,7 +152,7 @@ def _still_on(resource: str) -> str:
     )
 
 
-def supervise(pipe: Connection, supply: Supply, turn_on: bool) -> None:
+def supervise(pipe: Connection, supply: Supply) -> None:
     """Own the instruments until the other end of a pipe closes, in a process of its own.
 
     What is sent back are the answers, the errors in their place, and at the end whether the output
@@ -169,14 +165,12 @@ def supervise(pipe: Connection, supply: Supply, turn_on: bool) -> None:
     if hasattr(os, "setsid"):
         with suppress(OSError):
             os.setsid()
-    meter, touched = None, not turn_on
+    meter = None
     try:
-        if turn_on:
-            meter = SourceMeter.open(supply.source, supply.reader, supply.timeout_s)
-            touched = True
-            meter.start(supply.limit_mA)
-            pipe.send(meter.identity)
-            _serve(pipe, meter)
+        meter = SourceMeter.open(supply.source, supply.reader, supply.timeout_s)
+        meter.start(supply.limit_mA)
+        pipe.send(meter.identity)
+        _serve(pipe, meter)
     except (EOFError, OSError):
         pass
     except Exception as error:
@@ -185,7 +179,8 @@ def supervise(pipe: Connection, supply: Supply, turn_on: bool) -> None:
         with suppress(OSError):
             pipe.send(error)
     finally:
-        confirmed = not touched or _turned_off(meter, supply)
+        # what was not opened was not turned on
+        confirmed = meter is None or _turned_off(meter, supply)
         try:
             pipe.send(confirmed)
         except OSError:
