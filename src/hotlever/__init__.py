@@ -25,7 +25,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-__version__ = "2.0.0"
+__version__ = "3.0.0"
 
 #: What the package offers at its top, by the module it lives in. Loaded when first used, so that
 #: the command line starts fast.

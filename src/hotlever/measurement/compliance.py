@@ -32,7 +32,7 @@ class ComplianceOptions:
     change : float
         Change that the curve beside them lets expect over several level rows, a share of the
         largest, from which on they are at a limit. About a smooth maximum it is less than 15 times
-        `level`.
+        ``level``.
     change_of_few : float
         The same of two rows, or of four that are no neighbours, which may be level by chance.
     several, many : int

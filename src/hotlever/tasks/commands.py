@@ -37,6 +37,8 @@ from hotlever.tasks.sweeping import respond, sweep
 Command = Callable[..., int | None]
 
 #: By name, in the order in which the help lists them.
+#:
+#: :meta hide-value:
 COMMANDS: dict[str, Command] = {
     "probe new": new_probe,
     "probe show": show_probe,
