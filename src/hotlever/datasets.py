@@ -50,8 +50,8 @@ def labelled(
     Parameters
     ----------
     columns : mapping of str to array_like
-        Of `hotlever.quantities.QUANTITIES`; a tuple gives the dimensions of its own before the values, and unit and
-        meaning of any other after them.
+        Of `hotlever.quantities.QUANTITIES`; a tuple gives the dimensions of its own before the
+        values, and unit and meaning of any other after them.
     dimensions : str or sequence of str
         Of the other columns.
     coordinates : mapping, optional

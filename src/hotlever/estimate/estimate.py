@@ -111,7 +111,7 @@ class Estimate:
         empty if the tip was not asked for. What follows is of calibrations.
     power_law : PowerLaw or None
         In vacuum, of the estimated lever or as given; T_tip is the law's value at P_l / k,
-        approximately (see `law_residual_K`). None with held supplies, or where the power turns
+        approximately (see ``law_residual_K``). None with held supplies, or where the power turns
         along the branch: the tip then follows from no single power.
     law_residual_K : float
         Largest difference of the law from the model it was fitted to; 0 for a given law.

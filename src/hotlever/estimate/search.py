@@ -127,7 +127,7 @@ def solve(
 
 @dataclass(frozen=True)
 class Search:
-    """The searches for the lever of a problem, of which `progress` and `seen` are told."""
+    """The searches for the lever of a problem, of which ``progress`` and ``seen`` are told."""
 
     problem: Problem
     progress: Progress | None = None

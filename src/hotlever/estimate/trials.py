@@ -3,9 +3,9 @@
 A trial draws errors of data and priors, ε, and looks for the estimate x that they lead to: with the
 residuals r, in standard deviations, and an orthonormal basis Q of what their Jacobian J spans at
 the optimum, Qᵀ r(x) = ε. Where r is linear these are samples of the posterior. Where it bends they
-have the density exp(−½ |Qᵀ r|²) |det Qᵀ J|, and each counts as much more as the posterior is larger
-there (Bardsley, Solonen, Haario and Laine, SIAM J. Sci. Comput. 36, A1895 (2014)). Errors are drawn
-from Student's t, whose tails are wider, so that no sample counts for too much.
+have the density ``exp(−½ |Qᵀ r|²) |det Qᵀ J|``, and each counts as much more as the posterior is
+larger there (Bardsley, Solonen, Haario and Laine, SIAM J. Sci. Comput. 36, A1895 (2014)). Errors
+are drawn from Student's t, whose tails are wider, so that no sample counts for too much.
 
 With priors residuals count standard deviations. Without, their noise is unknown, with the prior
 1/σ: trials draw it too. A parameter without a prior is uniform within its bounds; what the data

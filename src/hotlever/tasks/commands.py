@@ -77,7 +77,7 @@ _SPREAD = "--calibrate-from"
 
 
 def run_command(
-    words: Sequence[str], reporter: Reporter, commands: Mapping[str, Command] = COMMANDS
+    words: Sequence[str], reporter: Reporter, commands: Mapping[str, Command] | None = None
 ) -> int:
     """Do what a command line says, of which the words follow ``hotlever``; return the exit status.
 
@@ -93,7 +93,7 @@ def run_command(
         check_files(command, values)
         return command(reporter, **values) or 0
 
-    return _parsed(words, call, reporter, commands)
+    return _parsed(words, call, reporter, commands or COMMANDS)
 
 
 def arguments_of(words: Sequence[str]) -> dict[str, Any]:
@@ -167,7 +167,7 @@ def _parsed(
 
 def command_line(
     call: Call,
-    commands: Mapping[str, Command] = COMMANDS,
+    commands: Mapping[str, Command] | None = None,
     word: str = "",
     reporter: Reporter | None = None,
 ) -> Any:
@@ -177,7 +177,8 @@ def command_line(
     ----------
     call : callable
         Takes a command and the values of its parameters by name; returns the exit status.
-    commands : mapping of str to callable
+    commands : mapping of str to callable, optional
+        By name; `COMMANDS` if left out.
     word : str
     reporter : Reporter, optional
         Given the version, if that is asked for.
@@ -203,8 +204,9 @@ def command_line(
     )
     app.callback()(root)
     groups = {"": app}
-    chosen = {name: command for name, command in commands.items() if name.split()[0] == word}
-    for name, command in (chosen or commands).items():
+    there = commands or COMMANDS
+    chosen = {name: command for name, command in there.items() if name.split()[0] == word}
+    for name, command in (chosen or there).items():
         group, _, last = name.rpartition(" ")
         if group not in groups:
             groups[group] = typer.Typer(cls=_Commands, help=_GROUPS[group], rich_markup_mode=None)
