@@ -30,7 +30,7 @@ import psutil
 from foreign_levers import NOISE, foreign_lever, owners_probe
 from hotlever.errors import HotleverError
 from hotlever.estimate import Measurement, calibrate
-from hotlever.estimate.linearised_lever import LinearisedLever
+from hotlever.estimate.next_measurement import LinearisedLever
 from hotlever.instruments.ramp import Ramp, RampOptions
 from hotlever.instruments.source_meter import Reading
 from hotlever.instruments.twin import RampCurve, TwinBench, TwinOptions

@@ -26,7 +26,7 @@ import numpy as np
 
 from hotlever.errors import BranchEndError, HotleverError
 from hotlever.estimate import Estimate, Measurement, calibrate, plan_next
-from hotlever.estimate.linearised_lever import LinearisedLever
+from hotlever.estimate.next_measurement import LinearisedLever
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import (

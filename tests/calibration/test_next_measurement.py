@@ -13,7 +13,7 @@ from documents import EXAMPLES
 from hotlever.errors import InputError
 from hotlever.estimate import calibrate, plan_next, read_calibration
 from hotlever.estimate.experiment import TIP
-from hotlever.estimate.linearised_lever import LinearisedLever
+from hotlever.estimate.next_measurement import LinearisedLever
 from hotlever.estimate.surrogate import Rows
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe

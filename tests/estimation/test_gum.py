@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtri
 from scipy.stats import irwinhall
 
-from hotlever.estimate.gum import Budget, CoverageInterval, InputQuantity, propagate
+from hotlever.estimate.uncertainty_budget import Budget, CoverageInterval, InputQuantity, propagate
 
 #: JCGM 100, Table H.2: V (V), I (A) and φ (rad) of five observations.
 OBSERVED = np.array(

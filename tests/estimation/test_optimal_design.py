@@ -7,7 +7,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 
-from hotlever.estimate.optimal_design import Candidate, Information, NoiseLaw, best_first
+from hotlever.estimate.next_measurement import Candidate, Information, NoiseLaw, best_first
 
 
 def line(x, noise=0.1):

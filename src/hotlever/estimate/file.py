@@ -30,7 +30,6 @@ from pydantic import (
 from hotlever import __version__
 from hotlever.datasets import labelled
 from hotlever.errors import InputError, unknown_name
-from hotlever.estimate.gum import Budget, CoverageInterval, InputQuantity
 from hotlever.estimate.knee import Knee
 from hotlever.estimate.options import BudgetOf, FitOptions
 from hotlever.estimate.power_law import PowerLaw
@@ -46,7 +45,13 @@ from hotlever.estimate.tip_table import (
     budgets_of,
     table_with_budgets,
 )
-from hotlever.estimate.uncertainty_budget import TemperatureBudget, limits_of
+from hotlever.estimate.uncertainty_budget import (
+    Budget,
+    CoverageInterval,
+    InputQuantity,
+    TemperatureBudget,
+    limits_of,
+)
 from hotlever.files import read_json, without_nan
 from hotlever.lever.transient.waveform import Polyline, Sine
 from hotlever.measurement import MEASURED, Measurement

@@ -18,8 +18,7 @@ import numpy as np
 
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimate import Estimate, calibrate
-from hotlever.estimate.linearised_lever import LinearisedLever
-from hotlever.estimate.next_measurement import hottest_tips, plan_next
+from hotlever.estimate.next_measurement import LinearisedLever, hottest_tips, plan_next
 from hotlever.instruments.source_meter import Reading
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe

@@ -10,7 +10,6 @@ import xarray as xr
 from hotlever import figures
 from hotlever.errors import InputError
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.gum import Budget, InputQuantity
 from hotlever.estimate.levers import law_rows, lever_rows, statements
 from hotlever.estimate.many import Batch
 from hotlever.estimate.summary import (
@@ -22,7 +21,7 @@ from hotlever.estimate.summary import (
 )
 from hotlever.estimate.tip_table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, even_rows
 from hotlever.estimate.uncertainty import Uncertainty
-from hotlever.estimate.uncertainty_budget import TemperatureBudget
+from hotlever.estimate.uncertainty_budget import Budget, InputQuantity, TemperatureBudget
 from hotlever.lever import Lever
 from hotlever.materials.parameters import INVERSION, sentence
 from hotlever.quantities import QUANTITIES
