@@ -154,7 +154,7 @@ def test_how_far_a_prior_is_pulled_is_what_the_others_gain_without_it(solved):
         return np.sum((residual[rows] - jacobian[rows] @ step) ** 2)
 
     every, count = np.arange(residual.size), len(one.problem.options.varied)
-    for row, name in enumerate(one.options.varied, start=residual.size - count):
+    for row, name in enumerate(one.problem.options.varied, start=residual.size - count):
         gained = least(every) - least(np.delete(every, row))
         assert one.posterior.shifts[name].pull ** 2 == pytest.approx(gained, rel=0.05, abs=0.05), (
             name
