@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import time
+from dataclasses import replace
 from threading import Thread
 
 import numpy as np
@@ -12,8 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hotlever import Probe, sweep
 from hotlever.errors import InputError
 from hotlever.estimate import read_measurement
+from hotlever.measurement import Measurement, with_measured_circuit
 
 PLAIN = "V_b (V),I_h (mA),V_r (mV),T_tip (K),dT_tip (K)\n1,0.1,50,,\n2,0.2,100,300,5\n"
 
@@ -354,3 +357,14 @@ def test_a_column_is_not_told_to_be_what_it_is_not(tmp_path, columns, message):
     path.write_text("V_b (V),I_h (mA),V_r (mV)\n1,0.1,60\n2,0.2,120\n")
     with pytest.raises(InputError, match=message):
         read_measurement(path, columns)
+
+
+def test_a_medium_that_nobody_says_is_noted():
+    data = Measurement.of_sweep(sweep(Probe.reference(), [1.0, 2.0]))
+    unsaid = replace(data, medium=None)
+    (note,) = with_measured_circuit(Probe.reference(), unsaid)[1]
+    assert note.startswith("medium: vacuum is assumed")
+    assert with_measured_circuit(Probe.reference(), data)[1] == []
+    assert with_measured_circuit(Probe.reference(), unsaid, "vacuum")[1] == []
+    stated = Probe.reference().in_medium("vacuum")
+    assert with_measured_circuit(stated, unsaid)[1] == []

@@ -262,6 +262,11 @@ def with_measured_circuit(
         notes.append(f"medium: {medium}, as asked, although the data file says {measured_in}")
     elif medium is None and changes["medium"] != assumed_in:
         notes.append(f"medium: the data file's {measured_in} is used, not the probe's {assumed_in}")
+    elif medium is measured_in is None and "medium" not in probe.surroundings.model_fields_set:
+        notes.append(
+            f"medium: {assumed_in} is assumed, since neither the data file nor the probe file says "
+            "it; a lever in another one may be explained as well: --medium unknown tries both"
+        )
     names = ["series_resistance_ohm", "base_temperature_K"]
     if changes["medium"] == measured_in == "air":
         names.append("gas_conductivity")
