@@ -7,6 +7,11 @@ through both give every state between. All curves run over u = √(T_tip − T_b
 smooth down to zero power: the potential begins as u, the temperature as u². The curves of a lever
 that more than the swept supply heats run over their length.
 
+How hot they get anywhere: which place is the hottest changes along a branch, a leg may overtake the
+heater. So the temperatures of all places that come into question are read off their own smooth
+curves, and the highest of them is taken last. A curve through the highest temperatures of the
+states would not know of the bend where one place overtakes another.
+
 A sweep reads the branch in a circuit, as a slow ramp of the bias does (`hotlever.lever.readings`).
 The fold of a ramp is a maximum of that bias, the knee of the I-V curve the maximum of V_l.
 """
@@ -17,10 +22,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hotlever.errors import BranchEndError
-from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations
+from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations, steps_of
 from hotlever.lever.newton import NewtonOptions, NewtonResult
 from hotlever.lever.readings import ByPower, Reading, slow_ramp
 from hotlever.lever.solved_states import (
@@ -29,13 +34,18 @@ from hotlever.lever.solved_states import (
     UNIT_V,
     Parametrisation,
     PseudoArclength,
-    SolvedStates,
     solve_at,
 )
-from hotlever.piecewise import Piecewise
+from hotlever.piecewise import Piecewise, smooth_curve
 from hotlever.probe.circuit import Circuit
-from hotlever.types import Array
+from hotlever.types import Array, Index
 
+#: Places along a branch that are looked at together.
+_AT_ONCE = 64
+#: Elements with this share of the highest rise at a state nearby come into question.
+_NEARLY = 0.85
+#: Points at which a temperature is looked for between two states, and how often between those.
+_POINTS, _ROUNDS = 17, 3
 #: Steps of Newton's method from the root of a rise to its place.
 _CORRECTIONS = 3
 #: Where a branch's values have the rise of the tip.
@@ -59,11 +69,23 @@ class OperatingPoint:
 
 
 @dataclass(frozen=True)
-class Branch(SolvedStates):
+class Branch:
     """States of a lever one after the other, and the curves through what they show.
 
     Attributes
     ----------
+    equations : LeverEquations
+    u : ndarray, shape (k,)
+        Where they are: √(T_tip − T_base) (K^½), zero without power. Of a lever that does not start
+        cold: how far along the branch they are, from where it is without a bias. Negative on the
+        way to biases of the other polarity.
+    x, slopes : ndarray, shape (size + 1, k)
+        The states, and their derivatives by u.
+    values, value_slopes : ndarray, shape (k, 4)
+        V_l (V), I_h (mA), V_r (V) and the rise of the tip (K) of each state, and their derivatives
+        by u.
+    highest_rise : ndarray, shape (k,)
+        The highest rise (K) anywhere in the lever.
     stated_parametrisation : Parametrisation, optional
         Of a lever that does not start cold: what the points u of similar levers have in common, if
         they are not lines across this branch itself.
@@ -76,7 +98,65 @@ class Branch(SolvedStates):
     (900, [2.02, 2.6])
     """
 
+    equations: LeverEquations
+    u: Array
+    x: Array
+    slopes: Array
+    values: Array
+    value_slopes: Array
+    highest_rise: Array
     stated_parametrisation: Parametrisation | None = None
+
+    @classmethod
+    def of(cls, equations: LeverEquations, u: Array, x: Array, slopes: Array) -> Branch:
+        """Return states, and what they show, from their slopes by u."""
+        values = np.vstack([equations.observed(x), equations.space.tip_rise(x)])
+        by_u = equations.observed_change(x, slopes), equations.space.tip_rise(slopes)
+        return cls(equations, u, x, slopes, values.T, np.vstack(by_u).T, equations.highest_rise(x))
+
+    @classmethod
+    def cold(cls, equations: LeverEquations, slope: Array) -> Branch:
+        """Return the state without power, whose slope is given."""
+        return cls.of(equations, np.zeros(1), np.zeros_like(slope), slope)
+
+    def among(self, which: NDArray[np.bool_ | np.intp]) -> Branch:
+        """Return some of them, by a mask or in an order."""
+        return Branch(
+            equations=self.equations,
+            u=self.u[which],
+            x=self.x[:, which],
+            slopes=self.slopes[:, which],
+            values=self.values[which],
+            value_slopes=self.value_slopes[which],
+            highest_rise=self.highest_rise[which],
+        )
+
+    def followed_by(self, after: Branch) -> Branch:
+        """Return the same with others after them."""
+        return Branch(
+            equations=self.equations,
+            u=np.append(self.u, after.u),
+            x=np.hstack([self.x, after.x]),
+            slopes=np.hstack([self.slopes, after.slopes]),
+            values=np.vstack([self.values, after.values]),
+            value_slopes=np.vstack([self.value_slopes, after.value_slopes]),
+            highest_rise=np.append(self.highest_rise, after.highest_rise),
+        )
+
+    @cached_property
+    def mirrored(self) -> Branch:
+        """The same with all potentials and currents reversed, followed the other way."""
+        sign = np.where(self.equations.space.is_temperature, 1.0, -1.0)[:, None]
+        of_values = np.append(-np.ones(len(ELECTRICAL_OUTPUTS)), 1.0)
+        return Branch(
+            equations=self.equations.mirrored,
+            u=-self.u[::-1],
+            x=sign * self.x[:, ::-1],
+            slopes=-sign * self.slopes[:, ::-1],
+            values=of_values * self.values[::-1],
+            value_slopes=-of_values * self.value_slopes[::-1],
+            highest_rise=self.highest_rise[::-1],
+        )
 
     @classmethod
     def of_roots(
@@ -106,6 +186,44 @@ class Branch(SolvedStates):
         cold = cls.cold(equations, equations.cold()[0])
         below, above = branch.among(u < 0.0), branch.among(u > 0.0)
         return below.followed_by(cold).followed_by(above)
+
+    # --- between them -----------------------------------------------------------------------------
+
+    def states(self, u: Array) -> Array:
+        """Return the states at some u, shape (size + 1, n)."""
+        return np.asarray(self._state_curve(u)).T
+
+    @cached_property
+    def _state_curve(self) -> Piecewise:
+        return self.through(self.x.T, self.slopes.T)
+
+    def through(self, values: Array, slopes: Array) -> Piecewise:
+        """Return the curve through some quantities of the states and their slopes, (k, ...)."""
+        return smooth_curve(self.u, values, slopes, self.steps)
+
+    @cached_property
+    def steps(self) -> Array:
+        """Where higher derivatives by u step; not known of places that are not of the tip."""
+        return steps_of(self.equations) if self.starts_cold else np.empty(0)
+
+    @cached_property
+    def starts_cold(self) -> bool:
+        """Whether one is at the base temperature: without a bias nothing heats the lever."""
+        return not self.x.any(axis=0).all()
+
+    @property
+    def begins_cold(self) -> bool:
+        """Whether they do, and none is on the way to biases of the other polarity."""
+        return self.starts_cold and self.u[0] == 0.0
+
+    @property
+    def solved(self) -> Index:
+        """The states that were solved: all but the one without power."""
+        return np.flatnonzero(self.x.any(axis=0))
+
+    def has_power(self, u: Array) -> NDArray[np.bool_]:
+        """Return which states at some u have power, (n,)."""
+        return np.asarray((u != 0.0) | (not self.starts_cold))
 
     # --- the curves -------------------------------------------------------------------------------
 
@@ -213,6 +331,70 @@ class Branch(SolvedStates):
         """Return the operating point at u."""
         lever, current, *_ = self.curve(u).tolist()
         return OperatingPoint(lever, current, lever * current, float(self.tip_K(u)))
+
+    # --- how hot they get -------------------------------------------------------------------------
+
+    @property
+    def melting_rise(self) -> float:
+        """Rise (K) beyond which no state is meaningful."""
+        return self.equations.laws.limit[0] - self.equations.base_temperature_K
+
+    @property
+    def melts(self) -> bool:
+        """Whether something melts at the last state: silicon, or another material."""
+        return bool(self.highest_rise[-1] >= self.melting_rise)
+
+    @cached_property
+    def end_u(self) -> float:
+        """Where the states end: at the last one, or where something begins to melt."""
+        return self._where_it_reaches(self.melting_rise) if self.melts else float(self.u[-1])
+
+    def turns(self, quantity: Piecewise) -> Array:
+        """Return u where a curve over u is level, up to the end."""
+        level = np.sort(quantity.derivative().roots())
+        return level[(level > 0) & (level < self.end_u)]
+
+    def highest_rise_at(self, u: Array) -> Array:
+        """Return the highest rise (K) anywhere in the lever at some u, (n,)."""
+        highest, order = np.empty(u.size), np.argsort(u)
+        for some in np.split(order, range(_AT_ONCE, u.size, _AT_ONCE)):
+            if some.size:
+                highest[some] = self._between_few(u[some])
+        return highest
+
+    def _where_it_reaches(self, rise: float) -> float:
+        """Return the first u at which the highest rise is `rise` (K), as it is at the end.
+
+        The place lies before the first state that is as hot.
+        """
+        start = int(np.searchsorted(self.u, 0.0))
+        after = start + int(np.flatnonzero(self.highest_rise[start:] >= rise)[0])
+        if after == start:
+            return float(self.u[start])
+        low, high = self.u[after - 1 : after + 1]
+        for _ in range(_ROUNDS):
+            u = np.linspace(low, high, _POINTS)
+            rises = self.highest_rise_at(u)
+            above = max(1, int(np.argmax(rises >= rise)))
+            (low, high), ends = u[above - 1 : above + 1], rises[above - 1 : above + 1]
+        return float(np.interp(rise, ends, [low, high]))
+
+    def _between_few(self, u: Array) -> Array:
+        """Return the highest rises at few u in rising order."""
+        first, last = np.searchsorted(self.u, u[[0, -1]])
+        # the curve between two states depends on the next ones on either side
+        near = slice(max(first - 2, 0), last + 2)
+        nodes, unit = self.u[near], np.eye(self.u[near].size)
+        weights = smooth_curve(
+            nodes, np.hstack([unit, 0.0 * unit]), np.hstack([0.0 * unit, unit]), self.steps
+        )(u)
+        equations, elements = self.equations, self.equations.space.elements
+        rises = equations.nodal_rises(self.x[:, near])
+        slopes = equations.space.nodal_rises(self.slopes[:, near])
+        dofs = elements.dofs[elements.near_highest(rises, _NEARLY)]
+        used, dofs = np.unique(dofs, return_inverse=True)
+        values = np.hstack([rises[used], slopes[used]]) @ weights.T
+        return elements.highest(values, dofs.reshape(-1, elements.dofs.shape[1]))
 
     # --- in a circuit -----------------------------------------------------------------------------
 

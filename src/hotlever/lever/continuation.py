@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -25,29 +26,57 @@ from hotlever.lever.space import LEVER
 from hotlever.piecewise import hermite_weights
 from hotlever.types import Array, Progress
 
-#: Far below what the curves between the states are off by.
-_OPTIONS = NewtonOptions(tolerance=1e-5)
-#: States that the next one is predicted from, and how many a branch has at most.
-_BEHIND, _MOST = 3, 2000
 #: States that a branch has, more or less, for a progress bar to fill.
 _USUAL_STATES = 20
-#: In the natural parameter: steps in u (K^½) where it is cold, in the tip temperature (K) where it
-#: is hot.
-_STEP_U, _STEP_K = 4.0, 60.0
-#: Half the step (K) after a step of a law; and by how much some place must get hotter per kelvin of
-#: the tip to halve the steps.
-_AFTER_STEP_K, _MUCH_FASTER = 5.0, 2.0
-#: By arc length: the first step and the largest.
-_FIRST, _LARGEST = 0.1, 0.5
-#: Smallest share of what is held by which it may rise, from nothing to its values.
-_SMALLEST_SHARE = 1.0 / 64.0
-#: Points for each state at which the nearest place on another branch is looked for.
-_LOOKED_AT = 20
-#: Points of Gauss's rule and rounds by which the length of a piece of the curve is found.
-_GAUSS, _ROUNDS = np.polynomial.legendre.leggauss(5), 6
+#: Points and weights of Gauss's rule on a piece of the curve.
+_GAUSS = np.polynomial.legendre.leggauss(5)
 
 # Whether a branch is long enough.
 Enough = Callable[[Branch], bool | np.bool_]
+
+
+@dataclass(frozen=True)
+class ContinuationOptions:
+    """How a branch is followed.
+
+    Attributes
+    ----------
+    newton : NewtonOptions
+        How exactly states are solved: far below what the curves between them are off by.
+    behind : int
+        States that the next one is predicted from.
+    most : int
+        States that a branch has at most.
+    step_u : float
+        In the natural parameter: the step in u (K^½) where it is cold.
+    step_K : float
+        The step in the tip temperature (K) where it is hot.
+    after_step_K : float
+        Half the step (K) after a step of a law.
+    much_faster : float
+        By how much some place must get hotter per kelvin of the tip to halve the steps.
+    trusted : float
+        Share of the step in the natural parameter within which a state is where it is expected.
+    first, largest : float
+        By arc length: the first step and the largest.
+    smallest_share : float
+        Smallest share of what is held by which it may rise, from nothing to its values.
+    looked_at : int
+        Points for each state at which the nearest place on another branch is looked for.
+    """
+
+    newton: NewtonOptions = field(default_factory=lambda: NewtonOptions(tolerance=1e-5))
+    behind: int = 3
+    most: int = 2000
+    step_u: float = 4.0
+    step_K: float = 60.0
+    after_step_K: float = 5.0
+    much_faster: float = 2.0
+    trusted: float = 0.5
+    first: float = 0.1
+    largest: float = 0.5
+    smallest_share: float = 1.0 / 64.0
+    looked_at: int = 20
 
 
 def continued(
@@ -55,6 +84,7 @@ def continued(
     enough: Enough,
     start: Branch | None = None,
     progress: Progress | None = None,
+    options: ContinuationOptions | None = None,
 ) -> Branch:
     """Follow a lever until its branch is long enough or something melts, or on from a branch of it.
 
@@ -73,14 +103,15 @@ def continued(
         return enough(branch)
 
     follow = NaturalContinuation if equations.circuit.starts_cold else ArclengthContinuation
-    branch = follow(equations, start).until(far_enough)
+    options = options or ContinuationOptions()
+    branch = follow(equations, start, options).until(far_enough)
     if not isinstance(enough, Reach) or enough.lowest_V is None or equations.is_even:
         return branch
     other, back = enough.mirrored, branch.mirrored
     if other(back):
         return branch
     try:
-        return follow(back.equations, back).until(other).mirrored
+        return follow(back.equations, back, options).until(other).mirrored
     except ComputationError as error:
         error.partial = error.partial.mirrored
         raise
@@ -92,8 +123,14 @@ class Continuation(ABC):
     #: The smallest step that is tried.
     smallest: ClassVar[float]
 
-    def __init__(self, equations: LeverEquations, start: Branch | None, step: float) -> None:
-        self._equations, self._step = equations, step
+    def __init__(
+        self,
+        equations: LeverEquations,
+        start: Branch | None,
+        options: ContinuationOptions,
+        step: float,
+    ) -> None:
+        self._equations, self.options, self._step = equations, options, step
         self._branch = self._beginning() if start is None else start
 
     def until(self, enough: Enough) -> Branch:
@@ -111,8 +148,10 @@ class Continuation(ABC):
                 if step < self.smallest:
                     raise self._lost("no state was found beyond one with")
             self._branch, self._step = self._branch.followed_by(part), step
-            if self._branch.u.size > _MOST:
-                raise self._lost(f"a branch of {_MOST} states is not long enough: the last has")
+            if self._branch.u.size > self.options.most:
+                raise self._lost(
+                    f"a branch of {self.options.most} states is not long enough: the last has"
+                )
         return self._branch
 
     def _lost(self, what: str) -> ComputationError:
@@ -132,7 +171,7 @@ class Continuation(ABC):
 
     def _expected(self, u: float) -> Array:
         """Predict the state at u from the last ones and their slopes."""
-        branch, behind = self._branch, slice(-_BEHIND, None)
+        branch, behind = self._branch, slice(-self.options.behind, None)
         if branch.u.size == 1:
             return branch.x + (u - branch.u[-1]) * branch.slopes
         weights = hermite_weights(branch.u[None, behind], np.array([u]))[0]
@@ -169,9 +208,11 @@ class NaturalContinuation(Continuation):
 
     smallest = 0.5
 
-    def __init__(self, equations: LeverEquations, start: Branch | None = None) -> None:
+    def __init__(
+        self, equations: LeverEquations, start: Branch | None, options: ContinuationOptions
+    ) -> None:
         self._bends = steps_of(equations)
-        super().__init__(equations, start, _STEP_K)
+        super().__init__(equations, start, options, options.step_K)
         if self._branch.u[-1] == 0.0:
             self._branch = self._from_cold(self._branch)
 
@@ -181,7 +222,7 @@ class NaturalContinuation(Continuation):
     def _from_cold(self, branch: Branch) -> Branch:
         """Add the first states that are not cold."""
         first, second = self._equations.cold()
-        for u in (0.5 * _STEP_U, _STEP_U):
+        for u in (0.5 * self.options.step_u, self.options.step_u):
             try:
                 branch = branch.followed_by(self._solved(u, u * first + u**2 * second))
             except NewtonError as error:
@@ -193,14 +234,14 @@ class NaturalContinuation(Continuation):
 
     def _proposed(self) -> float:
         # where a law settles after a step, the curve bends
-        u = float(self._branch.u[-1])
-        last = _AFTER_STEP_K if u in self._bends else self._step
+        options, u = self.options, float(self._branch.u[-1])
+        last = options.after_step_K if u in self._bends else self._step
         # A leg may get hotter faster than the tip. Steps are halved then, not scaled, so that
         # branches of similar levers still have most of their points in common.
         slopes = self._equations.space.rises(self._branch.slopes[:, -1:])
-        faster = max(1.0, float(slopes.max()) / (2.0 * u) / _MUCH_FASTER)
-        longest = _STEP_K / 2.0 ** np.ceil(np.log2(faster))
-        return float(min((u + _STEP_U) ** 2 - u**2, longest, 2.0 * last))
+        faster = max(1.0, float(slopes.max()) / (2.0 * u) / options.much_faster)
+        longest = options.step_K / 2.0 ** np.ceil(np.log2(faster))
+        return float(min((u + options.step_u) ** 2 - u**2, longest, 2.0 * last))
 
     def _landing(self, step: float) -> float:
         # or at a step of a law on the way
@@ -210,11 +251,11 @@ class NaturalContinuation(Continuation):
         return float(between[0]) if between.size else after
 
     def _solved(self, u: float, guess: Array) -> Branch:
-        roots = solve_at(self._equations, np.array([u]), guess, _OPTIONS)
+        roots = solve_at(self._equations, np.array([u]), guess, self.options.newton)
         return Branch.of_roots(self._equations, np.array([u]), roots)
 
     def _trusted(self, step: float) -> float:
-        return 0.5 * step
+        return self.options.trusted * step
 
 
 class ArclengthContinuation(Continuation):
@@ -222,12 +263,14 @@ class ArclengthContinuation(Continuation):
 
     smallest = 1e-4
 
-    def __init__(self, equations: LeverEquations, start: Branch | None = None) -> None:
-        super().__init__(equations, start, _FIRST)
+    def __init__(
+        self, equations: LeverEquations, start: Branch | None, options: ContinuationOptions
+    ) -> None:
+        super().__init__(equations, start, options, options.first)
 
     def _beginning(self) -> Branch:
         equations = self._equations
-        rest = without_bias(equations)
+        rest = without_bias(equations, self.options)
         along = equations.along(rest, equations.factorised(rest, LEVER), LEVER)
         output_slopes = equations.observed_change(rest, along)
         # the bias rises
@@ -240,11 +283,11 @@ class ArclengthContinuation(Continuation):
             end = equations.laws.limit[1]
             raise ComputationError(f"without a bias {end}: held supplies heat it")
         self._branch = branch
-        part = self._next(_FIRST)
+        part = self._next(self.options.first)
         return branch if part is None else branch.followed_by(part)
 
     def _proposed(self) -> float:
-        return min(1.5 * self._step, _LARGEST)
+        return min(1.5 * self._step, self.options.largest)
 
     def _landing(self, step: float) -> float:
         return float(self._branch.u[-1]) + step
@@ -259,7 +302,7 @@ class ArclengthContinuation(Continuation):
         space, at = equations.space, np.array([u])
         origin = in_plane(space, branch.x[:, -1:])[0]
         lines = PseudoArclength.across_tangent(float(branch.u[-1]), origin, tangent)
-        roots = solve_at(equations, at, guess, _OPTIONS, parametrisation=lines)
+        roots = solve_at(equations, at, guess, self.options.newton, parametrisation=lines)
         slope = equations.along(roots.x, roots.factors, lines.constraint(at))
         # by the length of the curve, not by that of its tangent
         slope = slope / np.linalg.norm(in_plane(space, slope))
@@ -281,7 +324,7 @@ def _length_between(start: Array, end: Array, away: Array) -> float:
     """
     length = float(np.linalg.norm(away))
     t, weights = 0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1]
-    for _ in range(_ROUNDS):
+    for _ in range(6):  # it converges by a digit a round
         slopes = (
             np.outer(6 * t - 6 * t**2, away)
             + length * np.outer(1 - 4 * t + 3 * t**2, start)
@@ -291,7 +334,7 @@ def _length_between(start: Array, end: Array, away: Array) -> float:
     return length
 
 
-def without_bias(equations: LeverEquations) -> Array:
+def without_bias(equations: LeverEquations, options: ContinuationOptions | None = None) -> Array:
     """Return the state without a bias, (size + 1, 1): what is held rises from nothing.
 
     Raises
@@ -306,7 +349,7 @@ def without_bias(equations: LeverEquations) -> Array:
             x = state_at_bias(driven, equations.circuit, 0.0, x, LEVER)
         except NewtonError as error:
             step /= 2.0
-            if step < _SMALLEST_SHARE:
+            if step < (options or ContinuationOptions()).smallest_share:
                 raise ComputationError(
                     "without a bias no steady state was found: held supplies lead to one up to "
                     f"{share:.0%} of their values"
@@ -327,10 +370,11 @@ def at_points_of(similar: Branch, branch: Branch) -> Branch:
         If a state was not found.
     """
     equations, parametrisation = branch.equations, similar.parametrisation
+    options = ContinuationOptions()
     if branch.starts_cold:
         return branch
-    u = np.linspace(branch.u[0], branch.u[-1], _LOOKED_AT * branch.u.size)
+    u = np.linspace(branch.u[0], branch.u[-1], options.looked_at * branch.u.size)
     away = branch.path(u) - similar.path(similar.u)[:, None]
     nearest = branch.states(u[np.argmin((away**2).sum(axis=-1), axis=1)])
-    roots = solve_at(equations, similar.u, nearest, _OPTIONS, parametrisation=parametrisation)
+    roots = solve_at(equations, similar.u, nearest, options.newton, parametrisation=parametrisation)
     return Branch.whole(equations, similar.u, roots, parametrisation)

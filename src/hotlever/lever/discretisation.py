@@ -12,12 +12,9 @@ What the air takes up in time is made once it is asked for, and cached.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
-from copy import copy
 from dataclasses import replace
 from functools import cached_property, lru_cache, partial
-from typing import Self
 
 import numpy as np
 from scipy.sparse import diags
@@ -26,14 +23,12 @@ from scipy.sparse.linalg import eigsh
 from hotlever.air.operator import PanelledAir, air_operator
 from hotlever.air.stores import AirStores, HeatInAir, stores_of
 from hotlever.cache import cache_file, store_arrays, stored
-from hotlever.errors import InputError
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.materials import Kind, Material
+from hotlever.materials import Kind
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, Wiring, mesh_layout
-from hotlever.probe.chip import in_pulses
 from hotlever.probe.surroundings import Surroundings
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index, Progress
@@ -48,90 +43,6 @@ _SHARE, _MOST_ROUNDS = 0.8, 10
 #: Modes of the lever, and how fine the panels are: twice as many change a history by less than
 #: what its steps are off by.
 _MODES, _PANELS = 48, 0.5
-
-
-class MeshedProbe:
-    """A probe with its mesh, its operators and its equations, which levers of one shape share.
-
-    Attributes
-    ----------
-    probe : Probe
-    space : FullSpace
-    equations : LeverEquations
-    panels : float
-        How fine the panels of the surface are, where there is air.
-    """
-
-    space: FullSpace
-
-    @one_blas_thread
-    def __init__(
-        self,
-        probe: Probe | str | os.PathLike[str],
-        mesh: MeshOptions | None = None,
-        *,
-        space: FullSpace | None = None,
-        progress: Progress | None = None,
-    ) -> None:
-        self.probe = Probe.coerce(probe)
-        if space is None and mesh is None:
-            space = chosen_space(self.probe)
-        mesh = mesh or MeshOptions()
-        self.panels = mesh.panels
-        self.space = space or flat_space(self.probe.layout(), mesh, self.probe.wiring)
-        if self.space.air.medium != self.medium:
-            self.space = self._surrounded(self.space, progress)
-        self._prepare()
-
-    def _prepare(self) -> None:
-        self.equations = LeverEquations.of_probe(self.space, self.probe)
-
-    def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
-        """Return a space in the probe's surroundings."""
-        return surrounded(space, self.probe, self.panels, progress)
-
-    @property
-    def circuit(self) -> Circuit:
-        """The measuring circuit."""
-        return self.probe.circuit
-
-    @property
-    def medium(self) -> str:
-        """What is around the lever: vacuum or air."""
-        return self.probe.surroundings.medium
-
-    def __repr__(self) -> str:
-        return (
-            f"<{type(self).__name__}: {self.probe.shape.shape} in {self.medium}, "
-            f"{self.space.mesh.elements.nelements} elements, {self.space.size} unknowns>"
-        )
-
-    def with_material(self, material: Material) -> Self:
-        """Return the same lever of another material; mesh, operators and air are shared."""
-        return self.with_probe(self.probe.model_copy(update={"material": material}))
-
-    def in_medium(self, medium: str) -> Self:
-        """Return the same lever in vacuum or in air; mesh and operators are shared."""
-        return self.with_probe(self.probe.in_medium(medium))
-
-    def in_pulses(self) -> Self:
-        """Return the same lever while the holder of its chip stays cold."""
-        probe = in_pulses(self.probe)
-        return self if probe is self.probe else self.with_probe(probe)
-
-    def with_probe(self, probe: Probe) -> Self:
-        """Return the lever of a probe of the same shape and tip; what is the same is shared."""
-        if (probe.layout(), probe.wiring) != (self.probe.layout(), self.probe.wiring):
-            raise InputError("another shape, tip or wiring needs a new Lever")
-        other = copy(self)
-        other.probe = probe
-        if probe.model_copy(update={"monitor": self.probe.monitor}) == self.probe:
-            return other  # its states are the same
-        around, base = probe.surroundings, probe.circuit.base_temperature_K
-        if (around, base) != (self.probe.surroundings, self.circuit.base_temperature_K):
-            other.space = other._surrounded(self.space)
-        other._prepare()
-        return other
 
 
 @lru_cache(maxsize=4)

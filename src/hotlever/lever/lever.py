@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.errors import ComputationError, as_far_as_possible
+from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, branch_end
 from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.dataset import (
@@ -20,12 +22,16 @@ from hotlever.lever.dataset import (
     dataset_of_states,
     with_ramp,
 )
-from hotlever.lever.discretisation import MeshedProbe
+from hotlever.lever.discretisation import chosen_space, flat_space, surrounded
+from hotlever.lever.equations import LeverEquations
+from hotlever.lever.full_space import FullSpace
 from hotlever.lever.observables import sensitivities_of
 from hotlever.lever.readings import Reading, there_and_back
 from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP, Constraint
-from hotlever.probe import MeshOptions, Probe
+from hotlever.materials import Material
+from hotlever.probe import Circuit, MeshOptions, Probe
+from hotlever.probe.chip import in_pulses
 from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
@@ -40,8 +46,8 @@ HOTTEST = 1300.0
 COARSE = MeshOptions(heater=0.5, corner=0.25, lever=0.2, panels=0.5)
 
 
-class Lever(MeshedProbe):
-    """A probe with its mesh, ready to be solved.
+class Lever:
+    """A probe with its mesh, its operators and its equations, ready to be solved.
 
     Parameters
     ----------
@@ -55,6 +61,15 @@ class Lever(MeshedProbe):
     progress : callable, optional
         Called while the air operator of a new geometry is made, with steps done and their number.
 
+    Attributes
+    ----------
+    probe : Probe
+    space : FullSpace
+        Mesh and operators, which levers of one shape share.
+    equations : LeverEquations
+    panels : float
+        How fine the panels of the surface are, where there is air.
+
     Examples
     --------
     >>> lever = Lever(Probe.reference())
@@ -63,9 +78,79 @@ class Lever(MeshedProbe):
     ([0.949, 0.927], 547)
     """
 
+    space: FullSpace
+
+    @one_blas_thread
+    def __init__(
+        self,
+        probe: Probe | str | os.PathLike[str],
+        mesh: MeshOptions | None = None,
+        *,
+        space: FullSpace | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        self.probe = Probe.coerce(probe)
+        if space is None and mesh is None:
+            space = chosen_space(self.probe)
+        mesh = mesh or MeshOptions()
+        self.panels = mesh.panels
+        self.space = space or flat_space(self.probe.layout(), mesh, self.probe.wiring)
+        if self.space.air.medium != self.medium:
+            self.space = self._surrounded(self.space, progress)
+        self._prepare()
+
     def _prepare(self) -> None:
-        super()._prepare()
+        self.equations = LeverEquations.of_probe(self.space, self.probe)
         self._branch: Branch | None = None
+
+    def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
+        """Return a space in the probe's surroundings."""
+        return surrounded(space, self.probe, self.panels, progress)
+
+    @property
+    def circuit(self) -> Circuit:
+        """The measuring circuit."""
+        return self.probe.circuit
+
+    @property
+    def medium(self) -> str:
+        """What is around the lever: vacuum or air."""
+        return self.probe.surroundings.medium
+
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__}: {self.probe.shape.shape} in {self.medium}, "
+            f"{self.space.mesh.elements.nelements} elements, {self.space.size} unknowns>"
+        )
+
+    def with_material(self, material: Material) -> Self:
+        """Return the same lever of another material; mesh, operators and air are shared."""
+        return self.with_probe(self.probe.model_copy(update={"material": material}))
+
+    def in_medium(self, medium: str) -> Self:
+        """Return the same lever in vacuum or in air; mesh and operators are shared."""
+        return self.with_probe(self.probe.in_medium(medium))
+
+    def in_pulses(self) -> Self:
+        """Return the same lever while the holder of its chip stays cold."""
+        probe = in_pulses(self.probe)
+        return self if probe is self.probe else self.with_probe(probe)
+
+    def with_probe(self, probe: Probe) -> Self:
+        """Return the lever of a probe of the same shape and tip; what is the same is shared."""
+        if (probe.layout(), probe.wiring) != (self.probe.layout(), self.probe.wiring):
+            raise InputError("another shape, tip or wiring needs a new Lever")
+        other = copy(self)
+        other.probe = probe
+        if probe.model_copy(update={"monitor": self.probe.monitor}) == self.probe:
+            return other  # its states are the same
+        around, base = probe.surroundings, probe.circuit.base_temperature_K
+        if (around, base) != (self.probe.surroundings, self.circuit.base_temperature_K):
+            other.space = other._surrounded(self.space)
+        other._prepare()
+        return other
+
+    # --- its branch ---------------------------------------------------------------------------
 
     @one_blas_thread
     def branch(self, hottest_K: float = HOTTEST, progress: Progress | None = None) -> Branch:

@@ -13,12 +13,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hotlever.lever.solved_states import SolvedStates
 from hotlever.piecewise import Piecewise, crossing, smooth_curve
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    from hotlever.lever.branch import Branch
 
 #: A bias (V) that is none.
 _NO_BIAS = 1e-9
@@ -29,13 +32,13 @@ class ByPower:
 
     Parameters
     ----------
-    states : SolvedStates
+    branch : Branch
     curve : Piecewise
-        V_l (V) and I_h (mA) by u, and what else they show.
+        V_l (V) and I_h (mA) by u, and what else it shows.
     """
 
-    def __init__(self, states: SolvedStates, curve: Piecewise) -> None:
-        self._states, self._curve = states, curve
+    def __init__(self, branch: Branch, curve: Piecewise) -> None:
+        self._branch, self._curve = branch, curve
 
     @cached_property
     def _power(self) -> Piecewise:
@@ -48,16 +51,16 @@ class ByPower:
     @cached_property
     def turn_u(self) -> float | None:
         """Where the power is highest before it falls; None if it rises to the end."""
-        falling = [u for u in self._states.turns(self._power).tolist() if self._power(u, 2) < 0]
+        falling = [u for u in self._branch.turns(self._power).tolist() if self._power(u, 2) < 0]
         return falling[0] if falling else None
 
     @cached_property
     def highest_mW(self) -> float:
         """The highest power up to which every power has one temperature."""
-        end = self._states.end_u
+        end = self._branch.end_u
         if self.turn_u is None:
             return float(self._power(end))
-        level = self._states.turns(self._power)
+        level = self._branch.turns(self._power)
         beyond = np.append(level[level > self.turn_u], end)
         return float(self._power(beyond).min())
 
@@ -82,15 +85,15 @@ class ByPower:
     @cached_property
     def _by_root(self) -> Piecewise:
         """u by the root of the power, which is nearly a straight line."""
-        states = self._states
-        values, slopes = states.values, states.value_slopes
+        branch = self._branch
+        values, slopes = branch.values, branch.value_slopes
         power = values[:, 0] * values[:, 1]
         slope = slopes[:, 0] * values[:, 1] + values[:, 0] * slopes[:, 1]
         root = np.sqrt(power)
         # at zero power both begin as u
         by_u = np.append(np.sqrt(slopes[0, 0] * slopes[0, 1]), slope[1:] / (2.0 * root[1:]))
-        bent = root[np.isin(states.u, states.steps)]
-        return smooth_curve(root, states.u, 1.0 / by_u, bent)
+        bent = root[np.isin(branch.u, branch.steps)]
+        return smooth_curve(root, branch.u, 1.0 / by_u, bent)
 
 
 @dataclass(frozen=True)

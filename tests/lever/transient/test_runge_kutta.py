@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError
-from hotlever.lever.transient.runge_kutta import Stepper, step_change
-from hotlever.lever.transient.tableau import ARK436L2SA
+from hotlever.lever.transient.runge_kutta import ARK436L2SA, Stepper, StepperOptions
 
 TIMES, STAGES, EMBEDDED = ARK436L2SA.times, ARK436L2SA.stages, ARK436L2SA.embedded
 WEIGHTS = ARK436L2SA.weights
@@ -89,11 +88,12 @@ class Pendulum:
 
 def test_changes_of_the_step_are_in_bounds():
     safety, least, most, failed = 0.9, 0.2, 6.0, 0.25
-    assert step_change(0.0) == most
-    assert step_change(1.0) == safety
-    assert step_change(1.001) < safety
-    assert step_change(1e9) == least
-    assert step_change(np.inf) == failed
+    change = StepperOptions().step_change
+    assert change(0.0) == most
+    assert change(1.0) == safety
+    assert change(1.001) < safety
+    assert change(1e9) == least
+    assert change(np.inf) == failed
 
 
 START = np.array([[0.0], [1.0]])

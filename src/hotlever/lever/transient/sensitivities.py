@@ -21,7 +21,7 @@ from hotlever.lever.newton import refined
 from hotlever.lever.observables import observed, observed_by
 from hotlever.lever.transient.history import checked_times, time_steps
 from hotlever.lever.transient.problem import TransientProblem
-from hotlever.lever.transient.runge_kutta import INSTANT_RATE, METHOD, LinearSolver, Step
+from hotlever.lever.transient.runge_kutta import ARK436L2SA, INSTANT_RATE, LinearSolver, Step
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import dimensions_of, parameters_of
@@ -166,12 +166,14 @@ class _Along:
     def _over(self, problem: TransientProblem, step: Step) -> None:
         """Differentiate each stage of a step."""
         length = step.end - step.start
-        rate, flows = 1.0 / (METHOD.diagonal * length), [self._flow]
+        rate, flows = 1.0 / (ARK436L2SA.diagonal * length), [self._flow]
         begin, stored = self._stored, self._stored
         changes = self._changes
-        for stage in range(1, len(METHOD.times)):
+        for stage in range(1, len(ARK436L2SA.times)):
             x = step.stages[:, [stage]]
-            explicit = begin + length * np.tensordot(METHOD.stages[stage, :stage], flows, axes=1)
+            explicit = begin + length * np.tensordot(
+                ARK436L2SA.stages[stage, :stage], flows, axes=1
+            )
             by_stored, by_rest = problem.by_parameter(x, self._names)
             right = rate * (explicit - by_stored) - by_rest
             changes = self._solved(problem, x, right, rate, step.factors)
