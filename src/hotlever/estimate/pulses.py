@@ -30,7 +30,7 @@ from hotlever.lever.equations import BASE
 from hotlever.lever.lever import COARSE, State
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient import pulse, simulate
-from hotlever.lever.transient.cyclic import cyclic_steady_state
+from hotlever.lever.transient.trains import cyclic_steady_state
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.materials.heat import heat_capacity
 from hotlever.probe import Probe

@@ -6,7 +6,7 @@ import pytest
 
 from hotlever.errors import HistoryEndError
 from hotlever.lever.transient import pulse, simulate
-from hotlever.lever.transient.cyclic import cyclic_steady_state
+from hotlever.lever.transient.trains import cyclic_steady_state
 
 
 @pytest.mark.slow

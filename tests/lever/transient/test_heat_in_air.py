@@ -14,10 +14,10 @@ from hotlever.lever import Lever
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse, simulate, sine, step
-from hotlever.lever.transient.cyclic import cyclic_steady_state
 from hotlever.lever.transient.frequency_domain import harmonics, spectrum
 from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.modes import slowest_modes
+from hotlever.lever.transient.trains import cyclic_steady_state
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.probe import Probe, Tip
 

@@ -7,8 +7,8 @@ import pytest
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.transient import sine, spectrum
-from hotlever.lever.transient.cyclic import cyclic_steady_state
 from hotlever.lever.transient.frequency_domain import HARMONIC_COLUMNS, harmonics
+from hotlever.lever.transient.trains import cyclic_steady_state
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 

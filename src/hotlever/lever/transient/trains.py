@@ -1,6 +1,10 @@
-"""A lever in time, long trains of pulses on modes where those are certified by the full lever.
+"""A lever in time under a wave form that is repeated: its cyclic steady state, and long trains.
 
-Modes are those of the first periods. On them the train is simulated, until its periods are alike;
+Periods are integrated one after the other. What a period begins with changes less each time; all
+that is still to come is a geometric series, whose ratio the last two changes tell.
+
+Long trains of pulses are simulated on modes where those are certified by the full lever. Modes are
+those of the first periods. On them the train is simulated, until its periods are alike;
 then the full lever is integrated from a state late in the train, and tells, as the first periods
 do, how far the reduced one departs within a period, and from that to the next. Where it departs too
 far, what the full lever did there joins the snapshots, and the train is simulated once more.
@@ -8,6 +12,7 @@ far, what the full lever did there joins the snapshots, and the train is simulat
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +22,6 @@ from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError
 from hotlever.lever.lever import State
-from hotlever.lever.transient.cyclic import Cycle
 from hotlever.lever.transient.history import (
     ENERGIES,
     Callback,
@@ -34,17 +38,42 @@ from hotlever.types import Array, Progress
 if TYPE_CHECKING:
     from hotlever.lever.lever import Lever
 
-#: Periods from which modes pay; those that are integrated to make them, or to compare; and how
-#: often they are made.
-FEWEST, _PERIODS, _ROUNDS = 20, 2, 4
-#: Points of a history for each step, where levers are compared.
-_PER_STEP = 2
-#: Most of what a departure within a period grows to, as it is carried on by the next ones.
-_LARGEST_RATIO = 0.97
-#: Share of the tolerance by which all later periods together may differ from a copy.
-_ALIKE = 0.01
 #: Parts of the time that progress is told in.
 _PARTS = 1000
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """How trains are simulated on modes, and the cyclic steady state is looked for.
+
+    Attributes
+    ----------
+    fewest : int
+        Periods from which modes pay.
+    periods : int
+        Those that are integrated to make modes, or to compare.
+    rounds : int
+        How often modes are made.
+    per_step : int
+        Points of a history for each step, where levers are compared.
+    largest_ratio : float
+        Most of what a departure within a period grows to, as it is carried on by the next ones.
+    alike : float
+        Share of the tolerance by which all later periods together may differ from a copy.
+    most_to_steady : int
+        Periods that are integrated at most until one begins as the one before.
+    extrapolated_from : int
+        Periods from which the steady state is extrapolated.
+    """
+
+    fewest: int = 20
+    periods: int = 2
+    rounds: int = 4
+    per_step: int = 2
+    largest_ratio: float = 0.97
+    alike: float = 0.01
+    most_to_steady: int = 60
+    extrapolated_from: int = 4
 
 
 @one_blas_thread
@@ -57,6 +86,7 @@ def simulate(
     tolerance_K: float = 0.1,
     start: State | None = None,
     callback: Callback | None = None,
+    trains: TrainOptions | None = None,
     **options: Any,
 ) -> xr.Dataset:
     """Simulate a lever in time, on modes if the wave form is repeated often and they suffice.
@@ -76,12 +106,14 @@ def simulate(
     end, period = waveform.usual_end if until is None else until, waveform.period
     if at is not None and until is None:
         end = float(checked_times(at)[-1])
-    often = waveform.count >= FEWEST and end < np.inf
+    trains = trains or TrainOptions()
+    often = waveform.count >= trains.fewest and end < np.inf
     # modes are of levers that only the swept supply drives, from cold
     cold = start is None and not lever.space.held
-    if period is not None and often and FEWEST * period <= end and cold:
+    if period is not None and often and trains.fewest * period <= end and cold:
         try:
-            return _on_modes(lever, waveform, period, end, at, tolerance_K, callback, **options)
+            how: Any = {"callback": callback, "trains": trains, **options}
+            return _on_modes(lever, waveform, period, end, at, tolerance_K, **how)
         except ComputationError:
             pass  # it melts, or is like no train that modes are good for
     options |= {"tolerance_K": tolerance_K, "start": start, "callback": callback}
@@ -96,6 +128,7 @@ def _on_modes(
     at: ArrayLike | None,
     tolerance_K: float,
     callback: Callback | None,
+    trains: TrainOptions,
     **options: Any,
 ) -> xr.Dataset:
     """Return the history on modes that are certified.
@@ -107,7 +140,7 @@ def _on_modes(
     """
     snapshots: list[Array] = []
     over_periods = partial(
-        integrate, waveform=waveform, until=_PERIODS * period, tolerance_K=tolerance_K
+        integrate, waveform=waveform, until=trains.periods * period, tolerance_K=tolerance_K
     )
 
     def integrated(start: State | None) -> xr.Dataset:
@@ -116,7 +149,7 @@ def _on_modes(
         def keep(t: float, state: State) -> None:
             snapshots.append(state.x)
 
-        return over_periods(lever, start=start, per_step=_PER_STEP, callback=keep)
+        return over_periods(lever, start=start, per_step=trains.per_step, callback=keep)
 
     def departure(full: xr.Dataset, start: State) -> float:
         """Estimate how far (K) the reduced lever departs from the full one in the long run."""
@@ -125,15 +158,17 @@ def _on_modes(
         away = np.abs(full.tip_K.values - reduced.tip_K.values)
         first, second = away[times <= period], away[times > period]
         # what is carried on to a later period decays, at a rate that the ends of two tell
-        ratio = min(max(second[-1] / max(first[-1], 1e-12) - 1.0, 0.0), _LARGEST_RATIO)
+        ratio = min(max(second[-1] / max(first[-1], 1e-12) - 1.0, 0.0), trains.largest_ratio)
         return float(away.max() + first[-1] * ratio / (1.0 - ratio))
 
     first = integrated(None)
     report_times = None if at is None else checked_times(at)
-    for _ in range(_ROUNDS):
+    for _ in range(trains.rounds):
         reduced = reduced_in_time(lever, np.hstack(snapshots))
-        train = Train(reduced, waveform, period, end, report_times, tolerance_K, **options)
-        late = train.start(train.whole - _PERIODS)
+        train = Train(
+            reduced, waveform, period, end, report_times, tolerance_K, trains.alike, **options
+        )
+        late = train.start(train.whole - trains.periods)
         away = max(
             departure(first, train.start(0)),
             departure(integrated(on_all_nodes(lever, late)), late),
@@ -148,7 +183,7 @@ def _on_modes(
     history = train.history
     note = (
         f"simulated on {reduced.space.size} modes, within {away:.1g} K of the full lever as "
-        f"compared from periods 1 and {train.whole - _PERIODS + 1} on"
+        f"compared from periods 1 and {train.whole - trains.periods + 1} on"
     )
     if train.cyclic_from is not None:
         note += f"; from period {train.cyclic_from + 1} on all are alike"
@@ -169,6 +204,8 @@ class Train:
     report_times : ndarray, or None
         Times (µs) to report; None for those at which the solver stepped.
     tolerance_K : float
+    alike : float
+        See `TrainOptions`.
     per_step : int
         See `hotlever.lever.transient.history.integrate`.
     progress : callable, optional
@@ -197,6 +234,7 @@ class Train:
         end: float,
         report_times: Array | None,
         tolerance_K: float,
+        alike: float = TrainOptions.alike,
         per_step: int = 1,
         progress: Progress | None = None,
     ) -> None:
@@ -232,7 +270,7 @@ class Train:
             start, last_K = cycle.states[-1], cycle.change_K
             if progress is not None:
                 progress(int(_PARTS * (number + 1) * period / end), _PARTS)
-            if cycle.remaining_K < _ALIKE * tolerance_K:
+            if cycle.remaining_K < alike * tolerance_K:
                 self._starts.append(start)
                 self.cyclic_from = number + 1
                 cycle = integrated(waveform, period, number + 1, self.whole)
@@ -289,3 +327,153 @@ class Train:
         self.states += [
             (t, cycle.states[row]) for t, row in zip(row_times.tolist(), rows, strict=True)
         ]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One period of a lever.
+
+    Attributes
+    ----------
+    start : State
+    history : xarray.Dataset
+    states : list of State
+        At the times of the history; the last one is the end of the period, at which the next one
+        begins.
+    change_K, remaining_K : float
+        By how much the temperatures at its end differ from those at its start, and by how much
+        those of all later periods do.
+    """
+
+    start: State
+    history: xr.Dataset
+    states: list[State]
+    change_K: float
+    remaining_K: float
+
+    @classmethod
+    def integrated(
+        cls,
+        lever: Lever,
+        waveform: Waveform,
+        period: float,
+        start: State,
+        at: ArrayLike | None,
+        last_change_K: float,
+        **options: Any,
+    ) -> Cycle:
+        """Integrate a period (µs) from a state, about where the one before ended.
+
+        That one changed by `last_change_K`; 0 if there is none. Options are those of
+        `hotlever.lever.transient.history.integrate`.
+
+        Raises
+        ------
+        HistoryEndError
+            If silicon melts or a step fails.
+        """
+        states: list[State] = []
+        history = integrate(
+            lever,
+            waveform,
+            period,
+            at,
+            start=start,
+            callback=lambda t, state: states.append(state),
+            **options,
+        )
+        rises = lever.space.rises(states[-1].x - start.x)
+        change = float(np.abs(rises).max())
+        remaining = np.inf
+        if change < last_change_K:
+            remaining = change**2 / (last_change_K - change)
+        return cls(start, history, states, change, remaining)
+
+
+def cyclic_steady_state(
+    lever: Lever,
+    waveform: Waveform,
+    period: float,
+    *,
+    start: State | None = None,
+    at: ArrayLike | None = None,
+    tolerance_K: float = 0.1,
+    trains: TrainOptions | None = None,
+    **options: Any,
+) -> tuple[xr.Dataset, State]:
+    """Simulate a lever under a repeated wave form until a period begins as the one before.
+
+    Parameters
+    ----------
+    lever : Lever
+    waveform : Waveform
+        One period of it.
+    period : float
+        µs.
+    start : State, optional
+        Near that at which a period begins; at rest by default.
+    at : array_like, optional
+        Times within the period (µs) to report.
+    tolerance_K : float
+        Of the steps, and of what the period may still change by (K).
+    trains : TrainOptions, optional
+    **options
+        Of `hotlever.lever.transient.history.integrate`.
+
+    Returns
+    -------
+    history : xarray.Dataset
+        Of one period.
+    start : State
+        At its beginning.
+
+    Raises
+    ------
+    HistoryEndError, ComputationError
+        If silicon melts, a step fails, or no period is like the last.
+
+    Notes
+    -----
+    What is left of the beginning decays with the slowest modes. From a few periods it is
+    extrapolated away by reduced rank extrapolation (Sidi, J. Comput. Appl. Math. 36, 305 (1991)).
+    """
+    lever = lever.in_pulses()
+    trains = trains or TrainOptions()
+    options["tolerance_K"] = tolerance_K
+    starts, last_K = [initial_state(lever, waveform) if start is None else start], 0.0
+    for _ in range(trains.most_to_steady):
+        cycle = Cycle.integrated(lever, waveform, period, starts[-1], at, last_K, **options)
+        last_K = cycle.change_K
+        if cycle.change_K < 0.1 * tolerance_K or cycle.remaining_K < 0.3 * tolerance_K:
+            return cycle.history, cycle.start
+        starts.append(_with_steady_air(cycle, period))
+        known = trains.extrapolated_from
+        if len(starts) > known:
+            # the next period begins somewhere else
+            starts, last_K = [_extrapolated(starts[-known:], lever)], 0.0
+    raise ComputationError(
+        f"after {trains.most_to_steady} periods of {period:g} µs one is still not like the last: "
+        f"the tip's state at the beginning changes by {cycle.change_K:.2g} K"
+    )
+
+
+def _with_steady_air(cycle: Cycle, period: float) -> State:
+    """Return the state after a period, with the air as it is after many such.
+
+    Air far away takes milliseconds to get warm, but hardly matters to the lever.
+    """
+    last = cycle.states[-1]
+    begin, end, own = cycle.start.unknowns, last.unknowns, len(last.x)
+    in_air = last.lever.equations.heat_in_air.cyclic(begin[own:], end[own:], period)
+    return State(last.lever, end[:own], in_air)
+
+
+def _extrapolated(starts: list[State], lever: Lever) -> State:
+    """Extrapolate states at the beginning of successive periods to their limit."""
+    own = lever.space.size + 1
+    columns = np.hstack([state.unknowns for state in starts])
+    changes = np.diff(lever.space.rises(columns[:own]), axis=1)
+    bends = np.diff(changes, axis=1)
+    shares, *_ = np.linalg.lstsq(bends, -changes[:, 0], rcond=1e-8)
+    limit = columns[:, :1] + np.diff(columns, axis=1)[:, : shares.size] @ shares[:, None]
+    return State(lever, limit[:own], limit[own:])
