@@ -1,6 +1,7 @@
 """The reduced lever: how accurate, how well it knows that, how fast, and what a fit costs with it.
 
 python benchmarks/reduced.py [CASES]     (the FEniCS rows need benchmarks/fenics/install.sh)
+python benchmarks/reduced.py buys        what it buys over a lever on a coarse mesh
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+from functools import partial
 from statistics import median
 
 import numpy as np
@@ -15,9 +17,13 @@ import numpy as np
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimate import fit, read_measurement
 from hotlever.estimate.experiment import ExperimentAtRest, experiment_of
+from hotlever.estimate.objective import Subproblem
+from hotlever.estimate.sampling import SampledLever
 from hotlever.estimate.surrogate import Rows
+from hotlever.estimate.trials import Trials, draw_samples
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
+from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.lever import estimated_error
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.lever.reduced.training import cached_reduction
@@ -34,6 +40,8 @@ from problems import (
 )
 
 RUNS = 7
+#: Trials of the posterior of a fit to the current alone.
+SAMPLES = 100
 #: Biases compared with the full lever in each case.
 BIASES = 5
 
@@ -81,7 +89,73 @@ def accuracy(lever, reduced, cases):
     )
 
 
+def buys():
+    """Compare with a coarse lever: a slider's step, a fit, and the posterior of the current."""
+    data, probe, highest = read_measurement(EXAMPLE), Probe.reference(), 9.0
+    full, coarse = Lever(probe), Lever(probe, COARSE)
+    reduced, bias = cached_reduction(full), np.linspace(1.0, highest, 9)
+    # the fit comes last that finds the geometry reduced
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ[CACHE_VARIABLE] = folder
+        fit_on_coarse = processor_seconds(lambda: fit(data), RUNS)
+        reduction = processor_seconds(lambda: cached_reduction(full))
+        fit_on_reduced = processor_seconds(lambda: fit(data), RUNS)
+    levers = [full.with_probe(probe.replace({"n_d": n_d})) for n_d in (4.0e17, 6.0e17)]
+    moved = {
+        "coarse": lambda at: Lever(at, space=coarse.space).branch_to(highest),
+        "reduced": lambda at: reduced.branch(at, Reach(at.circuit, highest)),
+    }
+    alone = fit(data, observables=("current",))
+    objective = alone.objective(alone.names)
+    experiments = {
+        name: ExperimentAtRest(fast, SimilarLevers(full), objective.residuals.bias, objective.names)
+        for name, fast in (("coarse", SimilarLevers(coarse)), ("reduced", reduced))
+    }
+    rows = []
+    for name, branch_of in moved.items():
+        step = median(processor_seconds(partial(branch_of, one.probe), RUNS) for one in levers)
+        off = 0.0
+        for one in levers:
+            branch = branch_of(one.probe)
+            tips = branch.tip_K(branch.read(one.circuit, bias).u)
+            off = max(off, float(np.abs(tips - one.sweep(bias).tip_K.values).max()))
+        lever = SampledLever(experiments[name], alone.probe)
+        drawn = draw_samples(Trials(Subproblem(objective, lever.at)), SAMPLES)
+        error = max(
+            lever.error_K(objective.at(alone.probe, drawn.points[row]))
+            for row in range(0, SAMPLES, SAMPLES // 4)
+        )
+        fitted = {"coarse": fit_on_coarse, "reduced": fit_on_reduced}[name]
+        spent = {"coarse": 0.0, "reduced": reduction}[name]
+        rows.append(
+            (
+                name,
+                f"{1e3 * step:.0f}",
+                f"{off:.2f}",
+                f"{fitted:.2f}",
+                f"{60 * fitted + spent:.0f}",
+                f"{drawn.effective:.0f}",
+                f"{error:.1f}",
+            )
+        )
+    table(
+        (
+            "lever",
+            "slider's step (ms)",
+            "off (K)",
+            "fit (s)",
+            "sixty fits (s)",
+            f"of {SAMPLES} samples, current alone",
+            "off at four (K)",
+        ),
+        rows,
+    )
+
+
 def main():
+    if sys.argv[1:] == ["buys"]:
+        buys()
+        return
     cases = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     data = read_measurement(EXAMPLE)
     probe = Probe.reference()
