@@ -178,6 +178,20 @@ def test_the_surrogate_serves_far_away_too(coarse, reduced):
     np.testing.assert_allclose(sampled(coarse, reduced)(there)[2], exact.tip_K, atol=5.0)
 
 
+def test_the_surrogate_has_the_slopes_of_its_values_far_away_too(coarse, reduced):
+    lever = SampledLever(reduced_experiment(coarse, reduced, BIAS), coarse.probe)
+    there = coarse.with_material(coarse.probe.material.with_(n_d=6e17, p=2.8)).probe
+    at, change = there.values(reduced.names), np.zeros(len(reduced.names))
+    for name, step in (("n_d", 2e14), ("p", 1e-3), ("a1", 1e-9)):
+        change[:] = 0.0
+        change[reduced.names.index(name)] = step
+        after, before = (lever.at.surrogate.values_at(at + way * change) for way in (1.0, -1.0))
+        slopes = lever.at.surrogate.predict(at)[1] @ change
+        changes = after[:3] - before[:3]
+        off = 1e-2 * np.abs(changes).max(axis=1, keepdims=True)
+        assert (np.abs(2.0 * slopes[:3] - changes) < off).all()
+
+
 def test_posterior_agrees_with_the_covariance_of_the_fit(fitted, posterior):
     for name in fitted.names:
         known = fitted.parameters[name]

@@ -23,8 +23,14 @@ import numpy as np
 from hotlever.contact.law import contact_of
 from hotlever.lever.branch import TIP_RISE, Branch, branch_end, shifted
 from hotlever.lever.laws import BASE
-from hotlever.lever.observables import Linearised, at_fixed_bias, observed, observed_by
-from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.observables import (
+    Linearised,
+    at_fixed_bias,
+    observed,
+    observed_by,
+    with_changes,
+)
+from hotlever.lever.reduced.lever import ReducedLever, Solved
 from hotlever.piecewise import Piecewise, crossing, spline_through
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.probe_parameters import parameters_of
@@ -322,7 +328,7 @@ class ReducedSurrogate(CurveSurrogate):
     """A branch times what a reduced lever changes by at equal rises of the tip: good far away too.
 
     The reduced lever stays on its few points, and each of its states starts at a root; so this
-    costs little more than powers do. Derivatives are those of the powers.
+    costs little more than powers do.
 
     Parameters
     ----------
@@ -338,14 +344,15 @@ class ReducedSurrogate(CurveSurrogate):
     ) -> None:
         super().__init__(local.probe, local.names, local.branch, local.by_parameter, local.rows)
         self._reduced, self._linearised = reduced, linearised
-        self._local_outputs = self._on_few_points(local.probe)
+        few, states = self._on_few_points(local.probe.values(local.names))
+        self._local_outputs = few.observed(states.x).T
 
-    def _on_few_points(self, probe: Probe) -> Array:
-        """Return V_l, I_h and V_r of the states of a probe, (k, 3)."""
+    def _on_few_points(self, parameters: Array) -> Solved:
+        """Return the equations and the states of a probe with some values of the parameters."""
+        named = zip(self.names, parameters.tolist(), strict=True)
+        probe = self.probe.replace(dict(named))
         guess = self._linearised.states(probe)[:, 1:]
-        u = self.branch.u[1:]
-        few, states = self._reduced.solved(probe, u, guess, self._linearised.factors)
-        return np.asarray(few.observed(states.x).T)
+        return self._reduced.solved(probe, self.branch.u[1:], guess, self._linearised.factors)
 
     @one_blas_thread
     def branch_at(self, parameters: Array) -> Branch:
@@ -356,14 +363,32 @@ class ReducedSurrogate(CurveSurrogate):
         ComputationError
             If such a lever has no such states.
         """
-        named = zip(self.names, parameters.tolist(), strict=True)
-        few = self._on_few_points(self.probe.replace(dict(named))) / self._local_outputs
+        few, states = self._on_few_points(parameters)
+        return self._multiplied_by(few.observed(states.x).T)
+
+    def _multiplied_by(self, outputs: Array) -> Branch:
+        """Return the branch whose states show V_l, I_h and V_r (k, 3) on few points."""
         ratio = np.ones(self.branch.values.shape)
-        ratio[1:, :TIP_RISE] = few
+        ratio[1:, :TIP_RISE] = outputs / self._local_outputs
         # without power the ratio is that of a barely warm lever
         ratio[0] = ratio[1]
         growth = spline_through(self.branch.u, ratio)(self.branch.u, 1) / ratio
         return multiplied(self.branch, ratio, growth)
+
+    @one_blas_thread
+    def predict(self, parameters: Array) -> tuple[Array, Array]:
+        """See `CurveSurrogate.predict`."""
+        few, states = self._on_few_points(parameters)
+        outputs = few.observed(states.x).T
+        branch = self._multiplied_by(outputs)
+        _, slopes = with_changes(few, states.x, self.names, states.factors)
+        rates = np.zeros((*branch.values.shape, len(self.names)))
+        rates[1:, :TIP_RISE] = slopes[:, :TIP_RISE] / outputs[..., None]
+        rates[0] = rates[1]
+        prediction = self.rows.differentiated(
+            branch, branch.values[:, :, None] * rates, self.circuit(parameters), self.names
+        )
+        return self.contact.differentiated(*prediction, parameters)
 
 
 #: A local model of what a lever shows, exact at the parameters of one that was solved.
