@@ -237,8 +237,10 @@ def test_doping_known_by_orders_of_magnitude_is_found_and_said_by_its_factor(dat
     """Nominal is a third of the truth: one standard deviation, however it is counted."""
     known = {**default_priors(NOMINAL), "n_d": "1.733e17 ×/ 3"}
     result = fit(data[0], NOMINAL, priors=known)
-    value = result.parameters["n_d"].value
-    assert value == pytest.approx(5.2e17, rel=0.4)
+    value, stderr = result.parameters["n_d"].value, result.parameters["n_d"].stderr
+    # with uncertain laws the data tell it to a factor of two
+    assert stderr / value < 0.7 * np.log(3.0)
+    assert abs(np.log(value / 5.2e17)) < 1.5 * stderr / value
     use = result.priors["n_d"]
     assert use.distribution == "log-normal"
     assert use.spread / use.value == pytest.approx(np.log(3.0))
