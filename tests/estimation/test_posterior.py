@@ -273,9 +273,7 @@ def test_what_was_known_to_a_factor_is_compared_in_logarithms():
     """Half as much again as was known: in its unit the posterior is as wide as the prior."""
     known = Prior(1e18, np.log(1.5))
     fitted = SimpleNamespace(value=1.5e18, stderr=4.5e17)
-    fit = SimpleNamespace(
-        probe=Probe.reference(), parameters={"n_d": fitted}, stated_priors={"n_d": known}
-    )
+    fit = SimpleNamespace(probe=Probe.reference(), parameters={"n_d": fitted}, known={"n_d": known})
     normal = np.random.default_rng(0).standard_normal(4000)
     statement = "n_d is as known before: these data do not tell"
     assert statement not in uncertainty._about(fit, "n_d", 1.5e18 * np.exp(0.30 * normal))

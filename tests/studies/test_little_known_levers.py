@@ -76,7 +76,7 @@ def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
     assert priors["n_d"].spread in (0.6, pytest.approx(np.log(2.5)))
     while len(away) < 200:
         try:
-            true = twins._drawn(rng, nominal)
+            true = twins._drawn(rng, nominal, obey=False)
         except twins.HotleverError:
             continue
         assert true.prior is None
@@ -108,7 +108,7 @@ def test_data_end_anywhere_from_350_K_to_melting_half_of_them_below_the_knee(som
     ends = [float(lever.branch.read(lever.true.circuit, np.array([0.0])).last_K) for lever in some]
     assert max(ends) > 1000.0
     below = sum(lever.below_knee for lever in some)
-    assert 3 <= below <= 9
+    assert 2 <= below <= 10
     for lever in some:
         tip = lever.tip_K(lever.measurement.bias_V)
         assert 18 <= tip.size <= 55
@@ -177,8 +177,8 @@ def answered(some, monkeypatch):
 
     arguments = {}
 
-    def calibrated(data, probe):
-        arguments.update(data=data, probe=probe)
+    def calibrated(data, probe, priors):
+        arguments.update(data=data, probe=probe, priors=priors)
         return Answer
 
     monkeypatch.setattr(twins, "calibrate", calibrated)
@@ -189,7 +189,11 @@ def answered(some, monkeypatch):
 def test_an_answer_is_compared_with_the_truth_by_the_error_of_that_side(answered):
     answer, arguments, lever = answered
     record = judge_little_known(0, "vacuum")
-    assert arguments == {"data": lever.measurement, "probe": lever.nominal}
+    assert arguments == {
+        "data": lever.measurement,
+        "probe": lever.nominal,
+        "priors": {"laws": "uncertain"},
+    }
     assert record["outcome"] == "described"
     count = np.isfinite(lever.tip_K(lever.measurement.bias_V)).sum()
     assert record["off_K"] == pytest.approx([10.0] * count)

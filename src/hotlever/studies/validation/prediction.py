@@ -47,7 +47,7 @@ class PredictedNumber:
 
     Examples
     --------
-    >>> half = Prediction(0.0, 1.0, is_share=True)
+    >>> half = PredictedNumber(0.0, 1.0, is_share=True)
     >>> [round(value, 3) for value in (half.median, *half.band_95)]
     [0.5, 0.123, 0.877]
     >>> half.verdict(0.9, 0.01)
