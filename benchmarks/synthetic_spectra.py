@@ -203,6 +203,28 @@ SHOULDERS = {"none": 0.0, "faint": 45.0, "strong": 260.0}  # height, photons
 ALIKE = 80  # spectra of one line
 
 
+def spectra_of_one_line(
+    count: int, *, band: float, step: float = 2.8, seed: int = 1, kelvin: float = 400.0
+) -> tuple[list[Spectrum], float]:
+    """Return spectra of the same line, on pixels that lie elsewhere each time, and its place."""
+    rng, spectra = np.random.default_rng(seed), []
+    for number in range(count):
+        instrument = Instrument(
+            start=440.0 + step * rng.random(),
+            step=step,
+            counts=1400.0,
+            background=300.0,
+            gain=30.0,
+            band=band,
+            band_centre=511.0,
+            band_fwhm=16.0,
+            spike_rate=0.0,
+            resolution=1.5 * step,
+        )
+        spectra.append(Spectrum(*spectrum(kelvin, rng, instrument), str(number)))
+    return spectra, true_line(kelvin, instrument)[0]
+
+
 def on_coarse_axes() -> None:
     """Print how honest the errors are of one line in many spectra."""
     print(f"\n{ALIKE} spectra of one line: rms of the pulls, within one and two standard errors")
@@ -210,23 +232,8 @@ def on_coarse_axes() -> None:
     every = {"by itself": list[float](), "together": list[float]()}
     for pixel in PIXELS:
         for name, band in SHOULDERS.items():
-            rng, spectra = np.random.default_rng(5), []
-            for number in range(ALIKE):
-                instrument = Instrument(
-                    start=440.0 + pixel * rng.random(),
-                    step=pixel,
-                    counts=1400.0,
-                    background=300.0,
-                    gain=30.0,
-                    band=band,
-                    band_centre=511.0,
-                    band_fwhm=16.0,
-                    spike_rate=0.0,
-                    resolution=1.5 * pixel,
-                )
-                spectra.append(Spectrum(*spectrum(400.0, rng, instrument), str(number)))
-            centre, _, _ = true_line(400.0, instrument)
-            by_itself = [measure([spectrum])[0].peak for spectrum in spectra]
+            spectra, centre = spectra_of_one_line(ALIKE, band=band, step=pixel, seed=5)
+            by_itself = [measure([each])[0].peak for each in spectra]
             together = [line.peak for line in measure(spectra)]
             for way, peaks in zip(every, (by_itself, together), strict=True):
                 there = [peak for peak in peaks if peak is not None]

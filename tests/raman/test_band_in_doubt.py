@@ -16,29 +16,7 @@ from hotlever.raman import (
 )
 from hotlever.raman.series import band_evidence
 from hotlever.raman.spectrum import Spectrum
-from synthetic_spectra import Instrument
-
-KELVIN = 400.0
-
-
-def spectra_of_one_line(count, *, band, step=2.8, seed=1):
-    """The same line, on pixels that lie elsewhere each time, and its place."""
-    rng, spectra = np.random.default_rng(seed), []
-    for number in range(count):
-        instrument = Instrument(
-            start=440.0 + step * rng.random(),
-            step=step,
-            counts=1400.0,
-            background=300.0,
-            gain=30.0,
-            band=band,
-            band_centre=511.0,
-            band_fwhm=16.0,
-            spike_rate=0.0,
-            resolution=1.5 * step,
-        )
-        spectra.append(Spectrum(*synthetic.spectrum(KELVIN, rng, instrument), str(number)))
-    return spectra, synthetic.true_line(KELVIN, instrument)[0]
+from synthetic_spectra import Instrument, spectra_of_one_line
 
 
 @pytest.mark.parametrize("case", synthetic.CASES, ids=lambda case: case.name)
