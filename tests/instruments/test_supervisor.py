@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 
@@ -121,6 +122,22 @@ def test_a_lost_line_is_said_aloud(twin):
 
     with pytest.raises(InstrumentError, match="MAY STILL BE ON"):
         measure()
+    assert twin.output_on
+
+
+def test_a_line_that_is_lost_as_the_output_is_turned_on_is_said_aloud():
+    class Breaking(TwinBench):
+        def source_answer(self, message: str) -> str | None:
+            answer = super().source_answer(message)
+            if self.output_on:
+                threading.Thread(target=self.break_lines).start()
+            return answer
+
+    with (
+        Breaking(resistor()) as twin,
+        pytest.raises(InstrumentError, match="MAY STILL BE ON"),
+    ):
+        Supervisor(Supply(twin.source, timeout_s=0.5, turn_off_s=0.5)).__enter__()
     assert twin.output_on
 
 

@@ -74,8 +74,8 @@ class Supervisor:
         self._start()
         try:
             self.identity = self._answer(self._supply.start_s)
-        except BaseException:
-            self._end()
+        except BaseException as error:
+            self._end(error)
             raise
         return self
 
@@ -94,13 +94,7 @@ class Supervisor:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        confirmed = self._end()
-        if not confirmed:
-            # whoever owned the instrument may have died
-            confirmed = _turned_off(None, self._supply)
-        if not confirmed:
-            before = f"{error}; " if error is not None and str(error) else ""
-            raise InstrumentError(f"{before}{_still_on(self._supply.source)}") from error
+        self._end(error)
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -127,8 +121,16 @@ class Supervisor:
             raise answer
         return answer
 
-    def _end(self) -> bool:
-        """Have the output turned off; return whether that is confirmed."""
+    def _end(self, error: BaseException | None) -> None:
+        """Have the output turned off; raise InstrumentError if nobody confirms that it is."""
+        # whoever owned the instrument may have died
+        if self._is_turned_off() or _turned_off(None, self._supply):
+            return
+        before = f"{error}; " if error is not None and str(error) else ""
+        raise InstrumentError(f"{before}{_still_on(self._supply.source)}") from error
+
+    def _is_turned_off(self) -> bool:
+        """Have the supervising process turn the output off; return whether it confirms that."""
         supply, confirmed = self._supply, False
         with suppress(OSError):
             self._pipe.send(None)
