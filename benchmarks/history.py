@@ -47,7 +47,7 @@ from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.lever.transport import Fluxes
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
-from hotlever.probe.priors import Prior, default_priors
+from hotlever.probe.priors import Prior, default_priors, draw_values
 from hotlever.quantities import observables_of
 from hotlever.threads import one_blas_thread
 from problems import table
@@ -144,7 +144,7 @@ def twins(count: float = 6, length: float = LENGTH, seed: float = 1) -> None:
     guess = simulate(lever, wave, at=rows_at).tip_K.values[-1]
     number = 0
     while number < count:
-        moved = {name: prior.at(rng.normal()) for name, prior in priors.items()}
+        moved = draw_values(priors, rng)
         try:
             truth = simulate(lever.with_probe(probe.replace(moved)), wave, at=rows_at)
         except HotleverError:

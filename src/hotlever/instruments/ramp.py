@@ -234,13 +234,15 @@ class Ramp:
         first_K = whole.jumps[0][1] if whole.jumps else whole.last_K
         return min(limit, float(first_K))
 
-    def _limits(self, bias: Array) -> Array:
+    def _tip_limit(self, bias_V: float) -> float:
+        """Return what the tip (K) does not exceed at a bias; infinity where it has no states."""
         known = self._known
-        return hottest_tips(known, bias[bias <= known.highest_V], known.information)
+        if bias_V > known.highest_V:
+            return np.inf
+        return float(hottest_tips(known, np.array([bias_V]), known.information)[0])
 
     def _is_safe(self, bias_V: float) -> bool:
-        limits = self._limits(np.array([bias_V]))
-        return bool(limits.size and limits[0] < self.limit_K)
+        return self._tip_limit(bias_V) < self.limit_K
 
     def _next_step(self) -> Step | None:
         """Return what to take next; None, with the reason, if nothing."""
@@ -254,7 +256,7 @@ class Ramp:
         if bias is None:
             return None
         tip, _ = self._known.tip(np.array([bias]))
-        return Step(bias, float(tip[0]), float(self._limits(np.array([bias]))[0]))
+        return Step(bias, float(tip[0]), self._tip_limit(bias))
 
     @property
     def _proposes(self) -> bool:

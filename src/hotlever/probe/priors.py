@@ -266,6 +266,11 @@ def updated(
     return {name: prior for name, prior in priors.items() if name not in names} | anew
 
 
+def draw_values(priors: Mapping[str, Prior], rng: np.random.Generator) -> dict[str, float]:
+    """Return a value from each of some priors, independent of each other, by name."""
+    return {name: prior.at(float(rng.standard_normal())) for name, prior in priors.items()}
+
+
 def as_known(probe: ProbesParts, stated: Mapping[str, Prior | str] | None) -> ProbesParts:
     """Return a probe as far as its priors say more than its file: on a chip as is usual.
 

@@ -38,7 +38,14 @@ from hotlever.materials.silicon import (
     minimos_mobility,
 )
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.priors import ALL_LAWS, PAPERS, UNCERTAIN, default_priors, updated
+from hotlever.probe.priors import (
+    ALL_LAWS,
+    PAPERS,
+    UNCERTAIN,
+    default_priors,
+    draw_values,
+    updated,
+)
 from hotlever.probe.tip import Tip
 from hotlever.text import BAND
 from hotlever.types import Array
@@ -136,11 +143,9 @@ def values_from_priors(nominal: Probe, rng: np.random.Generator) -> dict[str, fl
     Its laws do not depart from their formulas.
     """
     lawful = updated(default_priors(nominal), {ALL_LAWS: PAPERS}, nominal, "twins")
-    return {
-        name: prior.at(float(rng.standard_normal()))
-        for name, prior in lawful.items()
-        if name != "series_resistance_ohm"
-    }
+    return draw_values(
+        {name: prior for name, prior in lawful.items() if name != "series_resistance_ohm"}, rng
+    )
 
 
 def some_tip(rng: np.random.Generator) -> Tip:
