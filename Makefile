@@ -11,10 +11,10 @@ BIN := .venv/bin
 
 # Tests run side by side and start many processes: linear algebra with more than one thread in each
 # would wait for the others, and what all of them import is compiled once.
-test test-slow test-app: export OPENBLAS_NUM_THREADS := 1
+test test-failed test-slow test-app: export OPENBLAS_NUM_THREADS := 1
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: test test-slow test-app test-hostile test-pythons reproduce validate docs lock env clean
+.PHONY: test test-failed test-slow test-app test-hostile test-pythons reproduce validate docs lock env clean
 
 env: .venv/.ready
 
@@ -22,21 +22,28 @@ env: .venv/.ready
 	sh tools/make_env.sh
 	touch $@
 
+# what hangs has hung twice before the tests end
+TWO := -n 2 --dist loadfile --max-worker-restart=2
+
 test: env
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest $(TWO)
+
+# what failed last, alone: whether it fails again, or failed now and then
+test-failed: env
+	$(BIN)/python -m pytest --last-failed --last-failed-no-failures none
 
 test-slow: env
-	$(BIN)/python -m pytest -m slow -n 2 --dist loadfile
+	$(BIN)/python -m pytest -m slow -o faulthandler_timeout=3600 $(TWO)
 
 test-app: env
 	sh tools/get_chromium.sh
-	$(BIN)/python -m pytest -m browser -p no:cacheprovider -n 2 --dist loadfile tests/app tests/report
+	$(BIN)/python -m pytest -m browser -p no:cacheprovider $(TWO) tests/app tests/report
 
 test-hostile: env
-	HOTLEVER_HOSTILE=1 $(BIN)/python -m pytest tests/hostile -rP
+	HOTLEVER_HOSTILE=1 $(BIN)/python -m pytest tests/hostile -o faulthandler_timeout=3600 -rP
 
 test-pythons: env
 	sh tools/test_pythons.sh
