@@ -16,6 +16,14 @@ such a lever from so far away, and whether the errors that it states are those i
      python benchmarks/twins.py --wild [--count N] [--first K] [--medium vacuum|air]
                                 [--laws paper] [--obey] [--results FILE] [--write DIR]
 
+With --drawn, three-leg levers whose heater is 10 % longer than it was meant to be: drawn ones,
+whose window for the dopant is larger, with a prior of its edges, beside those of the built-in
+shape, with a prior of that dimension. Both have the same material, noise and outliers; other
+dimensions are as they were meant. The true window is drawn anew, so that it has other parts than
+the shifted one.
+
+     python benchmarks/twins.py [LEVERS] --drawn [--noise SHARE] [--laws paper]
+
 With --laws paper calibrations take the laws of silicon to be the paper's, as --laws says. Those of
 levers above are the paper's or MINIMOS'; those of the wild ones depart as the model has it, unless
 they are to --obey.
@@ -50,6 +58,7 @@ from hotlever.lever import Branch, Lever
 from hotlever.lever.discretisation import chosen_space, energy_between_degrees, making
 from hotlever.lever.full_space import FullSpace
 from hotlever.probe import MeshOptions, Probe
+from hotlever.probe.drawing import Drawing
 from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import ALL_LAWS, PAPERS, UNCERTAIN, default_priors, updated
 from hotlever.probe.probe_parameters import parameters_of
@@ -63,8 +72,10 @@ from hotlever.studies.simulation_based_calibration import (
     concatenated,
     coverage_by_decile,
     judge,
+    measure,
     stated_on_that_side,
     summary,
+    values_from_priors,
 )
 from hotlever.types import Array
 from problems import table
@@ -129,6 +140,114 @@ def main(
     without = [name for name in DEPARTURES if name not in departures]
     ending = f", without {', '.join(without)}" if without else ""
     report(results, f"{medium}, {what}, noise of {noise:g}, {laws} laws{ending}")
+
+
+# --- drawn levers whose windows are off -----------------------------------------------------------
+
+#: How far the heater ends outside of where it was meant to, at either side (µm), and what is said
+#: to be known of that; its own name for it.
+_WINDOW_UM = 0.2
+_SHIFT = "heater.edge_bias_um"
+#: What is known of other dimensions.
+_EXACT = "± 0.01%"
+
+
+def drawn_reference(shift_um: float = 0.0) -> Probe:
+    """The reference probe as a drawing whose window of the heater is drawn larger."""
+    layout = Probe.reference().layout()
+    sections = Drawing.of_layout(layout).sections()
+    (x0, y0), (x1, y1) = layout.heater.box + shift_um * np.array([[-1.0], [1.0]])
+    # it is drawn wider than the silicon, as is usual
+    low, high = y0 - 1.0, y1 + 1.0
+    sections["layers"]["heater"] = [[x0, low], [x1, low], [x1, high], [x0, high]]
+    return Probe.from_sections(sections, "drawn")
+
+
+def heaters_off() -> dict[str, tuple[Probe, Probe, dict[str, str]]]:
+    """The true lever, the nominal one and the prior of its owner, of each kind."""
+    meant = Probe.reference()
+    length_um = meant.shape.dimensions()["heater_length_um"]
+    longer = length_um + 2 * _WINDOW_UM
+    return {
+        "drawn": (drawn_reference(_WINDOW_UM), drawn_reference(), {_SHIFT: f"± {_WINDOW_UM}"}),
+        "built-in": (
+            meant.with_(heater_length_um=longer),
+            meant,
+            {"heater_length_um": f"{length_um} ± {2 * _WINDOW_UM}"},
+        ),
+    }
+
+
+def judge_drawn(number: int, noise: float, laws: str) -> dict[str, dict[str, Any]]:
+    """Calibrate the levers of a number, of each kind."""
+    return {
+        kind: judge_heater(number, *levers, noise, laws) for kind, levers in heaters_off().items()
+    }
+
+
+def judge_heater(
+    number: int, true: Probe, nominal: Probe, prior: dict[str, str], noise: float, laws: str
+) -> dict[str, Any]:
+    """Calibrate a lever, and return its errors, those that are stated, and its heater's."""
+    rng = np.random.default_rng(number)
+    held = [name for name in Probe.reference().shape.dimensions() if name != "thickness_um"]
+    drawn = values_from_priors(Probe.reference(), rng)
+    lever = true.with_(**{name: drawn[name] for name in drawn if name not in held})
+    data, _, solved = measure(lever, rng, "iv", noise=noise)
+    exact = {name: _EXACT for name in held if name in default_priors(nominal)}
+    try:
+        found = calibrate(data, probe=nominal, priors={ALL_LAWS: laws, **exact, **prior})
+    except HotleverError as error:
+        return {"refused": str(error)}
+    tip = solved.sweep(found.table.bias_V.values).tip_K.values
+    off = found.table.tip_K.values - tip
+    hot = tip > HOT
+    (name,) = prior
+    use = found.priors[name]
+    heater = np.array([use.value, use.posterior_value, use.posterior_spread])
+    return {
+        "refused": found.reason,
+        "off_K": off[hot],
+        "stated_K": stated_on_that_side(found.table, off)[hot],
+        # how much longer the heater is
+        "heater_um": (heater - [use.value, use.value, 0.0]) * (2.0 if name == _SHIFT else 1.0),
+    }
+
+
+def drawn(numbers: list[int], noise: float, laws: str) -> None:
+    """Print how right bands are of levers whose heaters are off, drawn and built-in."""
+    judged = list(two_at_a_time(partial(judge_drawn, noise=noise, laws=laws), numbers))
+    print(
+        f"\n## heaters {2 * _WINDOW_UM:g} µm longer than meant, noise of {noise:g}, {laws} laws\n"
+    )
+    rows = []
+    for kind in heaters_off():
+        every = [one[kind] for one in judged]
+        answered = [one for one in every if not one["refused"]]
+        if not answered:
+            continue
+        ratios = [np.abs(one["off_K"]) / one["stated_K"] for one in answered]
+        within = coverage_by_decile(ratios).mean(axis=1)
+        stated = [np.sqrt(np.mean(one["stated_K"] ** 2)) for one in answered]
+        largest = [np.abs(one["off_K"]).max() for one in answered]
+        _, found, spread = np.array([one["heater_um"] for one in answered]).T
+        rows.append(
+            [
+                kind,
+                f"{len(answered)} of {len(every)}",
+                *(f"{share:.0%}" for share in within),
+                f"{np.sqrt(np.mean([np.mean(ratio**2) for ratio in ratios])):.2f}",
+                f"{np.median(stated):.1f}",
+                f"{np.median(largest):.1f}",
+                f"{found.mean():.2f}",
+                f"{np.median(spread):.2f}",
+                f"{np.mean(np.abs(found - 2 * _WINDOW_UM) < 2 * spread):.0%}",
+            ]
+        )
+    bands = [f"in {level:.0%}" for level in LEVELS]
+    errors = ["error / stated", "stated (K)", "largest error (K)"]
+    heater = ["longer by (µm)", "± (µm)", "within two ±"]
+    table(["lever", "described", *bands, *errors, *heater], rows)
 
 
 # --- levers of which little is known, reported ---------------------------------------------------
@@ -556,6 +675,7 @@ if __name__ == "__main__":
     parser.add_argument("--noise", type=float, default=NOISE, help="of meters, a share")
     parser.add_argument("--laws", choices=(UNCERTAIN, PAPERS), default=UNCERTAIN)
     parser.add_argument("--obey", action="store_true", help="wild levers obey the paper's laws")
+    parser.add_argument("--drawn", action="store_true", help="levers whose heaters are off")
     parser.add_argument("--wild", action="store_true", help="levers of which little is known")
     parser.add_argument("--count", type=int, default=200, help="of levers of which little is known")
     parser.add_argument("--first", type=int, default=0, help="number of the first of them")
@@ -563,6 +683,9 @@ if __name__ == "__main__":
     parser.add_argument("--results", type=Path, metavar="FILE", help="one line for each of them")
     parser.add_argument("--write", type=Path, metavar="DIR", help="their data, not judged")
     given = parser.parse_args()
+    if given.drawn:
+        drawn([*range(given.levers)], given.noise, given.laws)
+        sys.exit()
     if given.wild:
         numbers = [*range(given.first, given.first + given.count)]
         if given.write:

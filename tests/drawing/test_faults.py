@@ -265,4 +265,4 @@ def test_what_a_drawing_cannot_do_yet_is_refused_where_it_is_met(run, tmp_path):
         "calibrate", "iv.csv", "--probe", "probe.toml", "--prior", "dimensions=±2%"
     )
     assert status == 2
-    assert "the outline of a drawing is taken as exact so far; expected thickness_um" in err
+    assert "edges of a drawing are off by a length, not by a share; expected thickness_um" in err

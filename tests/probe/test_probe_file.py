@@ -178,6 +178,6 @@ def test_a_tip_on_the_axis_is_at_zero_and_not_at_minus_zero(run, tmp_path):
 
 def test_what_no_drawing_has_is_refused_before_one_is_saved(tmp_path):
     probe = Probe.reference().with_(**{"prior.dimensions": "± 2%"})
-    with pytest.raises(InputError, match=r"lever\.toml: \[prior\]: dimensions: the outline of a"):
+    with pytest.raises(InputError, match=r"lever\.toml: \[prior\]: dimensions: edges of a"):
         probe.to_file(tmp_path / "lever.toml", drawing=tmp_path / "lever.gds")
     assert list(tmp_path.iterdir()) == []

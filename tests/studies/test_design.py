@@ -120,9 +120,9 @@ def test_a_film_of_a_drawing_is_varied_exactly():
 
 def test_the_numbers_of_a_drawing_are_those_it_has(drawn):
     assert drawn.usual == ("scale", "thickness_um", "n_d", "annealing_K", "annealing_min")
-    assert {"edge_bias_um", "series_resistance_ohm", "c_kappa"} <= set(drawn.numbers)
+    assert {"heater.edge_bias_um", "series_resistance_ohm", "c_kappa"} <= set(drawn.numbers)
     for name in ("unit_um", "tolerance_um", "heater_length_um"):
-        with pytest.raises(InputError, match="expected one of: thickness_um, scale"):
+        with pytest.raises(InputError, match=r"expected one of: thickness_um, silicon\.edge"):
             drawn.value(name)
 
 
@@ -141,7 +141,7 @@ def test_design_command_of_a_drawing(run, tmp_path):
     assert status == 0, err
     rows = [line.split()[0] for line in out.splitlines()[4:]]
     assert rows == ["scale", "thickness_um", "n_d", "annealing_K", "annealing_min"]
-    assert "--vary NAME=START:STOP:COUNT of thickness_um, scale, edge_bias_um" in err
+    assert "--vary NAME=START:STOP:COUNT of thickness_um, silicon.edge_bias_um, heater.edge" in err
     status, out, err = run(
         "design", "own.toml", "--no-air", "--vary", "edge_bias_um=-0.05:0.05:2", "--plot", "d.png"
     )

@@ -256,7 +256,7 @@ def described(report: Report, name: str) -> dict[str, Any]:
         sliders["material"].append((key, value, *ends, parameter.unit))
     for key, value in probe.shape.dimensions().items():
         if key not in probe.shape.tied():
-            low, high = (0.8 * value, 1.2 * value) if key != EDGE_BIAS else (-0.2, 0.2)
+            low, high = (0.8 * value, 1.2 * value) if own_name(key) != EDGE_BIAS else (-0.2, 0.2)
             ends = min(low, value), max(high, value)
             sliders["dimensions"].append((key, value, *ends, "µm"))
     circuit = probe.circuit

@@ -5,6 +5,7 @@ No knee is needed: a lever that was measured below it is less certain above, and
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import replace
 
 import numpy as np
@@ -24,8 +25,9 @@ from hotlever.estimate.uncertainty_budget import budget_of_estimate
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import Measurement
-from hotlever.probe import Circuit
+from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import THERMOMETER
+from hotlever.probe.shapes import full_bias_name
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.types import Array, Progress
@@ -96,8 +98,7 @@ def calibrated(
             "no interface is stated, so that the apex has no error of one; interface_K_per_mW in "
             "[contact] would give it one"
         )
-    if not probe.shape.outline_moves:
-        notes.append("the outline is taken to be as drawn: no error of it is in the result")
+    notes += _of_exact_edges(probe, estimate.priors)
     bias = tip.table.bias_V.values
     row = int(np.nanargmax(tip.table.tip_K) if at_V is None else np.searchsorted(bias, at_V))
     at_row = tip.table.isel(bias=slice(row, row + 1))
@@ -149,6 +150,25 @@ def what_spectra_would_do(solution: Solution, table: xr.Dataset) -> list[str]:
         f"from {seen} alone the rise of its hottest tip is known to ± {now:.2g} %; {_SPECTRA} "
         f"Raman spectra of ± {RAMAN_ERROR_K:g} K and {100.0 * THERMOMETER:g} % of the rise would "
         f"make it ± {then:.2g} %"
+    ]
+
+
+def _of_exact_edges(probe: Probe, priors: Container[str]) -> list[str]:
+    """Say which edges of a drawing that matter to the tip are taken to be where they are drawn."""
+    if probe.shape.outline_moves:
+        return []
+    heated = {
+        full_bias_name(layer)
+        for region in probe.layout().regions
+        if region.part != "reader branch"
+        for layer in region.layers
+    }
+    exact = [name for name in probe.shape.dimensions() if name in heated and name not in priors]
+    if not exact:
+        return []
+    return [
+        "edges are taken to be where they are drawn, and no error of them is in the result; a "
+        f"prior of {' and '.join(exact)} says how far off they may be"
     ]
 
 

@@ -355,7 +355,7 @@ def parameter_named(name: str) -> Parameter:
         )
     ending = max((unit for unit in _UNITS if name.endswith(f"_{unit}")), key=len, default="")
     stem = name.removesuffix(f"_{ending}")
-    words = stem.replace("_", " ")
+    words = stem.replace(".", " ").replace("_", " ")
     return Parameter(name, words, _UNITS.get(ending, "1"), 1.0, -math.inf, math.inf, words)
 
 

@@ -27,6 +27,7 @@ from hotlever.probe.parts import (
 from hotlever.probe.priors import priors_of
 from hotlever.probe.shapes import (
     DRAWING,
+    DRAWN,
     PARAMETRIC,
     PARAMETRIC_DRAWING,
     SHAPE_SECTIONS,
@@ -211,7 +212,10 @@ def field_of(probe: ProbeParts, name: str) -> tuple[str, str, type[Record]]:
     InputError
         If it is no key of a probe file; the nearest one is given.
     """
+    name = probe.shape.named(name)
     section, dot, key = name.rpartition(".")
+    if dot and name in probe.shape.dimensions():
+        section = f"layers.{section}"
     named = {material: type(kind) for material, kind in probe.materials.items()}
     wired = {f"circuit.{name}": Contact for name in probe.layout().terminal_names}
     records: dict[str, type[Record]] = {
@@ -220,7 +224,7 @@ def field_of(probe: ProbeParts, name: str) -> tuple[str, str, type[Record]]:
         **PARTS,
         MATERIAL: type(probe.material),
         **wired,
-        **{f"layers.{key}": layer for key, layer in probe.shape.layer_records().items()},
+        **{f"layers.{layer}": record for layer, record in probe.shape.layer_records().items()},
     }
     if dot and section not in records:
         raise unknown_name("section", section, [*SECTIONS, *named, *wired])
@@ -254,6 +258,7 @@ def changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str,
     InputError
         If a name exists in no section, or counts while a drawing is read only.
     """
+    changes = {probe.shape.named(name): value for name, value in changes.items()}
     sections = probe.sections()
     # numbers that formulas name are keys too
     named = {
@@ -271,7 +276,10 @@ def changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str,
         inside, (*above, last) = sections, section.split(".")
         for part in [MATERIALS] if section in probe.materials else above:
             inside = inside.setdefault(part, {})
-        inside.setdefault(last, {})[key] = value
+        if not isinstance(inside.setdefault(last, {}), Mapping):
+            # a layer of which no more was said than where it is drawn
+            inside[last] = {DRAWN: inside[last]}
+        inside[last][key] = value
         if section in probe.materials:
             useless = type(probe.materials[section]).without_use(inside[last])
             for other in {*useless} - {own for _, own in keys.values()}:

@@ -7,7 +7,7 @@ drawing and solving know only this. Lengths are in µm.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
@@ -41,6 +41,10 @@ class Taper:
     axis: Point
     length_um: float
 
+    def shifted(self, outward_um: float) -> Taper:
+        """Return it with both borders so far outside (µm)."""
+        return replace(self, length_um=self.length_um + 2 * outward_um)
+
     def distances(self, points: Array) -> Array:
         """Return how far points (2, n) are from the lines of both borders (µm), shape (2, n)."""
         along = np.tensordot(self.axis, points - np.reshape(self.centre, (2, 1)), axes=1)
@@ -52,14 +56,20 @@ class BorderTaper:
     """How the doping of a low-doped region of any outline is tapered: from its borders.
 
     Each of the `borders` with high-doped silicon is a line through its points; those that touch
-    are one.
+    are one. All may lie some way outside of the lines (µm).
     """
 
     borders: tuple[tuple[Point, ...], ...]
+    outward_um: float = 0.0
+
+    def shifted(self, outward_um: float) -> BorderTaper:
+        """Return it with all borders so far outside (µm)."""
+        return replace(self, outward_um=self.outward_um + outward_um)
 
     def distances(self, points: Array) -> Array:
         """Return how far points (2, n) are from each border (µm), shape (borders, n)."""
-        return np.stack([_distance(points, np.array(border)) for border in self.borders])
+        away = np.stack([_distance(points, np.array(border)) for border in self.borders])
+        return away + self.outward_um
 
 
 @dataclass(frozen=True)

@@ -136,7 +136,10 @@ class MovingMesh:
         """
         from skfem import MeshTri  # see `hotlever.probe.mesh`
 
-        layout = _in_order(self._mesh.layout, probe.layout())
+        try:
+            layout = _in_order(self._mesh.layout, probe.layout())
+        except InputError as error:
+            raise ComputationError(f"no such lever can be drawn: {error}") from None
         if layout is None:
             raise ComputationError(
                 "the mesh cannot follow so large a change of the dimensions: the lever gets other "

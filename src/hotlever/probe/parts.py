@@ -138,7 +138,8 @@ class ProbeParts(Record):
     @property
     def stated_priors(self) -> dict[str, str]:
         """What its file says of its priors, by name."""
-        return {} if self.prior is None else self.prior.model_extra or {}
+        texts = (self.prior and self.prior.model_extra) or {}
+        return {self.shape.named(name): text for name, text in texts.items()}
 
     @property
     def monitors(self) -> dict[str, Monitor]:
@@ -240,21 +241,30 @@ class ProbeParts(Record):
 
     def values(self, names: Sequence[str]) -> Array:
         """Return some of its values by their names in a probe file, shape (len(names),)."""
-        numbers = [getattr(self._owner(name)[1], name.rpartition(".")[2]) for name in names]
+        dimensions = self.shape.dimensions()
+        numbers = [
+            dimensions[name]
+            if name in dimensions
+            else getattr(self._owner(name)[1], name.rpartition(".")[2])
+            for name in names
+        ]
         return np.array(numbers, dtype=float)
 
     def replace(self, values: Mapping[str, float]) -> Self:
         """Return a copy with some values changed, as `with_` does but unchecked and fast."""
         changed = dict[str, tuple[Record, dict[str, float]]]()
+        dimensions = {
+            name: value for name, value in values.items() if name in self.shape.dimensions()
+        }
         for name, value in values.items():
-            section, record = self._owner(name)
+            section, record = self._owner(name) if name not in dimensions else ("", None)
             if record is not None:
                 changed.setdefault(section, (record, {}))[1][name.rpartition(".")[2]] = value
         copies: dict[str, Any] = {
             section: record.model_copy(update=own) for section, (record, own) in changed.items()
         }
         materials = {name: copies.pop(name, kind) for name, kind in self.materials.items()}
-        shape = copies.pop("probe", self.shape)
+        shape = copies.pop("probe", self.shape).with_dimensions(dimensions)
         return self.model_copy(update={**copies, "shape": shape, MATERIALS: materials})
 
     def with_physics(self, effects: Iterable[str], where: str = "physics") -> Self:

@@ -30,6 +30,7 @@ from hotlever.materials.parameters import Parameter, own_name
 from hotlever.probe.chip import on_usual_chip
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.probe_parameters import nuisances, of_materials, parameters_of
+from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.records import StandardError
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 from hotlever.text import with_unit
@@ -323,9 +324,10 @@ def priors_of(
         elif name == ALL_DIMENSIONS:
             spread = share_of(text, here, ("share", "factor"))
             if not probe.shape.outline_moves:
+                shifts = [own for own in probe.shape.dimensions() if own_name(own) == EDGE_BIAS]
                 raise InputError(
-                    f"{here}: the outline of a drawing is taken as exact so far; expected "
-                    "thickness_um alone"
+                    f"{here}: edges of a drawing are off by a length, not by a share; expected "
+                    f"thickness_um = '{text}', and a spread such as '± 0.1' of {', '.join(shifts)}"
                 )
             # those that are named have their own
             unnamed = [dimension for dimension in nuisances(probe) if dimension not in stated]

@@ -10,7 +10,7 @@ import math
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
-from hotlever.materials.parameters import IN_TIME, parameter_named
+from hotlever.materials.parameters import IN_TIME, own_name, parameter_named
 from hotlever.probe.chip import CHIP, usual_chip
 from hotlever.probe.circuit import MOST_OFFSET_V
 from hotlever.probe.parts import ProbeParts
@@ -42,7 +42,7 @@ _USUAL_BIAS = 0.1
 #: Dimensions of a tip that matter to its lever, the last in contact only, and of a shape that do
 #: not matter to the tip.
 OF_THE_TIP = ("height_um", "half_angle_deg", "apex_radius_um")
-_HARMLESS = ("reader_length_um", "reader_centre_um", EDGE_BIAS)
+_HARMLESS = ("reader_length_um", "reader_centre_um")
 
 
 def dimensions_of(probe: ProbeParts) -> list[str]:
@@ -59,7 +59,11 @@ def _of_the_tip(probe: ProbeParts) -> tuple[str, ...]:
 def nuisances(probe: ProbeParts) -> list[str]:
     """Return the dimensions of the drawing that matter to the tip, each by itself."""
     held = (*_HARMLESS, *probe.shape.tied())
-    return [name for name in probe.shape.dimensions() if name not in held]
+    return [
+        name
+        for name in probe.shape.dimensions()
+        if name not in held and own_name(name) != EDGE_BIAS
+    ]
 
 
 def of_materials(
@@ -162,7 +166,7 @@ def parameters_of(
             scale=value,
             lower=least * value,
             upper=most * value,
-            meaning=meaning[name],
+            meaning=meaning.get(name, parameter_named(name).meaning),
             spread=spread,
             value=value,
         )
@@ -170,10 +174,10 @@ def parameters_of(
     matter = nuisances(probe)
     for name in probe.shape.dimensions():
         add(name, _DIMENSIONS if name in matter else None)
-    if EDGE_BIAS in table:
-        table[EDGE_BIAS] = table[EDGE_BIAS]._replace(
-            scale=_USUAL_BIAS, lower=-MOST_EDGE_BIAS, upper=MOST_EDGE_BIAS
-        )
+        if own_name(name) == EDGE_BIAS:
+            table[name] = table[name]._replace(
+                scale=_USUAL_BIAS, lower=-MOST_EDGE_BIAS, upper=MOST_EDGE_BIAS
+            )
     for name in _of_the_tip(probe):
         add(name, _TIP)
     if probe.contact is not None and 0 < probe.contact.interface_K_per_mW < OUT_OF_CONTACT:

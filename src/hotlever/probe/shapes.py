@@ -8,6 +8,7 @@ drawing (`hotlever.probe.drawing.shape`).
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -35,16 +36,20 @@ def thickness(meaning: str = "of the silicon") -> Any:
     return _length(meaning, 0.01, 20)
 
 
-def edge_bias() -> Any:
+def edge_bias(meaning: str = "all etched edges lie so far outside the drawing") -> Any:
     """Return the bounds of how far edges are outside the drawing (µm), and what that is."""
-    meaning = "all etched edges lie so far outside the drawing"
     return Field(default=0.0, ge=-MOST_EDGE_BIAS, le=MOST_EDGE_BIAS, description=meaning)
+
+
+def full_bias_name(layer: str) -> str:
+    """Return how the shift of a layer's edges is called among the dimensions of a drawing."""
+    return f"{layer}.{EDGE_BIAS}"
 
 
 class Shape(Record):
     """What a probe is made to look like (section ``[probe]`` of a probe file); lengths in µm."""
 
-    #: Whether the outline follows dimensions, which can be uncertain or varied.
+    #: Whether all of the outline follows dimensions, each of which may be off by a share.
     outline_moves: ClassVar[bool] = True
     #: Keys of a probe file that count while it is read, and mean nothing to what was read.
     read_with: ClassVar[tuple[str, ...]] = ()
@@ -68,6 +73,14 @@ class Shape(Record):
     @abstractmethod
     def dimensions(self) -> dict[str, float]:
         """Return the dimensions (µm) that are given and can change, by name."""
+
+    def named(self, name: str) -> str:
+        """Return the name of a dimension that a file may name otherwise."""
+        return name
+
+    def with_dimensions(self, values: Mapping[str, float]) -> Self:
+        """Return a copy with some of its dimensions changed, unchecked."""
+        return self.model_copy(update=dict(values))
 
     def notes(self) -> list[str]:
         """Return what a user should hear of it before anything is solved."""
@@ -360,5 +373,7 @@ DRAWING = "drawing"
 #: Made in Python only.
 PARAMETRIC_DRAWING: Literal["parametric-drawing"] = "parametric-drawing"
 SHAPES = (*PARAMETRIC, DRAWING)
+#: Key of a layer's outlines where a section says more of it.
+DRAWN = "drawn"
 #: Sections of a probe file that describe a shape; those of a drawing come first to last.
 SHAPE_SECTIONS = ("probe", "layers", "terminals")

@@ -18,7 +18,7 @@ from hotlever.materials import LOW_DOPED, full_name
 from hotlever.materials.doping import diffusion_length
 from hotlever.materials.parameters import parameter_named
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.shapes import PARAMETRIC_DRAWING
+from hotlever.probe.shapes import EDGE_BIAS, PARAMETRIC_DRAWING
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.steps import each
 from hotlever.types import Array, Progress
@@ -72,22 +72,27 @@ class Design:
         InputError
             If there is none; the text gives the nearest one.
         """
-        numbers = self.numbers
-        if name not in numbers:
+        numbers, own = self.numbers, self.probe.shape.named(name)
+        if own not in numbers:
             raise unknown_name("name", name, numbers)
-        return numbers[name]
+        return numbers[own]
 
     @property
     def numbers(self) -> dict[str, float]:
         """All that can be varied, by name: the numbers of the probe file, and the annealing."""
-        fixed, numbers = (*self.probe.shape.read_with, "tolerance_um"), dict[str, float]()
+        shape = self.probe.shape
+        fixed, numbers = (*shape.read_with, "tolerance_um"), dict(shape.dimensions())
         for section, entries in self.probe.sections().items():
             for key, entry in entries.items():
                 if isinstance(entry, Mapping):
                     # a material's name is enough, a layer or a contact has its section before it
                     start = key if section == "materials" else f"{section}.{key}"
-                    own = {f"{start}.{name}": value for name, value in entry.items()}
-                    numbers |= {name: value for name, value in own.items() if _number(value)}
+                    numbers |= {
+                        f"{start}.{name}": value
+                        for name, value in entry.items()
+                        # edges of a layer are dimensions, with its name alone before them
+                        if _number(value) and (section, name) != ("layers", EDGE_BIAS)
+                    }
                 elif _number(entry) and key not in fixed:
                     numbers[key] = float(entry)
         return numbers | {name: getattr(self, name) for name in ANNEALING if self._is_annealed}

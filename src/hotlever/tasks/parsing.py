@@ -89,6 +89,7 @@ def parse_priors(texts: Sequence[str] | None, probe: Probe) -> dict[str, str] | 
         return {}
     expected = "NAME=VALUE±SPREAD, NAME=VALUE×/FACTOR, usual, or none alone"
     pairs = parse_pairs("--prior", [text for text in texts if text != USUAL], expected)
+    pairs = {probe.shape.named(name): text for name, text in pairs.items()}
     priors_of(pairs, probe, "--prior")
     return pairs
 

@@ -6,24 +6,35 @@ that is cut away from the lever, and the border it leaves is the terminal.
 
 Etching moves all edges of the body's outline by the same length, corners mitred, but those at
 terminals: there a lever is cut off, not etched. Layers keep their borders, and where they reach the
-outline as it is drawn they reach that which is etched.
+outline as it is drawn they reach that which is etched. A border that ends at a corner of the
+outline, or lies near it, moves with it, so that nothing of a lever comes or goes with a small
+shift; what dopant diffuses from stays where it is drawn.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from itertools import pairwise
+from dataclasses import replace
+from itertools import chain, pairwise
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 from shapely import LinearRing, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from hotlever.probe.drawing.layers import DrawnTerminal, terminal_part
-from hotlever.probe.drawing.outlines import STANDS_OUT, DrawingError, Ring, parts_of, polygons
-from hotlever.probe.layout import Layout, Point, Terminal
-from hotlever.types import Array
+from hotlever.probe.drawing.outlines import (
+    NARROWEST,
+    DrawingError,
+    Ring,
+    check_widths,
+    parts_of,
+    polygons,
+)
+from hotlever.probe.layout import Film, Layout, Point, Region, Terminal
+from hotlever.types import Array, Index
 
 #: Share of its length by which an edge may stick out of a terminal that names a line.
 _ENDS = 2.0
@@ -33,14 +44,15 @@ _OFF = 1e-6
 _COVERED = 0.1
 #: Share of what a contact covers that a film below it must take up to be that contact's metal.
 _IS_FILM = 0.9
-_STYLE = {"cap_style": "flat", "join_style": "mitre"}
-#: So many times the bias, sides reach beyond the end of a slanted leg, and what is beyond the end
-#: reaches beyond its corners.
-_BEYOND, _ASIDE = 2.0, 3.0
 #: How far off (µm) a point is still a corner, or on a line.
 _SAME_UM = 1e-6
 #: Cosine of the angle between a border and the outline's normal below which it runs along it.
 _ALONG = 0.3
+#: How far from outline and corners places move partly with them (µm): borders of low-doped silicon,
+#: since its dopant stays, and those of films, which stay themselves.
+_WITH_DOPANT_UM, _WITH_FILMS_UM = 1.0, 0.1
+#: Sine of the angle between a terminal and the edge beside it below which it goes straight on.
+_STRAIGHT_ON = 0.01
 
 
 def terminal_edges(
@@ -227,172 +239,181 @@ def check_apart(terminals: list[Terminal]) -> None:
 # --- etching --------------------------------------------------------------------------------------
 
 
-class Etching:
-    """What etching makes of a drawn outline.
+def etched(
+    body: str, layout: Layout, outline: Polygon, bias_um: float, tolerance_um: float
+) -> Layout:
+    """Return a layout whose edges are outside of where they are drawn, all by the same length.
 
-    Attributes
+    Every corner moves in proportion to the bias, so that the layout keeps its parts and corners.
+
+    Parameters
     ----------
-    drawn, outline : Polygon
-        Before and after.
-    ends : list of Terminal
-        The terminals on the etched outline.
+    body : str
+        The layer of the outline.
+    layout : Layout
+        As it is drawn.
+    outline : Polygon
+        Its own, with corners where it turns.
+    bias_um : float
+    tolerance_um : float
+        An edge so near to that of a terminal is one.
 
     Raises
     ------
     DrawingError
-        If the body falls apart, or a terminal is lost.
+        If parts of the lever would turn over, overlap or be too narrow.
+    """
+    rates = _OutlineRates(body, layout, outline, tolerance_um)
+
+    def moved(ring: Iterable[Point]) -> tuple[Point, ...]:
+        points = np.array(list(ring))
+        return tuple(map(_point, points + bias_um * rates.at(points)))
+
+    regions = tuple(
+        replace(region, outline=moved(region.outline), holes=tuple(map(moved, region.holes)))
+        for region in layout.regions
+    )
+    terminals = tuple(Terminal(end.name, *moved((end.start, end.end))) for end in layout.terminals)
+    _check_etched(f"with {body}.edge_bias_um = {bias_um:g}", body, regions, tolerance_um)
+    return replace(layout, regions=regions, terminals=terminals)
+
+
+def _check_etched(why: str, body: str, regions: Iterable[Region], tolerance_um: float) -> None:
+    """Refuse regions that turn over, overlap or are too narrow."""
+    shapes = [region.polygon for region in regions]
+    turned = [shape for shape in shapes if not (shape.is_valid and shape.exterior.is_ccw)]
+    if turned:
+        what = f"{why} a part of the lever turns over, expected a smaller shift"
+        raise DrawingError(what, body, place=turned[0].centroid)
+    whole = shapely.union_all(shapes)
+    if abs(whole.area - sum(shape.area for shape in shapes)) > _SAME_UM * whole.length:
+        what = f"{why} parts of the lever overlap, expected a smaller shift"
+        raise DrawingError(what, body, place=whole)
+    for shape in shapes:
+        try:
+            check_widths(body, shape, [shape], NARROWEST * tolerance_um)
+        except DrawingError as error:
+            raise DrawingError(f"{why} {error.what}", body, place=error.place) from None
+
+
+class _OutlineRates:
+    """How fast places of a layout move with the bias of the edges of its outline.
+
+    A corner stays on both of its edges, of which one at a terminal rests. Where a border reaches an
+    edge far from its corners it goes straight on.
     """
 
-    def __init__(
-        self, body: str, drawn: Polygon, ends: list[Terminal], bias_um: float, tolerance: float
-    ) -> None:
-        self.drawn, self._bias, self._tolerance = orient(drawn), bias_um, tolerance
-        self._far = abs(bias_um)
-        sides, cuts = self._sides(ends)
-        strip = shapely.union_all([side.buffer(self._far, **_STYLE) for side in sides])
-        if bias_um > 0:
-            etched_area = self.drawn.union(strip).difference(shapely.union_all(cuts))
-        else:
-            etched_area = self.drawn.difference(strip)
-        pieces = parts_of(etched_area.simplify(STANDS_OUT * tolerance))
-        if len(pieces) != 1:
-            what = f"with edge_bias_um = {bias_um:g} {len(pieces)} pieces are left, expected one"
-            raise DrawingError(what, body, place=self.drawn)
-        self.outline: Polygon = pieces[0]
-        self.ends = [etched_end for end in ends for etched_end in self._etched_ends(end)]
-
-    def _sides(self, ends: list[Terminal]) -> tuple[list[BaseGeometry], list[Polygon]]:
-        """Return the lines that are etched, and what lies beyond the leg ends."""
-        sides: list[BaseGeometry] = []
-        cuts = []
-        cut_off = [(end.start, end.end) for end in ends]
-        for ring in (self.drawn.exterior, *self.drawn.interiors):
-            corners = np.array(ring.coords)[:-1]
-            edges = list(zip(corners, np.roll(corners, -1, axis=0), strict=True))
-            held = [
-                any(along((tuple(a), tuple(b)), line, self._tolerance) for line in cut_off)
-                for a, b in edges
-            ]
-            if not any(held):
-                sides.append(LinearRing(corners))
-                continue
-            # begin behind a leg end
-            first = held.index(True) + 1
-            order = [(first + step) % len(edges) for step in range(len(edges))]
-            side: list[Array] = []
-            for number in order:
-                start, end = edges[number]
-                if not held[number]:
-                    side = side or [start]
-                    side.append(end)
-                    continue
-                before, after = edges[number - 1], edges[(number + 1) % len(edges)]
-                turns = _turn(before, edges[number]), _turn(edges[number], after)
-                cuts.append(self._beyond(start, end, turns))
-                if side:
-                    sides.append(self._lengthened(side, edges, number))
-                side = []
-        return sides, cuts
-
-    def _lengthened(
-        self, line: list[Array], edges: list[tuple[Array, Array]], number: int
-    ) -> LineString:
-        """Return a side, beyond the corners of the leg ends unless they turn inwards."""
-        count = len(edges)
-        first = (number - len(line) + 1) % count
-        begin, final = edges[first - 1], edges[number]
-        points = list(line)
-        if _turn(begin, edges[first]) > 0:
-            points.insert(0, line[0] - _BEYOND * self._far * _unit(line[1] - line[0]))
-        if _turn(edges[number - 1], final) > 0:
-            points.append(line[-1] + _BEYOND * self._far * _unit(line[-1] - line[-2]))
-        return LineString(points)
-
-    def _beyond(self, start: Array, end: Array, turns: tuple[float, float]) -> Polygon:
-        """Return what lies beyond a leg end, a bit to its sides unless silicon is there."""
-        direction = _unit(end - start)
-        outward = 2 * _ASIDE * self._far * np.array([direction[1], -direction[0]])
-        aside = [
-            _ASIDE * self._far if turn > 0 else -self._far / max(abs(turn), _SAME_UM)
-            for turn in turns
-        ]
-        corners = [start - aside[0] * direction, end + aside[1] * direction]
-        return Polygon([*corners, corners[1] + outward, corners[0] + outward])
-
-    def _etched_ends(self, end: Terminal) -> list[Terminal]:
-        """Return a terminal on the etched outline: to the corners, if it went to the corners."""
-        start, final = np.array(end.start), np.array(end.end)
-        corners = shapely.get_coordinates(self.drawn)
-        longer = _ASIDE * self._far * _unit(final - start)
-        whole = [np.linalg.norm(corners - at, axis=1).min() < _SAME_UM for at in (start, final)]
-        line = (tuple(start - longer * whole[0]), tuple(final + longer * whole[1]))
-        return [
-            Terminal(end.name, *segment)
-            for edge in outline_edges(self.outline)
-            if along(edge, (end.start, end.end), self._tolerance)
-            and (segment := along(edge, line, self._tolerance))
-        ]
-
-    def layer(self, shape: BaseGeometry) -> BaseGeometry:
-        """Return a layer that reaches the etched outline where it reached the drawn one."""
-        if self._bias <= 0:
-            return shape
-        band = self.outline.difference(self.drawn)
-        reaches = shape.intersection(self.drawn.boundary)
-        borders = shape.boundary.intersection(self.drawn).difference(
-            self.drawn.boundary.buffer(_SAME_UM)
+    def __init__(self, body: str, layout: Layout, outline: Polygon, tolerance_um: float) -> None:
+        rings = [np.array(ring.coords)[:-1] for ring in _rings(outline)]
+        self._starts = np.concatenate(rings)
+        ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+        sides = ends - self._starts
+        self._lengths = np.linalg.norm(sides, axis=1)
+        self._along = sides / self._lengths[:, None]
+        self._outward = np.stack([self._along[:, 1], -self._along[:, 0]], axis=1)
+        held = [(end.start, end.end) for end in layout.terminals]
+        edges = [(_point(a), _point(b)) for a, b in zip(self._starts, ends, strict=True)]
+        self._rates = np.array(
+            [float(not any(along(edge, line, tolerance_um) for line in held)) for edge in edges]
         )
-        added = []
-        for line in _lines(reaches):
-            strip = line.buffer(self._far * (1 + _SAME_UM), **_STYLE)
-            if not line.is_ring:
-                for points in (np.array(line.coords), np.array(line.coords)[::-1]):
-                    strip = self._along_border(strip, points, borders)
-            added += [
-                # without hairs, and a bit into the layer
-                piece.buffer(-2 * _SAME_UM, **_STYLE).buffer(3 * _SAME_UM, **_STYLE)
-                for piece in parts_of(strip.intersection(band))
-                if piece.area > 10 * _SAME_UM * piece.length
-            ]
-        whole = shapely.union_all([shape, *added])
-        return whole.simplify(STANDS_OUT * self._tolerance)
+        numbers = self._numbers(rings)
+        before, self._next = (
+            np.concatenate([np.roll(ring, way) for ring in numbers]) for way in (1, -1)
+        )
+        self._at_starts = np.array(
+            [self._of_corner(body, first, last) for last, first in enumerate(before)]
+        )
+        self._borders = self._directions(layout)
+        films = dict[Point, set[tuple[Film, ...]]]()
+        for region in layout.regions:
+            for corner in chain(*region.rings):
+                films.setdefault(_key(corner), set()).add(region.films)
+        self._of_dopant = {
+            _key(corner)
+            for region in layout.regions
+            if region.taper is not None
+            for corner in chain(*region.rings)
+            if len(films[_key(corner)]) == 1
+        }
 
-    def _along_border(
-        self, strip: BaseGeometry, points: Array, borders: BaseGeometry
-    ) -> BaseGeometry:
-        """Return a strip along the outline whose end goes on where the layer's border does."""
-        at, back = points[0], _unit(points[0] - points[1])
-        near = (line for line in _lines(borders) if line.distance(shapely.Point(at)) < 3 * _SAME_UM)
-        line = next(near, None)
-        if line is None:
-            return strip
-        coordinates = np.array(line.coords)
-        if np.linalg.norm(coordinates[0] - at) < np.linalg.norm(coordinates[-1] - at):
-            coordinates = coordinates[::-1]
-        border = _unit(coordinates[-1] - coordinates[-2])
-        normal = border - (border @ back) * back
-        lean = float(np.linalg.norm(normal))
-        if lean < _ALONG:
-            return strip
-        far = 2 * self._far
-        wedge = Polygon([at, at + far * normal / lean, at + far * border / lean])
-        if wedge.area < _SAME_UM * far:
-            return strip
-        return strip.union(wedge) if border @ back > 0 else strip.difference(wedge)
+    @staticmethod
+    def _numbers(rings: list[Array]) -> list[Index]:
+        """Return the numbers of the edges of each ring."""
+        ends = np.cumsum([len(ring) for ring in rings])
+        return [np.arange(end - len(ring), end) for ring, end in zip(rings, ends, strict=True)]
+
+    def _of_corner(self, body: str, first: int, last: int) -> Array:
+        """Return how the corner between two edges moves."""
+        normals, rates = self._outward[[first, last]], self._rates[[first, last]]
+        if rates[0] == rates[1]:
+            return np.asarray(rates[0] * normals.sum(axis=0) / (1.0 + normals[0] @ normals[1]))
+        if abs(np.linalg.det(normals)) < _STRAIGHT_ON:
+            what = "beside a terminal the edge goes straight on: its edges cannot be shifted"
+            raise DrawingError(what, body, place=self._starts[last])
+        return np.linalg.solve(normals, rates)
+
+    def _nearest(self, points: Array) -> tuple[Index, Array, Array]:
+        """Return the nearest edge of points (n, 2), how far along it and how far away they are."""
+        offset = points[:, None] - self._starts
+        along_edge = np.clip((offset * self._along).sum(axis=2), 0.0, self._lengths)
+        away = np.linalg.norm(offset - along_edge[..., None] * self._along, axis=2)
+        edge, row = away.argmin(axis=1), np.arange(len(points))
+        return edge, along_edge[row, edge], away[row, edge]
+
+    def _directions(self, layout: Layout) -> dict[Point, list[Array]]:
+        """Return the directions of the borders that reach the outline, by where they do."""
+        directions = dict[Point, list[Array]]()
+        for region in layout.regions:
+            edges = region.edges
+            _, _, away = self._nearest(edges.mean(axis=1))
+            for start, end in edges[away > _SAME_UM]:
+                for at in (start, end):
+                    directions.setdefault(_key(at), []).append(_unit(end - start))
+        return directions
+
+    def at(self, points: Array) -> Array:
+        """Return the rates of corners (n, 2) of regions or terminals."""
+        edges, at, away = self._nearest(points)
+        rates = np.zeros_like(points)
+        for row, (edge, point) in enumerate(zip(edges.tolist(), points, strict=True)):
+            with_outline = max(1.0 - away[row] / self._near(point), 0.0)
+            if with_outline:
+                rates[row] = with_outline * self._on_edge(edge, at[row], point)
+        return rates
+
+    def _on_edge(self, edge: int, at: float, point: Array) -> Array:
+        """Return the rate of a place on an edge; near a corner that of it, so as not to pass it."""
+        slide = self._slide(edge, point)
+        slide = self._rates[edge] * self._outward[edge] if slide is None else slide
+        distances = np.array([at, self._lengths[edge] - at])
+        shares = np.maximum(1.0 - distances / min(self._lengths[edge], self._near(point)), 0.0)
+        corners = self._at_starts[[edge, self._next[edge]]]
+        return np.asarray(slide + shares @ (corners - slide))
+
+    def _near(self, point: Array) -> float:
+        """Return how far what moves with it is from a place."""
+        return _WITH_DOPANT_UM if _key(point) in self._of_dopant else _WITH_FILMS_UM
+
+    def _slide(self, edge: int, at: Array) -> Array | None:
+        """Return the rate of a place on an edge at which a border goes straight on, if it can."""
+        normal = self._outward[edge]
+        borders = self._borders.get(_key(at), [])
+        steep = [border / (border @ normal) for border in borders if abs(border @ normal) > _ALONG]
+        if not steep or any(np.abs(steep[0] - other).max() > _SAME_UM for other in steep):
+            return None
+        return np.asarray(self._rates[edge] * steep[0])
+
+
+def _rings(outline: Polygon) -> list[LinearRing]:
+    oriented = orient(outline)
+    return [oriented.exterior, *oriented.interiors]
+
+
+def _key(at: ArrayLike) -> Point:
+    """Return a place as the same for all that have it."""
+    x, y = np.asarray(at, dtype=float).round(6).tolist()
+    return x, y
 
 
 def _unit(vector: Array) -> Array:
     return np.asarray(vector / np.linalg.norm(vector))
-
-
-def _turn(before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
-    """Return the sine of the angle by which an outline turns to the left."""
-    first, second = _unit(before[1] - before[0]), _unit(after[1] - after[0])
-    return float(first[0] * second[1] - first[1] * second[0])
-
-
-def _lines(shape: BaseGeometry) -> Iterable[LineString]:
-    """Return the single lines of what two shapes have in common."""
-    parts = [line for line in shapely.get_parts(shape) if "Line" in line.geom_type]
-    merged = shapely.line_merge(shapely.union_all(parts)) if parts else LineString()
-    return [line for line in shapely.get_parts(merged) if line.length > 0]

@@ -17,14 +17,16 @@ from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.probe.drawing.outlines import Ring
+from hotlever.probe.shapes import DRAWN, EDGE_BIAS, edge_bias
 from hotlever.records import Record
 
 SILICON, BODY, HEATER = "silicon", "body", "heater"
 #: Terminals that a lever must have.
 REQUIRED = ("supply", "ground")
-#: Keys of outlines where a section says what a layer is made of, and where all below a terminal's
-#: outlines is contact.
-DRAWN, AREA = "drawn", "area"
+#: Key of outlines where all below a terminal's is contact.
+AREA = "area"
+#: Keys of a layer of the silicon of ``[material]`` of which more than outlines is said.
+_EDGES = {DRAWN, EDGE_BIAS}
 #: Thickness that a film may have (µm).
 _THINNEST_UM, _THICKEST_UM = 0.001, 20.0
 
@@ -73,6 +75,7 @@ class DrawnLayer(DrawnPart):
         le=_THICKEST_UM,
         description="of a film on the body; left out: a part of the body",
     )
+    edge_bias_um: float = edge_bias("edges of outline or window lie so far outside the drawing")
     #: That of the material; no key of a probe file.
     kind: str
 
@@ -80,6 +83,11 @@ class DrawnLayer(DrawnPart):
     def is_body(self) -> bool:
         """Whether it is the outline of the lever."""
         return self.name in (SILICON, BODY)
+
+    @property
+    def window_bias_um(self) -> float:
+        """How far outside the drawing dopant diffuses from; the outline is no window."""
+        return 0.0 if self.is_body else self.edge_bias_um
 
     @property
     def is_film(self) -> bool:
@@ -108,7 +116,12 @@ class DrawnLayer(DrawnPart):
 
     def section(self) -> Any:
         """Return its value in ``[layers]``."""
-        return self.drawn if self.is_plain else self.model_dump(exclude={"name", "kind"})
+        unsaid = {"name", "kind"} | ({"material", "thickness_um"} if self.is_plain else set())
+        if not self.edge_bias_um:
+            unsaid |= {EDGE_BIAS}
+            if self.is_plain:
+                return self.drawn
+        return self.model_dump(exclude=unsaid)
 
 
 def terminal_part(name: str) -> str:
@@ -133,15 +146,20 @@ def layer_values(
     body = BODY if BODY in section else SILICON
     if body not in section:
         raise _missing(SILICON, section, where)
-    named = {name for name, entry in section.items() if isinstance(entry, Mapping)}
+    named = {
+        name
+        for name, entry in section.items()
+        if isinstance(entry, Mapping) and entry.keys() != _EDGES
+    }
     layers = {}
     for name, entry in section.items():
+        own = dict(entry) if isinstance(entry, Mapping) else {DRAWN: entry}
         if name in named:
             own = _of_material(entry, kinds, f"{where.removesuffix(']')}.{name}]")
         elif name == body:
-            own = {DRAWN: entry, "material": HIGH_DOPED, "kind": "high-doped-silicon"}
+            own |= {"material": HIGH_DOPED, "kind": "high-doped-silicon"}
         else:
-            own = {DRAWN: entry, "material": LOW_DOPED, "kind": "n-silicon"}
+            own |= {"material": LOW_DOPED, "kind": "n-silicon"}
         layers[name] = {"name": name, **own}
     if BODY in section and BODY not in named:
         raise InputError(
@@ -175,7 +193,8 @@ def _of_material(entry: Mapping[str, Any], kinds: Mapping[str, str], where: str)
         raise InputError(f"{where}: {DRAWN} is missing")
     for key in ("name", "kind"):
         if key in entry:
-            raise unknown_name("key", key, (DRAWN, "material", "thickness_um"), where)
+            keys = (DRAWN, "material", "thickness_um", EDGE_BIAS)
+            raise unknown_name("key", key, keys, where)
     if "material" not in entry:
         raise InputError(f"{where}: material is missing")
     material = entry["material"]

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 import shapely
 from pydantic import Field, TypeAdapter, ValidationError
 from shapely import Polygon
@@ -18,12 +19,13 @@ from shapely.geometry.base import BaseGeometry
 from hotlever.errors import InputError, counted, quoted
 from hotlever.files import whole_file
 from hotlever.materials import HIGH_DOPED
-from hotlever.probe.drawing.edges import Etching, check_apart, covered, cut_away, terminal_edges
+from hotlever.probe.drawing.edges import check_apart, covered, cut_away, etched, terminal_edges
 from hotlever.probe.drawing.layers import (
     AREA,
-    DRAWN,
+    BODY,
     HEATER,
     REQUIRED,
+    SILICON,
     DrawnLayer,
     DrawnTerminal,
     Rings,
@@ -59,7 +61,7 @@ from hotlever.probe.drawing.sheet import (
 )
 from hotlever.probe.layout import BorderTaper, Film, Layout, Part, Point, Region, Taper, Terminal
 from hotlever.probe.mesh import MOST_SQUARES
-from hotlever.probe.shapes import Shape, edge_bias, thickness
+from hotlever.probe.shapes import DRAWN, EDGE_BIAS, Shape, full_bias_name, thickness
 from hotlever.records import Record
 
 #: Outlines nearer than so many tolerances to that of the body are the same.
@@ -72,7 +74,6 @@ def build_layout(
     terminals: tuple[DrawnTerminal, ...],
     tip: Point,
     tolerance_um: float,
-    edge_bias_um: float = 0.0,
 ) -> Layout:
     """Return the layout of a drawing, its body 1 µm thick.
 
@@ -85,8 +86,6 @@ def build_layout(
     tip : tuple of float
     tolerance_um : float
         What is nearer is the same.
-    edge_bias_um : float
-        How far outside the drawing the edges of the body are.
 
     Raises
     ------
@@ -113,12 +112,6 @@ def build_layout(
     }
     edges = {end.name: end.drawn for end in terminals if not end.by_area}
     ends = terminal_edges(outline, edges, tolerance_um)
-    if edge_bias_um:
-        etching = Etching(body, outline, ends, edge_bias_um, tolerance_um)
-        for part, shape in shapes.items():
-            shapes[part] = etching.layer(snapped(shape, outline, snap))
-        outline, ends = etching.outline, etching.ends
-        check_widths(body, outline, drawn[body], narrowest)
     contacts = {end.name: snapped(shapes.pop(end.part), outline, snap) for end in by_area}
     near = [outline]
     for name, shape in shapes.items():
@@ -141,16 +134,19 @@ def build_layout(
     for piece in partition.pieces:
         _check_piece(piece, borders, drawn, narrowest)
     regions = _regions(partition, by_name, ends, tolerance_um)
-    for region in regions:
+    layout = Layout(tuple(regions), tuple(ends), tip, 1.0)
+    if bias := by_name[body].edge_bias_um:
+        layout = etched(body, layout, outline, bias, tolerance_um)
+    for region in layout.regions:
         squares = region.area / region.narrow_um**2
         if HEATER in region.layers and squares > MOST_SQUARES:
             what = f"{region.narrow_um:.3g} µm wide and {squares:.0f} times as long, expected at "
             raise DrawingError(
                 f"{what}most {MOST_SQUARES:g}", HEATER, drawn[HEATER], region.polygon
             )
-    if not outline.contains(shapely.Point(tip)):
+    if not layout.contains(np.array([tip])).all():
         raise DrawingError(f"it lies outside the {body}", "tip_um", place=tip)
-    return Layout(tuple(regions), tuple(ends), tip, 1.0)
+    return layout
 
 
 def _healed_on(
@@ -235,7 +231,8 @@ def _taper(
     Raises
     ------
     DrawingError
-        If it should border on high-doped silicon and does not, or borders on two kinds of it.
+        If it should border on high-doped silicon and does not, or borders on two kinds of it, or
+        edges that it borders on are shifted by different lengths.
     """
     piece = partition.pieces[number]
     own = piece.layers[0]
@@ -248,7 +245,17 @@ def _taper(
     if len(materials) > 1:
         what = f"it borders on high-doped silicon of {len(materials)} materials, expected one"
         raise DrawingError(what, own, place=piece.shape)
-    return partition.taper(number, sources, tolerance), next(iter(materials), HIGH_DOPED)
+    taper = partition.taper(number, sources, tolerance)
+    if taper is not None:
+        shifts = {layers[own].window_bias_um - layers[name].window_bias_um for name in sources}
+        if len(shifts) > 1:
+            what = "it borders on layers of different edge_bias_um, expected the same"
+            raise DrawingError(what, own, place=piece.shape)
+        taper = taper.shifted(*shifts)
+        if isinstance(taper, Taper) and taper.length_um <= 0:
+            what = f"with edge_bias_um = {layers[own].window_bias_um:g} nothing of it is left"
+            raise DrawingError(what, own, place=piece.shape)
+    return taper, next(iter(materials), HIGH_DOPED)
 
 
 def _parts(
@@ -383,7 +390,6 @@ class DrawnShape(DrawingFile, Shape):
         le=100,
         description="outlines and the tip's place are so many times what is drawn",
     )
-    edge_bias_um: float = edge_bias()
     tip_um: Point = Field(description="place of the tip, as drawn")
     remarks: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
         default=None, description="what of the file does not count, or not as it is drawn"
@@ -397,8 +403,48 @@ class DrawnShape(DrawingFile, Shape):
         return f"lever of {Path(self.file).name}" if self.file else "drawn lever"
 
     def dimensions(self) -> dict[str, float]:
-        """Return the thickness: the outline is as it is drawn."""
-        return {"thickness_um": self.thickness_um}
+        """Return the thickness, and how far edges of the outline and of windows are shifted."""
+        shifts = {full_bias_name(one.name): one.edge_bias_um for one in self._with_edges}
+        return {"thickness_um": self.thickness_um, **shifts}
+
+    @property
+    def _with_edges(self) -> list[DrawnLayer]:
+        """The outline, and the layers that dopant diffuses into or from."""
+        doped = [one for one in self.layers if one.is_low_doped or one.is_high_doped]
+        tapered = any(one.is_low_doped for one in doped) and any(one.is_high_doped for one in doped)
+        return [
+            one
+            for one in self.layers
+            if one.is_body or (tapered and one in doped and not one.is_film)
+        ]
+
+    def named(self, name: str) -> str:
+        """Return the name of a dimension: of one shift of all edges, that of the outline."""
+        body = next(layer.name for layer in self.layers if layer.is_body)
+        return full_bias_name(body) if name == EDGE_BIAS else name
+
+    def with_dimensions(self, values: Mapping[str, float]) -> Self:
+        """Return a copy with some of its dimensions changed, unchecked."""
+        layers = tuple(
+            layer.model_copy(update={EDGE_BIAS: values[full_bias_name(layer.name)]})
+            if full_bias_name(layer.name) in values
+            else layer
+            for layer in self.layers
+        )
+        own = {name: value for name, value in values.items() if name in type(self).model_fields}
+        return self.model_copy(update={"layers": layers, **own})
+
+    def check(self) -> None:
+        """Raise a ValueError if it cannot be drawn and meshed."""
+        movable = self._with_edges
+        for layer in self.layers:
+            if layer.edge_bias_um and layer not in movable:
+                names = ", ".join(one.name for one in movable)
+                raise InputError(
+                    f"[layers.{layer.name}]: edge_bias_um: no dopant diffuses from its edges, "
+                    f"expected it of {names}"
+                )
+        super().check()
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """Return the sections of a probe file that describe it."""
@@ -410,7 +456,7 @@ class DrawnShape(DrawingFile, Shape):
 
     def layer_records(self) -> dict[str, type[Record]]:
         """Return what the sections ``[layers.NAME]`` hold, by the names of the layers."""
-        return {layer.name: DrawnLayer for layer in self.layers if not layer.is_plain}
+        return {layer.name: DrawnLayer for layer in self.layers}
 
     @property
     def materials(self) -> tuple[str, ...]:
@@ -427,7 +473,7 @@ class DrawnShape(DrawingFile, Shape):
         x, y = self.tip_um
         tip = (self.scale * x, self.scale * y)
         try:
-            layout = build_layout(layers, terminals, tip, self.tolerance_um, self.edge_bias_um)
+            layout = build_layout(layers, terminals, tip, self.tolerance_um)
         except DrawingError as error:
             place = error.place and (error.place[0] / self.scale, error.place[1] / self.scale)
             raise error.again(place=place) from None
@@ -482,6 +528,9 @@ class DrawnShape(DrawingFile, Shape):
         layers = layer_values(
             _section(sections, "layers", where), kinds or {}, f"{where}: [layers]"
         )
+        if (bias := values.pop(EDGE_BIAS, None)) is not None:
+            # where files say it of all shapes
+            _add_bias(layers, bias, here)
         terminals = terminal_values(_section(sections, "terminals", where), f"{where}: [terminals]")
         parts = layers | {terminal_part(name): end for name, end in terminals.items()}
         named = {part: own[DRAWN] for part, own in parts.items() if isinstance(own[DRAWN], str)}
@@ -508,6 +557,20 @@ class DrawnShape(DrawingFile, Shape):
                 drawn=named.get(error.part),
                 outlines={part.part: part.drawn for part in (*drawn_layers, *ends)},
             ) from None
+
+
+def _add_bias(layers: Mapping[str, dict[str, Any]], bias: Any, where: str) -> None:
+    """Take what ``[probe]`` says of all edges as what is said of the layer of the outline.
+
+    Raises
+    ------
+    InputError
+        If that says it too.
+    """
+    (body,) = (name for name in layers if name in (SILICON, BODY))
+    if EDGE_BIAS in layers[body]:
+        raise InputError(f"{where}: {EDGE_BIAS}: expected it in [layers.{body}] only")
+    layers[body][EDGE_BIAS] = bias
 
 
 def _cut_by(numbers: list[int]) -> str:
@@ -623,7 +686,8 @@ def save_drawing(drawn: DrawnShape, path: str | os.PathLike[str], folder: Path) 
     for number, layer in enumerate(drawn.layers, start=1):
         drawn_as = added(layer.name, layer.drawn, number)
         whole = sections["layers"][layer.name]
-        sections["layers"][layer.name] = drawn_as if layer.is_plain else whole | {DRAWN: drawn_as}
+        of_more = isinstance(whole, Mapping)
+        sections["layers"][layer.name] = whole | {DRAWN: drawn_as} if of_more else drawn_as
     first = max(_TERMINALS, len(drawn.layers) + 1)
     for number, end in enumerate(drawn.terminals, start=first):
         if all(len(ring) > 2 for ring in end.drawn):
