@@ -259,7 +259,9 @@ class PanelledAir:
         # What tells faces apart acts on the rows alone, those of the moments are the same for both
         # faces: so the derivative of the layer itself stands between two solutions of one kind.
         change = self._layer_by_gap()
-        more = -self._halves * (flux.T @ (change @ flux))
+        # the largest product of matrices here, of which no more than six digits are asked
+        single = flux.astype(np.float32)
+        more = -self._halves * (single.T @ (change.astype(np.float32) @ single)).astype(float)
         by_face = np.zeros(len(self.panels))
         by_face[:own] = shares
         jumped_more = -self._solve(by_face) @ (change @ whole)

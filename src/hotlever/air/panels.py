@@ -82,8 +82,8 @@ class Panels:
     def __len__(self) -> int:
         return len(self.corners)
 
-    def chosen(self, index: NDArray[Any]) -> Panels:
-        """Return some of the panels, by number or by mask; what is known of them stays known."""
+    def chosen(self, index: NDArray[Any] | slice) -> Panels:
+        """Return some of the panels, by number, mask or range; what is known of them stays."""
         some = Panels(self.corners[index])
         for name in vars(self).keys() & {"areas", "centres", "radii", "moments"}:
             vars(some)[name] = vars(self)[name][index]

@@ -97,17 +97,23 @@ def single_layer_matrix(
     matrix = np.zeros((*kernel.shape, count, count), dtype=kernel.dtype)
     for done, mirror in enumerate(mirrors):
         images = panels.reflected(mirror)
+        for body in (panels, images):
+            # what is known of all is known of a part
+            _ = body.radii, body.moments
         image = np.empty_like(matrix)
         near = []
         for start in range(0, count, _ROWS):
-            rows = np.arange(start, min(start + _ROWS, count))
-            some = panels.chosen(rows)
-            square = square_distances(some, images)
-            image[..., rows, :] = kernel.far_pairs(some, images, square)
-            reach = kernel.far * np.add.outer(some.radii, images.radii)
+            # each pair once: the matrix is symmetric
+            rows, others = slice(start, start + _ROWS), slice(start, count)
+            some, rest = panels.chosen(rows), images.chosen(others)
+            square = square_distances(some, rest)
+            values = kernel.far_pairs(some, rest, square)
+            image[..., rows, others] = values
+            image[..., others, rows] = np.swapaxes(values, -1, -2)
+            reach = kernel.far * np.add.outer(some.radii, rest.radii)
             i, j = np.nonzero(square < reach**2)
-            half = rows[i] <= j
-            near.append(np.stack([rows[i][half], j[half]]))
+            half = i <= j
+            near.append(start + np.stack([i[half], j[half]]))
         pairs = np.concatenate(near, axis=1)
         for start in range(0, pairs.shape[1], _PAIRS):
             i, j = pairs[:, start : start + _PAIRS]

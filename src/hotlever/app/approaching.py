@@ -29,7 +29,7 @@ from hotlever.steps import each
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.common_steps import make_lever, notes_of
 from hotlever.tasks.parsing import parse_bias, parse_distances
-from hotlever.tasks.surfaces import jumping_at_tip, needs_jump, over_a_surface, reader_noise
+from hotlever.tasks.surfaces import jumping_at_tip, over_a_surface, reader_noise
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
@@ -62,9 +62,7 @@ def described(report: Report, name: str, tilt_deg: float | None) -> dict[str, An
 
 
 @one_blas_thread
-def answer(
-    report: Report, task: Task, distance: float, quick: bool, jump_K: float | None
-) -> dict[str, Any]:
+def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str, Any]:
     """Return what a reader shows at a distance (µm), and if `quick` by the distance too.
 
     Parameters
@@ -75,9 +73,6 @@ def answer(
     distance : float
     quick : bool
         Whether the coarse lever is to answer.
-    jump_K : float or None
-        The temperature as at which the air jumps for it, where the probe leaves that open; that of
-        its own tip if None. The full lever takes that of its own, as the command does.
 
     Raises
     ------
@@ -92,26 +87,17 @@ def answer(
     probe = surrounded_probe(report, told, finds_air=True)
     probe = over_a_surface(report, probe, medium, distances)
     bias = float(parse_bias(told["bias"], probe.lowest_bias_V).item())
+    probe = jumping_at_tip(report, _coarse(probe), bias)
     if quick:
-        if needs_jump(probe) and jump_K is None:
-            probe = jumping_at_tip(report, _nearest(report, probe, True), bias).probe
-        elif needs_jump(probe):
-            probe = probe.with_(jump_temperature_K=jump_K)
         return _moving(report, Reader(probe, noise), distances, distance, bias)
-    with report.progress("full lever") as update:
-        update(0, 2)
-        lever = _nearest(report, probe, False)
-        if needs_jump(probe):
-            lever = jumping_at_tip(report, lever, bias)
-        update(1, 2)
-        data = over_surface(lever, [distance], [bias], noise)
+    lever = make_lever(report, probe.with_(surface_gap_um=distance))
+    data = over_surface(lever, [distance], [bias], noise)
     if not data.tip_K.notnull().any():
         raise ComputationError(notes_of(data)[0])
     report.note(*notes_of(data))
     values = {name: float(data[name].item()) for name in _READ}
     return {
         "now": {"bias_V": bias, "surface_gap_um": distance, **values},
-        "jump_K": lever.probe.surroundings.jump_temperature_K if needs_jump(probe) else None,
         "read_at": data.attrs["read_at"],
     }
 
@@ -154,9 +140,8 @@ def _moving(
 
 
 @lru_cache(maxsize=_CACHE_SIZE)
-def _nearest(report: Report, probe: Probe, coarse: bool) -> Lever:
-    """Return a lever at the nearest distance."""
-    return Lever(probe, COARSE) if coarse else make_lever(report, probe)
+def _coarse(probe: Probe) -> Lever:
+    return Lever(probe, COARSE)
 
 
 @lru_cache(maxsize=_CACHE_SIZE)

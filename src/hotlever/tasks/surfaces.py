@@ -259,6 +259,7 @@ def approach(
     """Read the distance to a surface: signal, noise, resolution."""
     import numpy as np
 
+    from hotlever.lever.lever import COARSE, Lever
     from hotlever.lever.reader import Reader, best_bias, over_surface, rows_of
 
     distances = parse_distances(distance)
@@ -268,17 +269,18 @@ def approach(
     above = over_a_surface(reporter, read, medium, distances)
     biases = None if bias is None else parse_bias(bias, above.lowest_bias_V)
     reader = Reader(above, noise)
+    coarse = Lever(above, COARSE)
+    if biases is None:
+        with reporter.progress("best bias") as update:
+            best_V = best_bias(coarse, distances[[0, -1]], _HIGHEST_V, noise, update)
+        biases = np.array([best_V])
+        reporter.note(
+            f"of all biases up to {_HIGHEST_V:g} V {biases.item():.4g} V resolves these "
+            "distances best (--bias chooses others)"
+        )
+    above = jumping_at_tip(reporter, coarse, float(biases[biases.size // 2]))
     lever = make_lever(reporter, above)
-    with reporter.progress_bars("best bias", "distances") as (trying, update):
-        if biases is None:
-            best_V = best_bias(lever, distances[[0, -1]], _HIGHEST_V, noise, trying)
-            biases = np.array([best_V])
-            reporter.note(
-                f"of all biases up to {_HIGHEST_V:g} V {biases.item():.4g} V resolves these "
-                "distances best (--bias chooses others)"
-            )
-        if needs_jump(above):
-            lever = jumping_at_tip(reporter, lever, float(biases[biases.size // 2]))
+    with reporter.progress("distances") as update:
         data = over_surface(lever, distances, biases, noise, pressures, progress=update)
     if not data.tip_K.notnull().any():
         raise ComputationError(notes_of(data)[0])
@@ -316,33 +318,28 @@ def over_a_surface(reporter: Reporter, probe: Probe, medium: str | None, distanc
     return probe.with_(**changes)
 
 
-def needs_jump(probe: Probe) -> bool:
-    """Return whether a probe leaves it open of which temperature the air is that jumps."""
-    return probe.surroundings.jump_temperature_K == _usual_jump_K()
+def jumping_at_tip(reporter: Reporter, coarse: Lever, bias_V: float) -> Probe:
+    """Return the probe of a coarse lever, with the jump of the air as at its tip at a bias.
 
-
-def _usual_jump_K() -> float:
-    """Return what probe files have where they do not state of what temperature the air is (K)."""
+    A coarse lever's tip does: the jump length of air some kelvin colder or hotter is the same
+    within one per cent. The probe stays as it is if it states a temperature for the jump, or if
+    there is no state at this bias.
+    """
     from hotlever.probe.surroundings import Surroundings
 
-    return float(Surroundings.model_fields["jump_temperature_K"].default)
-
-
-def jumping_at_tip(reporter: Reporter, lever: Lever, bias_V: float) -> Lever:
-    """Return a lever with the jump of the air as at the temperature of its tip at a bias.
-
-    The same lever where there is no state at this bias.
-    """
+    probe, usual_K = coarse.probe, Surroundings.model_fields["jump_temperature_K"].default
+    if probe.surroundings.jump_temperature_K != usual_K:
+        return probe
     try:
-        (state,) = lever.solve([bias_V])
+        (state,) = coarse.solve([bias_V])
     except ComputationError:
-        return lever
+        return probe
     T = round(state.tip_K)
     reporter.note(
         f"the air's temperature jumps as at {T} K, the tip's at {bias_V:.4g} V "
-        f"(--set jump_temperature_K=... states another one than {_usual_jump_K():g})"
+        f"(--set jump_temperature_K=... states another one than {usual_K:g})"
     )
-    return lever.with_probe(lever.probe.with_(jump_temperature_K=T))
+    return probe.with_(jump_temperature_K=T)
 
 
 def reader_noise(
