@@ -165,8 +165,8 @@ def measure(
 ) -> tuple[Measurement, Array, Lever]:
     """Measure a lever up to a bias (V), or as far as it goes; return its true temperatures (K) too.
 
-    Of ``KINDS``, the current is measured alone, with the reader, or with five Raman temperatures;
-    meters have a noise that is a share of what they show.
+    Of ``KINDS``, the current is measured alone, with the reader, or with five Raman temperatures,
+    with their errors stated; meters have a noise that is a share of what they show.
 
     Raises
     ------
@@ -205,7 +205,9 @@ def measure(
         sizes = rng.uniform(*laboratory.outlier, outliers.size)
         off = rng.choice((-1.0, 1.0), outliers.size) * sizes
         current[outliers] *= 1.0 + noise * off
-    return Measurement(sweep.bias.values, current, reader, tips, errors), tip, lever
+    stated = RAMAN[1] if what == "raman" else None
+    data = Measurement(sweep.bias.values, current, reader, tips, errors, raman_scale=stated)
+    return data, tip, lever
 
 
 def paper_ways(data: Measurement, nominal: Probe) -> list[Callable[[Array], Array]]:
