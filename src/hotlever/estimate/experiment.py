@@ -325,7 +325,7 @@ class ExperimentAtRest:
             return self
         fast, probe = at.linearised.branch, at.probe
         equations = self.full.equations(probe, self.names)
-        u, x = self.fast.full_states(fast, equations, self.reach(probe))
+        u, x = self.fast.full_states(fast, equations)
         by_fast, parametrisation = at.linearised.output_slopes_at(u), fast.parametrisation
         values = np.zeros(by_fast.shape[:2])
         values[:, :TIP_RISE] = equations.observed(x).T - fast.curve(u)[:, :TIP_RISE]

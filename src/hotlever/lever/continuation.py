@@ -61,8 +61,6 @@ class ContinuationOptions:
         By arc length: the first step and the largest.
     smallest_share : float
         Smallest share of what is held by which it may rise, from nothing to its values.
-    looked_at : int
-        Points for each state at which the nearest place on another branch is looked for.
     """
 
     newton: NewtonOptions = field(default_factory=lambda: NewtonOptions(tolerance=1e-5))
@@ -76,7 +74,6 @@ class ContinuationOptions:
     first: float = 0.1
     largest: float = 0.5
     smallest_share: float = 1.0 / 64.0
-    looked_at: int = 20
 
 
 def continued(
@@ -357,24 +354,3 @@ def without_bias(equations: LeverEquations, options: ContinuationOptions | None 
             continue
         share += step
     return x
-
-
-def at_points_of(similar: Branch, branch: Branch) -> Branch:
-    """Return a branch with its states at the points of a similar one, and their u.
-
-    Of a lever that starts cold it is returned as it is: its own points are as good.
-
-    Raises
-    ------
-    NewtonError
-        If a state was not found.
-    """
-    equations, parametrisation = branch.equations, similar.parametrisation
-    options = ContinuationOptions()
-    if branch.starts_cold:
-        return branch
-    u = np.linspace(branch.u[0], branch.u[-1], options.looked_at * branch.u.size)
-    away = branch.path(u) - similar.path(similar.u)[:, None]
-    nearest = branch.states(u[np.argmin((away**2).sum(axis=-1), axis=1)])
-    roots = solve_at(equations, similar.u, nearest, options.newton, parametrisation=parametrisation)
-    return Branch.whole(equations, similar.u, roots, parametrisation)

@@ -30,6 +30,8 @@ _BY_ROUNDING = 1e-3
 #: many as a cubic element has. And how far above its nodes an element may reach, as a share of the
 #: difference between its nodes.
 _STEPS, _ABOVE_NODES = 12, 0.25
+#: Points that are looked for in all elements together.
+_POINTS_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
@@ -187,10 +189,10 @@ class FiniteElements:
         np.maximum.at(highest, field, (each[element, :, field] @ self._lattice).max(axis=1))
         return np.asarray(highest)
 
-    def on_reference(self, point: Array, element: Any = slice(None)) -> Array:
-        """Return where a point lies on the reference element, seen from each or one element."""
+    def on_reference(self, point: Array, element: int) -> Array:
+        """Return where a point lies on the reference element, seen from an element."""
         corner = self.basis.mesh.p[:, self.basis.mesh.t[0, element]]
-        return np.einsum("...ra,a...->r...", self.inverse[element], (point - corner.T).T)
+        return np.asarray(self.inverse[element] @ (point - corner))
 
     def on_facets(self, facets: Index) -> FacetPoints:
         """Return quadrature points on some facets of the mesh, facet by facet."""
@@ -241,14 +243,20 @@ class FiniteElements:
         points = np.pad(points, ((0, 0), (0, len(self.positions) - points.shape[1])))
         elements = np.empty(len(points), dtype=np.intp)
         local = np.empty(points.T.shape)
-        for number, point in enumerate(points):
-            here = self.on_reference(point)
-            depth = np.minimum(here.min(axis=0), 1.0 - here.sum(axis=0))
-            elements[number] = nearest = depth.argmax()
-            if depth[nearest] < -_BY_ROUNDING:
-                where = ", ".join(f"{value:g}" for value in point)
+        corners = self.basis.mesh.p[:, self.basis.mesh.t[0]]
+        for first in range(0, len(points), _POINTS_AT_ONCE):
+            some = slice(first, first + _POINTS_AT_ONCE)
+            # where the points lie on the reference element, seen from each element
+            away = points[some].T[:, None] - corners[:, :, None]
+            here = np.einsum("era,aen->ern", self.inverse, away)
+            depth = np.minimum(here.min(axis=1), 1.0 - here.sum(axis=1))
+            nearest = depth.argmax(axis=0)
+            number = np.arange(nearest.size)
+            outside = np.flatnonzero(depth[nearest, number] < -_BY_ROUNDING)
+            if outside.size:
+                where = ", ".join(f"{value:g}" for value in points[some][outside[0]])
                 raise InputError(f"the point ({where}) µm lies outside the lever")
-            local[:, number] = here[:, nearest]
+            elements[some], local[:, some] = nearest, here[nearest, :, number].T
         shape = [self.basis.elem.lbasis(local, node) for node in range(self.dofs.shape[1])]
         values = np.stack([value for value, _ in shape], axis=1)
         slopes = np.stack([slope for _, slope in shape], axis=-1)

@@ -142,14 +142,21 @@ class FullSpace(Space):
             rises[self.end_nodes[name]] += rise
         return rises
 
-    def from_nodal(self, rise: Array, potential: Array, lever_V: float) -> Array:
-        """Return the state with these nodal rises (K) and potentials (V)."""
-        x = np.zeros(self.size + 1)
+    def from_nodal(self, rise: Array, potential: Array, lever_V: float | Array) -> Array:
+        """Return the state with these nodal rises (K) and potentials (V), or several of them."""
+        x = np.zeros((self.size + 1, *rise.shape[1:]))
         for unknowns, values in ((self._T, rise), (self._V, potential)):
             free = (unknowns >= 0) & (unknowns < self.size)
             x[unknowns[free]] = values[free]
         x[-1] = lever_V
         return x
+
+    def prolonged(self, coarse: FullSpace, x: Array) -> Array:
+        """Return states (size + 1, n) of another mesh of the same lever, interpolated on this."""
+        at_nodes, _ = coarse.elements.interpolation(self.elements.nodes.T)
+        nothing = csr_matrix(at_nodes.shape)
+        rise = coarse.combined(at_nodes, nothing) @ x
+        return self.from_nodal(rise, coarse.combined(nothing, at_nodes) @ x, x[-1])
 
     def rises(self, x: Array) -> Array:
         """Return the free rises of the temperature (K), (nodes, n), of states."""

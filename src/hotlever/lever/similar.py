@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from hotlever.air.coupling import AirLoss
 from hotlever.lever.branch import Branch, Reach
-from hotlever.lever.continuation import at_points_of, continued
+from hotlever.lever.continuation import ContinuationOptions, continued
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.films import PlacedFilm, thickness_at
 from hotlever.lever.full_space import FullSpace
@@ -68,15 +68,31 @@ class SimilarLevers:
         """Return what solves levers far away too, for which this may not be made."""
         return self
 
-    def full_states(
-        self, branch: Branch, equations: LeverEquations, reach: Reach
-    ) -> tuple[Array, Array]:
-        """Return u of states of a branch of this lever, (k,), and those of another's equations.
+    def full_states(self, branch: Branch, equations: LeverEquations) -> tuple[Array, Array]:
+        """Return u of states of a branch of this lever, (k,), and those of a finer mesh there.
 
         These, (size + 1, k), are as many as it takes to see by how much the branches differ.
+
+        Raises
+        ------
+        NewtonError
+            If a state was not found.
         """
-        other = at_points_of(branch, continued(equations, reach))
-        return other.u[other.solved], other.x[:, other.solved]
+        options, u = ContinuationOptions(), branch.u[branch.solved]
+        coarse = equations.space.full.prolonged(branch.equations.space, branch.x[:, branch.solved])
+        # what a coarse mesh lacks changes smoothly along the branch
+        x, lacking = np.empty_like(coarse), np.zeros_like(coarse)
+        for k in range(u.size):
+            one = slice(k, k + 1)
+            guess = coarse[:, one] + lacking[:, max(k - 1, 0), None]
+            if k > 1:
+                share = (u[k] - u[k - 1]) / (u[k - 1] - u[k - 2])
+                guess += share * (lacking[:, k - 1, None] - lacking[:, k - 2, None])
+            lines = branch.parametrisation
+            roots = solve_at(equations, u[one], guess, options.newton, parametrisation=lines)
+            x[:, one] = roots.x
+            lacking[:, one] = roots.x - coarse[:, one]
+        return u, x
 
     def tip_error_K(self, probe: Probe, branch: Branch) -> float:
         """Return by how much tips on a branch of it may be off its equations' at a fixed bias.

@@ -143,9 +143,7 @@ class ReducedLever:
         """Return what solves levers far away too, for which this may not be made."""
         return SimilarLevers(Lever(self.drawn, COARSE))
 
-    def full_states(
-        self, branch: Branch, equations: LeverEquations, reach: Reach
-    ) -> tuple[Array, Array]:
+    def full_states(self, branch: Branch, equations: LeverEquations) -> tuple[Array, Array]:
         """See `SimilarLevers.full_states`: few, since the errors are small and smooth."""
         some = np.unique(np.linspace(1, branch.u.size - 1, _COMPARED_AT).astype(int))
         u, guess = branch.u[some], self.space.expanded(branch.x[:, some])
