@@ -114,7 +114,7 @@ def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Vari
     attributes = stated[0] if stated else usual
     if array.ndim == 0:
         own = ()
-    elif own == name and array.dtype.kind in "if":
+    elif own == name and array.dtype.kind in "ifU":
         return xr.Variable(own, pd.Index(array), attributes)
     try:
         return xr.Variable(own, array, attributes, fastpath=True)

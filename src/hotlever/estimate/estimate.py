@@ -471,7 +471,9 @@ class Estimate:
                 f"{self.measurement.path or 'an estimate'}: is a fit, expected a calibration, "
                 "which has a table of the tip temperature"
             )
-        rows = self.table.isel(bias=np.isfinite(self.table.tip_K.values))
+        rows, known = self.table, np.isfinite(self.table.tip_K.values)
+        if not known.all():  # of rows by an array xarray asks whether it is Dask's, as of a number
+            rows = rows.isel(bias=known)
         return rows.isel(bias=slice(int(np.argmin(rows.tip_K.values)), None))
 
     @property

@@ -273,8 +273,9 @@ def numbered(
 ) -> tuple[Index, Index, int]:
     """Give every nodal value its unknown, in an order with little fill.
 
-    Values that are held get -1, the potential of the swept supply the number after all others; a
-    held terminal, and the leg ends on the chip, have that of their first node.
+    Values that are held get -1, the potential of the swept supply the number after all others. A
+    held terminal has one number, and so have leg ends on the chip. These come last but for it,
+    since they meet so many others that the matrix would fill up behind them.
 
     Parameters
     ----------
@@ -302,10 +303,16 @@ def numbered(
         free[1, contact_nodes[name]] = False
     for name in wiring.held:
         free[1, contact_nodes[name][1:]] = False
+    shared = np.zeros_like(free)
+    shared[0, on_chip[:1]] = True
+    for name in wiring.held:
+        shared[1, contact_nodes[name][0]] = True
     flat = free[:, order].T
     size = int(flat.sum())
     ordered = np.full(flat.shape, -1, dtype=np.intp)
-    ordered[flat] = np.arange(size)
+    alone, together = flat & ~shared[:, order].T, flat & shared[:, order].T
+    ordered[alone] = np.arange(alone.sum())
+    ordered[together] = np.arange(alone.sum(), size)
     number = np.full((elements.size, 2), -1, dtype=np.intp)
     number[order] = ordered
     T, V = number.T.copy()
