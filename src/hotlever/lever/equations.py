@@ -41,6 +41,7 @@ from hotlever.lever.transport import (
     Tangent,
     fluxes_of,
     tangent_of,
+    weights_of_properties,
 )
 from hotlever.materials import Kind
 from hotlever.materials.air import kirchhoff_variable
@@ -67,6 +68,8 @@ BALANCES = (
     "into_tip_mW",
 )
 
+#: Parameters by which heat leaves the surface or the leg ends, whatever radiates or touches.
+_OF_SURFACE = {GAS, GAP, BASE, CHIP}
 #: Error (relative) to which derivatives are solved.
 _EXACT = 1e-6
 #: A lever voltage (V) at which a lever is nearly cold.
@@ -334,18 +337,60 @@ class LeverEquations:
     def by_parameter(self, x: Array, names: Sequence[str]) -> Array:
         """Return how `balance` changes with parameters or dimensions, (size + 1, n, k)."""
         fields, _, _ = self.at(x)
-        by = self.properties(fields.T, names)[1]
+        by, moved = self.properties(fields.T, names)[1], self._fluxes_moved_by(x, names)
         columns = []
         for name in names:
             change = fluxes_of(fields, by[name])
-            if name == BASE:
-                change += self.tangent(x).fluxes(self.terminals.warmed_by_base(fields))
-            elif name in self.motions:
-                motion = self.motions[name]
-                change += motion.of_fluxes(fields, self.fluxes(x), self.tangent(x))
-            columns.append(change)
+            columns.append(change + moved[name] if name in moved else change)
         changes = Fluxes(*(np.stack(column, axis=-1) for column in zip(*columns, strict=True)))
-        weak = self.space.weak_form(changes)
+        return self.space.weak_form(changes) + self._on_surface(x, names)
+
+    def tested_by_parameter(self, x: Array, names: Sequence[str], tests: Array) -> Array:
+        """Return what `by_parameter` does times tests (size + 1, n, m), summed up, (n, m, k).
+
+        Fluxes are linear in the properties, so that the tests give these a weight at each point,
+        and a parameter costs no more than a sum over the points.
+        """
+        fields, _, _ = self.at(x)
+        by, moved = self.properties(fields.T, names)[1], self._fluxes_moved_by(x, names)
+        at_points, weights = self.space.fields(tests), self.space.weights
+        weighted = weights_of_properties(fields, at_points, self.laws.physics, weights)
+        tested = np.zeros((*tests.shape[1:], len(names)))
+        for column, name in enumerate(names):
+            for law, weight in weighted.named.items():
+                tested[..., column] += np.einsum("pn,pnm->nm", getattr(by[name], law), weight)
+            if name in moved:
+                tested[..., column] += moved[name].tested(at_points, weights)
+        surface = [name for name in names if name in _OF_SURFACE or self._has_losses]
+        if surface:
+            columns = [names.index(name) for name in surface]
+            on_surface = self._on_surface(x, surface)
+            tested[..., columns] += np.einsum("snm,snk->nmk", tests, on_surface)
+        return tested
+
+    def _fluxes_moved_by(self, x: Array, names: Sequence[str]) -> dict[str, Fluxes]:
+        """Return how fluxes change with the temperature of the base and dimensions among names.
+
+        Properties being the same.
+        """
+        moving = [name for name in names if name == BASE or name in self.motions]
+        if not moving:
+            return {}
+        fields, fluxes, tangent = self.at(x)[0], self.fluxes(x), self.tangent(x)
+        return {
+            name: tangent.fluxes(self.terminals.warmed_by_base(fields))
+            if name == BASE
+            else self.motions[name].of_fluxes(fields, fluxes, tangent)
+            for name in moving
+        }
+
+    @property
+    def _has_losses(self) -> bool:
+        return len(self.rim.weights) > 0 or self.contact is not None
+
+    def _on_surface(self, x: Array, names: Sequence[str]) -> Array:
+        """Return how what leaves at the surface, and into the chip, changes with parameters."""
+        weak = np.zeros((*x.shape, len(names)))
         for points, (_, by_loss) in self.losses(x, names).items():
             stacked = np.stack([by_loss[name] for name in names], axis=-1)
             getattr(self, points).add_heat(weak, stacked)

@@ -131,9 +131,7 @@ def by_parameter(
     before the next, whose pivots it has then, and memory. Adjoint: one solve for each quantity that
     changes and each state, however many parameters there are.
     """
-    direct, of_tip = equations.by_parameter(x, names), equations.tip_by_parameter(x, names)
-    missing = -direct
-    missing[-1] = -np.reshape(constraint.tip, (-1, 1)) * of_tip
+    of_tip = equations.tip_by_parameter(x, names)
     gradient, moves = equations.observed_gradient(x), constraint is not TIP
     if moves:
         unknowns, weights = equations.space.tip
@@ -144,9 +142,13 @@ def by_parameter(
     for some in every[:, None] if factors is None else [every]:
         own = factors or equations.factorised(x[:, some], constraint.among(some))
         adjoint[:, some] = own.solve(gradient[:, some], some - some[0], transposed=True)
+    # the constraint is the last of the equations; the current itself depends on parameters too
+    of_constraint, adjoint[-1] = adjoint[-1].copy(), 0.0
+    adjoint[-1, :, 1] = -1.0
     output_slopes = np.zeros((x.shape[1], TIP_RISE + 1, len(names)))
-    output_slopes[:, : gradient.shape[-1]] = np.einsum("sno,snk->nok", adjoint, missing)
-    output_slopes[:, 1] += direct[-1]
+    output_slopes[:, : gradient.shape[-1]] = -equations.tested_by_parameter(x, names, adjoint)
+    moved = np.reshape(constraint.tip, (-1, 1)) * of_tip
+    output_slopes[:, : gradient.shape[-1]] -= of_constraint[..., None] * moved[:, None]
     output_slopes[:, TIP_RISE] += moves * of_tip
     if equations.space.reader is None:
         output_slopes[:, 2] = np.nan

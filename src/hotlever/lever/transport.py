@@ -65,6 +65,15 @@ class Fluxes:
     def __iter__(self) -> Iterator[Array]:
         return iter((self.heat_source, self.heat, self.charge))
 
+    def tested(self, tests: Fields, weights: Array) -> Array:
+        """Return the sums over the points, with weights (points, 1), for m tests each, (n, m)."""
+        source, heat, charge = (weights * flux for flux in self)
+        return np.asarray(
+            np.einsum("pn,pnm->nm", source, tests.T)
+            + np.einsum("dpn,dpnm->nm", heat, tests.grad_T)
+            + np.einsum("dpn,dpnm->nm", charge, tests.grad_V)
+        )
+
 
 @dataclass(frozen=True)
 class Tangent:
@@ -166,6 +175,26 @@ def fluxes_of(fields: Fields, properties: Properties) -> Fluxes:
     if properties.emission is not None:
         source += properties.emission
     return Fluxes(source, heat, charge)
+
+
+def weights_of_properties(
+    fields: Fields, tests: Fields, physics: Physics, weights: Array
+) -> Properties:
+    """Return what each property counts for in m tests of each state's fluxes, (points, n, m).
+
+    The sum over points of property times weight, for all properties, is `Fluxes.tested`.
+    """
+    T, grad_T, grad_V = (each[..., None] for each in (fields.T, fields.grad_T, fields.grad_V))
+    along_V = (grad_T * tests.grad_V).sum(axis=0), (grad_V * tests.grad_V).sum(axis=0)
+    along_T = (grad_T * tests.grad_T).sum(axis=0), (grad_V * tests.grad_T).sum(axis=0)
+    at = weights[..., None]
+    found = Properties(
+        kappa=at * along_T[0], sigma=at * (along_V[1] - tests.T * (grad_V**2).sum(axis=0))
+    )
+    if physics.thermoelectric:
+        beta = along_V[0] - tests.T * (grad_T * grad_V).sum(axis=0) + T * along_T[1]
+        found = replace(found, beta=at * beta, gamma=at * T * along_T[0])
+    return replace(found, emission=at * tests.T) if physics.radiation else found
 
 
 def tangent_of(fields: Fields, properties: Properties, by_T: Properties) -> Tangent:
