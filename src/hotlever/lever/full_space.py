@@ -282,3 +282,7 @@ class SparseFactors:
         """Return the same factors, those of some states taken from others, in their order."""
         solvers = dict(enumerate(self._solvers)) | dict(zip(states, other._solvers, strict=True))
         return SparseFactors(list(solvers.values()))
+
+    def followed_by(self, other: SparseFactors) -> SparseFactors:
+        """Return the same, and those of other states after them."""
+        return SparseFactors(self._solvers + other._solvers)

@@ -230,18 +230,23 @@ class Linearised:
     ) -> Linearised:
         """Follow a branch until it goes far enough (see `continued`), and differentiate it.
 
-        With equations for the derivatives, which may differ a little and cost less, the states are
-        differentiated as well; the factors may then be those of states nearby.
+        Factors of its states may be at hand. With equations for the derivatives, which may differ a
+        little and cost less, the states are differentiated as well; the factors may then be those
+        of states nearby.
         """
         longer = continued(branch.equations, enough, branch)
         x, changes = longer.x[:, longer.solved], np.empty(0)
+        constraint = longer.parametrisation.constraint(longer.u[longer.solved])
+        equations = derivatives or longer.equations
+        added = np.arange(branch.solved.size, x.shape[1])
+        if factors is None or longer.u[0] < branch.u[0]:
+            factors = equations.factorised(x, constraint)
+        elif added.size:
+            of_added = equations.factorised(x[:, added], constraint.among(added))
+            factors = factors.followed_by(of_added)
         if derivatives is None:
-            constraint = longer.parametrisation.constraint(longer.u[longer.solved])
-            factors = longer.equations.factorised(x, constraint)
             output_slopes = by_parameter(longer.equations, x, names, factors, constraint)
         else:
-            if factors is None or longer is not branch:
-                factors = derivatives.factorised(x)
             changes, output_slopes = with_changes(derivatives, x, names, factors)
         if longer.starts_cold:
             # without power nothing depends on the parameters

@@ -144,15 +144,19 @@ class SimilarLevers:
             If a state was not found.
         """
         names = usual_parameters(probe) if names is None else names
-        equations = self.equations(probe, names)
+        equations, factors = self.equations(probe, names), None
         if near is None:
             branch = continued(equations, reach)
         else:
             parametrisation, solved = near.branch.parametrisation, near.branch.solved
             u, guess = near.branch.u[solved], near.states(probe)[:, solved]
-            roots = solve_at(equations, u, guess, NewtonOptions(), near.factors, parametrisation)
+            newton = ContinuationOptions().newton
+            roots = solve_at(equations, u, guess, newton, near.factors, parametrisation)
+            # one Jacobian serves a last step and the slopes along the branch and by parameters
+            factors = equations.factorised(roots.x, parametrisation.constraint(u))
+            roots = solve_at(equations, u, roots.x, NewtonOptions(), factors, parametrisation)
             branch = Branch.whole(equations, u, roots, parametrisation)
-        return Linearised.of(probe, names, branch, reach)
+        return Linearised.of(probe, names, branch, reach, factors=factors)
 
 
 def motion_of(space: FullSpace, movement: Movement) -> Motion:

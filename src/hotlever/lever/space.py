@@ -37,6 +37,10 @@ class Factors(Protocol):
         """Return the same factors, those of some states taken from others, in their order."""
         ...
 
+    def followed_by(self, other: Any) -> Any:
+        """Return the same, and those of other states after them."""
+        ...
+
 
 @dataclass(frozen=True)
 class SurfaceTangent:

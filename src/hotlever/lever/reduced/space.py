@@ -295,3 +295,7 @@ class DenseFactors:
         inverses = self._inverses.copy()
         inverses[states] = other._inverses
         return DenseFactors(inverses)
+
+    def followed_by(self, other: DenseFactors) -> DenseFactors:
+        """Return the same, and those of other states after them."""
+        return DenseFactors(np.concatenate([self._inverses, other._inverses]))
