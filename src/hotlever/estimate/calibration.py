@@ -23,13 +23,16 @@ from hotlever.estimate.tip_table import rms
 from hotlever.estimate.tip_temperature import tip_by_bias
 from hotlever.estimate.uncertainty_budget import budget_of_estimate
 from hotlever.lever import Branch, Lever
-from hotlever.lever.lever import COARSE
+from hotlever.lever.branch import TIP_RISE
+from hotlever.lever.continuation import continued
+from hotlever.lever.lever import COARSE, HOTTEST
 from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import THERMOMETER
 from hotlever.probe.shapes import full_bias_name
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.spieser2017 import RAMAN_ERROR_K
+from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
 #: Rows with a current that are not few for a lever.
@@ -73,11 +76,10 @@ def calibrated(
     notes += [jump.note for jump in tip.jumps]
     notes += [] if reason else what_spectra_would_do(solution, tip.table)
     notes += outlier_notes(solution.residuals, solution.prediction.values, robust=True)
-    own, lever = solution.branch, Lever(probe.in_medium("vacuum"), COARSE)
-    vacuum = lever.branch()
+    own, vacuum = solution.branch, _hotter(solution, "vacuum")
     # beyond the measured range a coarse lever says where the knee is
     if own.knee is None:
-        own = vacuum if medium == "vacuum" else lever.in_medium(medium).branch()
+        own = vacuum if medium == "vacuum" else _hotter(solution, medium)
     knee, threshold = knee_with_errors(solution, own), vacuum.knee
     law, residual, k, k_stderr = None, np.nan, np.nan, np.nan
     turns = power_turns(own, medium) or power_turns(vacuum, "vacuum")
@@ -119,6 +121,20 @@ def calibrated(
         knee_tip_K=np.nan if own.knee is None else own.knee.tip_K,
         measured_rms_K=rms(_missed(solution.branch, measured, circuit)),
     )
+
+
+@one_blas_thread
+def _hotter(solution: Solution, medium: str) -> Branch:
+    """Return the branch of a coarse lever, to tips hotter than was measured, in a medium.
+
+    In that of the measurement it goes on from the states that the search ended with.
+    """
+    assert isinstance(solution.prediction, PredictionAtRest)
+    probe, searched = solution.probe, solution.prediction.linearised.branch
+    if medium != probe.surroundings.medium or searched.equations.space.is_reduced:
+        return Lever(probe.in_medium(medium), COARSE).branch()
+    rise = HOTTEST - probe.circuit.base_temperature_K
+    return continued(searched.equations, lambda to: to.values[-1, TIP_RISE] >= rise, searched)
 
 
 def what_spectra_would_do(solution: Solution, table: xr.Dataset) -> list[str]:
