@@ -215,11 +215,14 @@ def judge_heater(
 
 
 def drawn(numbers: list[int], noise: float, laws: str) -> None:
-    """Print how right bands are of levers whose heaters are off, drawn and built-in."""
+    """Judge levers whose heaters are off, drawn and built-in, and sum all up."""
     judged = list(two_at_a_time(partial(judge_drawn, noise=noise, laws=laws), numbers))
-    print(
-        f"\n## heaters {2 * _WINDOW_UM:g} µm longer than meant, noise of {noise:g}, {laws} laws\n"
-    )
+    report_drawn(judged, f"noise of {noise:g}, {laws} laws")
+
+
+def report_drawn(judged: list[dict[str, dict[str, Any]]], title: str) -> None:
+    """Print errors and those that are stated, of each kind."""
+    print(f"\n## heaters {2 * _WINDOW_UM:g} µm longer than meant, {title}\n")
     rows = []
     for kind in heaters_off():
         every = [one[kind] for one in judged]

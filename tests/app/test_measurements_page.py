@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from elements import all_of, named, of, tell_columns, texts
+from elements import all_of, named, of, press, tell_columns, texts
 from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import Here, drop, text_of, until, visit
@@ -313,3 +313,68 @@ class Resting(Here):
         if function.__name__ == "answer":
             await asyncio.sleep(60.0)
         return await super().call(function, *arguments, heard=heard)
+
+
+# --- measured with a source meter ---------------------------------------------------------------
+
+
+def test_a_lever_is_drawn_while_it_is_measured_and_its_rows_are_taken(tmp_path: Path) -> None:
+    pytest.importorskip("pyvisa")
+
+    async def story(user: User, session: Session) -> None:
+        at_once(session)
+        session.chosen["measure"] = {
+            "source": "twin:3", "bias": "1.5:5.5:4", "settle": "0s", "stay_below": "500K",
+            "reader": "", "compliance": "2mA", "propose": False,
+        }  # fmt: skip
+        await user.open("/measurements")
+        line = (
+            "hotlever measure --source twin:3 --bias 1.5:5.5:4 --settle 0s --stay-below 500K "
+            "--compliance 2mA -o reference-iv.csv"
+        )
+        await user.should_see(line)
+        press(user, "Measure")
+        await until(lambda: of(user, ui.select, "Measurements").value == ["reference-iv.csv"])
+        await user.should_see("Dashed: the limit, 500 K.", retries=50)
+        await user.should_see("4 rows in reference-iv.csv")
+        current, tip = all_of(user, ui.plotly)[:2]
+        (measured,) = current.figure["data"]
+        band, estimate, before, limit = tip.figure["data"]
+        assert len(measured["x"]) == len(before["y"]) == 4
+        assert limit["y"] == [500.0, 500.0]
+        # what was foretold of the last row, and the band by what is known now
+        assert estimate["y"][-1] < before["y"][-1] < 500.0
+        low, high = np.reshape([*band["y"]], (2, -1))
+        assert (low < estimate["y"]).all()
+        assert (high[::-1] > estimate["y"]).all()
+
+    visit(tmp_path, story)
+
+
+def test_a_measurement_is_stopped_and_says_that_its_output_is_off(tmp_path: Path) -> None:
+    pytest.importorskip("pyvisa")
+
+    async def story(user: User, session: Session) -> None:
+        options = {"source": "twin:3", "bias": "1:4:7", "settle": "600s", "output": "iv.csv"}
+        job = session.jobs.start("measure", Task("measure", (), options))
+        await user.open("/measurements")
+        await until_file(tmp_path / "iv.csv", "source: KEITHLEY")
+        press(user, "Stop")
+        for _ in range(600):
+            if job.standing != "running":
+                break
+            await asyncio.sleep(0.1)
+        assert job.standing == "failed"
+        assert job.message == "iv.csv: 0 rows; stopped by the user, the output is off"
+        await user.should_see(job.message, retries=50)
+
+    visit(tmp_path, story)
+
+
+async def until_file(path: Path, text: str) -> None:
+    """Wait, a minute at most, until a file holds a text."""
+    for _ in range(600):
+        if path.exists() and text in path.read_text(encoding="utf-8"):
+            return
+        await asyncio.sleep(0.1)
+    raise AssertionError(f"{path} does not say {text}")

@@ -24,6 +24,9 @@ Standing = Literal["running", "done", "failed", "cancelled"]
 
 #: Notes kept of a task, and jobs of a page.
 _MOST_NOTES, _MOST_JOBS = 200, 50
+#: Seconds that a task has to turn off what it turned on, and between two looks whether it has.
+_TURN_OFF_S, _LOOK_S = 30.0, 0.1
+_STUCK = "it did not end by itself and was killed: see whether the output of the instrument is off"
 #: Share of the work from which on it tells how long the rest takes: it may begin slowly.
 _TELLING = 0.03
 
@@ -237,6 +240,23 @@ class Jobs:
         if self.running(page):
             self.of(page)[0].end("cancelled")
             await self._workers[page].end()
+
+    async def stop(self, page: str) -> None:
+        """Have a page's work end by itself: it turns off what it turned on, and says how it ended.
+
+        What does not end is killed.
+        """
+        if not self.running(page):
+            return
+        job, worker = self.of(page)[0], self._workers[page]
+        job.hear("progress", ("stopping", 0, 0))
+        worker.interrupt()
+        for _ in range(int(_TURN_OFF_S / _LOOK_S)):
+            if job.standing != "running":
+                return
+            await asyncio.sleep(_LOOK_S)
+        job.end("failed", _STUCK)
+        worker.kill()
 
 
 # --- in the process -------------------------------------------------------------------------------

@@ -136,6 +136,11 @@ class Worker:
         elif self._heard is not None:
             self._heard(kind, content)
 
+    def interrupt(self) -> None:
+        """Have the call that it answers end, as by Ctrl-C."""
+        with suppress(OSError):
+            os.kill(int(self._process.pid or 0), signal.SIGTERM)
+
     async def end(self) -> None:
         """End the process and all that it started."""
         self._signal(signal.SIGTERM)

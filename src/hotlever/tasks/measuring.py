@@ -6,11 +6,11 @@ import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
-from hotlever.errors import ComputationError, InputError, excerpt, quoted
+from hotlever.errors import ComputationError, InputError, counted, excerpt, quoted
 from hotlever.files import write_text
 from hotlever.tasks.arguments import (
     Laws,
@@ -32,7 +32,7 @@ from hotlever.tasks.reporter import Reporter
 from hotlever.units import setting
 
 if TYPE_CHECKING:
-    from hotlever.instruments.ramp import MeasuredRamp, Step
+    from hotlever.instruments.ramp import MeasuredRamp, Ramp, Step
     from hotlever.instruments.source_meter import Reading
     from hotlever.probe import Probe
 
@@ -129,11 +129,18 @@ def measure_lever(
         def record(reading: Reading, step: Step) -> None:
             file.add(reading)
             reporter.tell(_row(len(ramp.measured.readings), reading, step))
+            reporter.show("rows", _rows(ramp))
 
         supply = Supply(of_source, of_reader, limit_mA)
-        with Supervisor(supply) as instrument:
-            file.comment(f"source: {instrument.identity}")
-            measured = ramp.measure(instrument, record)
+        try:
+            with Supervisor(supply) as instrument:
+                file.comment(f"source: {instrument.identity}")
+                measured = ramp.measure(instrument, record)
+        except KeyboardInterrupt:
+            rows = counted(len(ramp.measured.readings), "row")
+            raise ComputationError(
+                f"{output}: {rows}; stopped by the user, the output is off"
+            ) from None
         file.comment(f"ended: {measured.reason}")
     reporter.give(_result(output, measured))
     if not measured.complete:
@@ -180,6 +187,23 @@ def _row(number: int, reading: Reading, step: Step) -> str:
         f"{number:3d}  {reading.bias_V:7.4g} V  {reading.current_mA:8.5g} mA   tip expected at "
         f"{step.tip_K:.0f} K, below {step.tip_limit_K:.0f} K"
     )
+
+
+def _rows(ramp: Ramp) -> dict[str, Any]:
+    """Return the rows so far, what was foretold of each, and the tip by what is known now."""
+    measured = ramp.measured
+    shown: dict[str, Any] = {
+        "bias_V": [reading.bias_V for reading in measured.readings],
+        "current_mA": [reading.current_mA for reading in measured.readings],
+        "foretold_K": [step.tip_limit_K for step in measured.steps],
+        "limit_K": ramp.limit_K,
+    }
+    columns = {"band_V": "bias_V", "tip_K": "tip_K", "low_K": "tip_low_K", "high_K": "tip_high_K"}
+    calibration = measured.calibration
+    return shown | {
+        name: [] if calibration is None else calibration.table[column].values.tolist()
+        for name, column in columns.items()
+    }
 
 
 def _result(output: Path, measured: MeasuredRamp) -> str:

@@ -24,6 +24,7 @@ from hotlever.app.pages.frame import (
     table,
     two_columns,
 )
+from hotlever.app.pages.instrument import MeasureCard
 from hotlever.app.pages.plots import MeasuredPlots
 from hotlever.app.pages.results import show_result
 from hotlever.app.pages.task_page import MEDIA, JobView, TaskPage, several
@@ -101,6 +102,8 @@ class MeasurementsPage(TaskPage):
                     flat_button("All", self._take_all)
                     flat_button("None", partial(self._select.set_value, []))
                 self.lever_choice()
+                self._instrument = MeasureCard(session, banner, self._measured)
+                self._instrument.show_fields()
                 self._show_options()
                 self._button = ui.button("Start", icon="play_arrow", on_click=self.start)
                 # until there is something understood
@@ -110,6 +113,7 @@ class MeasurementsPage(TaskPage):
                     names = {"": "–"} | {name: name for name in results}
                     self.choice("opened", "Or open a result of the folder", names)
             with right:
+                self._instrument.show_rows()
                 JobView(session, self.name, self._ended, during=self._follow, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
                 self._columns = ColumnPicker(partial(self._tell, "columns"))
@@ -198,6 +202,7 @@ class MeasurementsPage(TaskPage):
 
     def changed(self) -> Awaitable[None] | None:
         """Read the measurement anew if it, or what it is read with, is another one."""
+        self._instrument.show_command()
         self._button.set_text(_MADE[self.chosen["kind"]] + (" all" if len(self.data) > 1 else ""))
         if self._asked == self._read_of:
             self.show_command()
@@ -295,6 +300,10 @@ class MeasurementsPage(TaskPage):
         self._take(names)
         if len(names) > 1:
             await say_refused(self.session, self.banner, names, spectra=False)
+
+    async def _measured(self, name: str) -> None:
+        """Take the rows of a measurement that has ended."""
+        self._take([name])
 
     async def _example(self) -> None:
         with self.banner.caught():

@@ -165,6 +165,48 @@ class MeasuredPlots:
         self._legend.set_text("Dots: measured. Line: the lever as the fit has it.")
 
 
+class RampPlots:
+    """A lever while it is measured: its curve, and its tip with the limit that it stays below."""
+
+    def __init__(self) -> None:
+        band = {"type": "scatter", "mode": "none", "fill": "toself", "name": "95 %"}
+        measured = dots(BLUE, 7, symbol="circle-open") | {"name": "measured"}
+        before = dots(INK, 8, symbol="triangle-down-open") | {"name": "below with 99 %, foretold"}
+        traces = [band, line(BLUE) | {"name": "tip"}, before, line(VERMILION, dash="dash")]
+        with side_by_side():
+            layout = axes(BIAS, _CURRENT, 270)
+            self._current = plotted([measured], layout, "Measured current against bias")
+            layout = axes(BIAS, _TIP, 270, normal="y")
+            self._tip = plotted(traces, layout, "Tip temperature with its band, and the limit")
+        self._legend = caption("")
+
+    def show(self, rows: dict[str, Any] | None) -> None:
+        """Draw the rows so far, as `hotlever.tasks.measuring` shows them; nothing where none is."""
+        if rows is None:
+            return
+        band, tip, before, limit = self._tip.figure["data"]
+        self._current.figure["data"][0] |= points(rows["bias_V"], rows["current_mA"])
+        along = rows["band_V"]
+        band |= points([*along, *along[::-1]], [*rows["low_K"], *rows["high_K"][::-1]])
+        band["fillcolor"] = SHADE.format(0.3)
+        tip |= points(along, rows["tip_K"])
+        before |= points(rows["bias_V"], rows["foretold_K"])
+        limit |= points([0.0, max(rows["bias_V"])], [rows["limit_K"]] * 2)
+        for plot in (self._current, self._tip):
+            plot.update()
+        last = f"{rows['bias_V'][-1]:.4g} V, {rows['current_mA'][-1]:.4g} mA"
+        where = ""
+        if along:
+            where = (
+                f", tip at {rows['tip_K'][-1]:.0f} K "
+                f"(95 %: {rows['low_K'][-1]:.0f} to {rows['high_K'][-1]:.0f} K)"
+            )
+        self._legend.set_text(
+            f"Row {len(rows['bias_V'])}: {last}{where}. Grey: 95 % by the rows so far. Triangles: "
+            f"not above with 99 %, foretold. Dashed: the limit, {rows['limit_K']:.0f} K."
+        )
+
+
 def _range(values: list[float]) -> list[float]:
     """Return the ends of an axis that shows some values, and a little more."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))

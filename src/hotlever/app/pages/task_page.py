@@ -306,6 +306,8 @@ class JobView:
         Called with the job whenever there is something new of it.
     notes : bool
         Whether what the task notes is shown here, and not with its result.
+    stops : bool
+        Whether it is stopped, as what owns an instrument, and not cancelled.
     """
 
     def __init__(
@@ -316,14 +318,16 @@ class JobView:
         *,
         during: Callable[[Job], None] | None = None,
         notes: bool = True,
+        stops: bool = False,
     ) -> None:
         self._session, self._page, self._then, self._during = session, page, then, during
         self._seen: tuple[int, int] = (0, -1)
+        end, way = ("Stop", self._stop) if stops else ("Cancel", self._cancel)
         with ui.column().classes("w-full gap-1") as self._all:
             with ui.row().classes("w-full items-center no-wrap") as self._running:
                 self._bar = ui.linear_progress(show_value=False, size="10px").props("rounded")
                 self._text = ui.label().classes("text-xs no-wrap").props("aria-live=polite")
-                ui.button("Cancel", on_click=self._cancel).props("dense outline color=negative")
+                ui.button(end, on_click=way).props("dense outline color=negative")
             self._message = ui.label().classes("banner w-full").props("role=alert")
             self._notes = ui.column().classes("w-full gap-0 text-sm remark")
             self._notes.set_visibility(notes)
@@ -338,6 +342,10 @@ class JobView:
     @property
     def _has_ended(self) -> bool:
         return self._job is not None and self._job.standing != "running"
+
+    async def _stop(self) -> None:
+        await self._session.jobs.stop(self._page)
+        self._look()
 
     async def _cancel(self) -> None:
         await self._session.jobs.cancel(self._page)
@@ -362,7 +370,8 @@ class JobView:
             self._bar.set_value(job.share or 0.0)
             left = job.left_s
             more = "" if left is None else f", some {max(1.0, left):.0f} s left"
-            self._text.set_text(f"{job.label or 'starting'}{more}")
+            what = job.label or ("at work" if job.contents else "starting")
+            self._text.set_text(f"{what}{more}")
         if self._seen == (id(job), job.version):
             return
         self._seen = (id(job), job.version)
