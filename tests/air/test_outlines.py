@@ -34,9 +34,8 @@ def test_a_thin_disc():
     assert found == pytest.approx(8 * 10.0, rel=1e-3)
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.4])
-def test_a_thin_square(angle):
-    found = without_thickness(lambda thickness: turned(plate(BOX, thickness), angle))
+def test_a_thin_square():
+    found = without_thickness(lambda thickness: turned(plate(BOX, thickness), 0.4))
     assert found == pytest.approx(4 * np.pi * SQUARE * 10.0, rel=1e-3)
 
 
@@ -45,7 +44,7 @@ def test_a_thin_square(angle):
     [
         [(0, 0), (30, 0), (30, 4), (0, 4)],
         pytest.param([(0, 0), (20, -1), (20, 3), (8, 6)], marks=pytest.mark.slow),
-        [(0, 0), (12, 0), (12, 9), (9, 9), (9, 2), (0, 2)],
+        pytest.param([(0, 0), (12, 0), (12, 9), (9, 9), (9, 2), (0, 2)], marks=pytest.mark.slow),
     ],
     ids=["rectangle", "slanted", "angle"],
 )
@@ -53,8 +52,7 @@ def test_panels_are_fine_enough_and_turning_changes_nothing(outline):
     whole = plate(outline, 0.4)
     here = loss(whole)
     assert here == pytest.approx(loss(whole, 1.5), rel=1e-3)
-    for angle in (0.3, -2.0):
-        assert loss(turned(whole, angle, (50.0, 900.0))) == pytest.approx(here, rel=1e-5)
+    assert loss(turned(whole, -2.0, (50.0, 900.0))) == pytest.approx(here, rel=1e-5)
 
 
 def test_a_hole_that_is_small_changes_little_and_a_large_one_more():

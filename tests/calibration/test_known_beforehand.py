@@ -46,6 +46,7 @@ def test_edges_that_are_off_together_are_known_by_one_prior():
     assert float((error / calibration.table.tip_stderr_K).max()) < 2.0
 
 
+@pytest.mark.slow
 def test_doping_known_to_a_factor_is_calibrated_and_written_with_its_distribution(run, tmp_path):
     """The lever that is stated has a third of the doping."""
     true = Lever(Probe.reference()).branch()

@@ -23,6 +23,8 @@ from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
 from synthetic_curves import measured_curve, measurement_of
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 
 @pytest.fixture(scope="module")
 def curve(reference) -> IVCurve:
@@ -66,10 +68,7 @@ def test_equal_rows_are_no_curve(curve):
     ("bias", "current", "probe", "message"),
     [
         (lambda v, i: v, lambda v, i: 1e3 * i, {}, r"kΩ at low bias, expected about 6\.9.*large"),
-        (lambda v, i: v, lambda v, i: 1e-3 * i, {}, r"1000 times too small"),
         (lambda v, i: v, lambda v, i: 5.0 * i, {}, r"is the current (5|4.99|5.01) times"),
-        (lambda v, i: i, lambda v, i: v, {}, r"are bias and current swapped"),
-        (lambda v, i: v - 5.6 * i, lambda v, i: i, {}, r"is V_b the lever's own voltage"),
         (lambda v, i: v, lambda v, i: i, {"series_resistance_ohm": 0.0}, r"rather 5\.[56]\d* than"),
         (lambda v, i: v, lambda v, i: 1e-5 + 0.0 * i, {}, r"hardly any current flows"),
     ],

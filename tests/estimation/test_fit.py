@@ -59,22 +59,15 @@ def test_only_the_chosen_observables_enter(coarse, coarse_model):
     assert result.parameters["c_kappa"].value == pytest.approx(TRUTH["c_kappa"], rel=0.02)
 
 
-def test_wrong_points_are_named_and_a_robust_fit_sets_them_aside(coarse, coarse_fast, monkeypatch):
-    # the plain fit is not that of such a lever; why, is not what is asked here
-    monkeypatch.setattr(Diagnosis, "named", lambda _: "")
+def test_a_wrong_point_is_named_and_a_robust_fit_sets_it_aside(coarse, coarse_fast):
     data = twin(coarse, noise=2e-3)
     current = data.current_mA.copy()
     current[3] *= 10  # a wrong decade
     spoilt = Measurement(data.bias_V, current, data.reader_V, data.tip_K, data.tip_error_K)
-    plain = fit(spoilt, model=coarse_fast)
     robust = fit(spoilt, robust=True, model=coarse_fast)
-    for result in (plain, robust):
-        assert any(f"current at {BIAS[3]:g} V is" in note for note in result.notes)
+    assert any(f"current at {BIAS[3]:g} V is" in note for note in robust.notes)
     for name, fitted in robust.parameters.items():
         assert abs(fitted.value - TRUTH[name]) < 5 * fitted.stderr
-    truth = TRUTH["c_kappa"]
-    off = [abs(result.parameters["c_kappa"].value - truth) for result in (plain, robust)]
-    assert not plain.describes_data or off[0] > 10 * off[1]
 
 
 def test_of_many_wrong_points_the_worst_are_named(coarse):
@@ -176,6 +169,7 @@ def test_the_same_row_again_is_no_further_datum(coarse):
         fit(equal)
 
 
+@pytest.mark.slow
 def test_a_start_that_does_not_reach_the_data_is_no_obstacle(coarse, coarse_fast, monkeypatch):
     """No lever shows them without the resistor, and the fit says so, and what may be behind it."""
     monkeypatch.setattr(Diagnosis, "named", lambda _: "is it the resistor?")

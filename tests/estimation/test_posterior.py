@@ -68,15 +68,15 @@ def fitted(lever):
 
 @pytest.fixture(scope="module")
 def posterior(fitted):
-    return sample_posterior(fitted, samples=400, processes=1, noise="common")
+    return sample_posterior(fitted, samples=150, processes=1, noise="common")
 
 
 def test_a_normal_density_is_found():
-    found = draw_samples(Trials(normal()), 4000, seed=1)
-    assert found.points.mean(axis=0) == pytest.approx(MEAN, abs=0.1)
-    np.testing.assert_allclose(np.cov(found.points.T), COVARIANCE, rtol=0.1)
+    found = draw_samples(Trials(normal()), 1000, seed=1)
+    np.testing.assert_array_less(np.abs(found.points.mean(axis=0) - MEAN), [0.1, 0.2])
+    np.testing.assert_allclose(np.cov(found.points.T), COVARIANCE, rtol=0.15)
     # less than all only for the tails that errors are drawn with
-    assert 3000 < found.effective <= 4000
+    assert 750 < found.effective <= 1000
 
 
 def test_a_bent_density_is_found():
@@ -88,13 +88,13 @@ def test_a_bent_density_is_found():
     def jacobian(x):
         return np.array([[1.0, 0.0], [-4.0 * x[0], 2.0], [0.0, 0.7]])
 
-    found = draw_samples(Trials(Near(residual, jacobian)), 4000, seed=1)
-    assert found.effective > 1000
+    found = draw_samples(Trials(Near(residual, jacobian)), 1500, seed=1)
+    assert found.effective > 400
     x, y = np.meshgrid(np.linspace(-5, 5, 1001), np.linspace(-5, 20, 2501), indexing="ij")
     density = np.exp(-0.5 * (x**2 + ((y - x**2) / 0.5) ** 2 + (0.7 * y) ** 2))
     for values, sampled_values in ((x**2, found.points[:, 0] ** 2), (y, found.points[:, 1])):
         exact = (density * values).sum() / density.sum()
-        assert sampled_values.mean() == pytest.approx(exact, rel=0.05)
+        assert sampled_values.mean() == pytest.approx(exact, rel=0.1)
 
 
 def test_an_unknown_noise_is_integrated_out():
@@ -109,7 +109,7 @@ def test_an_unknown_noise_is_integrated_out():
 
     near = Near(residual, jacobian, prior=False)
     near.objective.residuals.present = np.ones((2, data.size), dtype=bool)
-    found = draw_samples(Trials(near), 4000, seed=1)
+    found = draw_samples(Trials(near), 1500, seed=1)
     exact = stats.t(data.size - 1, data.mean(), stats.sem(data))
     for points in found.points.T:
         quantiles = np.percentile(points, (5, 25, 75, 95))
@@ -120,15 +120,15 @@ def test_what_the_data_leave_open_is_uniform_within_its_bounds():
     def residual(x):
         return np.array([x[0], 0.0])
 
-    found = draw_samples(Trials(Near(residual, lambda x: np.diag([1.0, 0.0]), bound=3.0)), 4000)
+    found = draw_samples(Trials(Near(residual, lambda x: np.diag([1.0, 0.0]), bound=3.0)), 1000)
     assert found.points[:, 1].std() == pytest.approx(6.0 / np.sqrt(12.0), rel=0.05)
     assert np.abs(found.points).max() < 3.0
 
 
-def test_the_number_of_processes_does_not_change_the_samples(informed):
-    one, two = (sample_posterior(informed, samples=120, processes=count) for count in (1, 2))
+def test_the_number_of_processes_does_not_change_the_samples(informed, by_two_processes):
+    one = sample_posterior(informed, samples=150, processes=1)
     for name in informed.names:
-        np.testing.assert_allclose(one[name], two[name], rtol=1e-9)
+        np.testing.assert_allclose(one[name], by_two_processes[name], rtol=1e-9)
 
 
 def test_another_seed_gives_other_samples():
@@ -200,9 +200,9 @@ def test_posterior_agrees_with_the_covariance_of_the_fit(fitted, posterior):
 
 
 def test_posterior_says_how_far_to_trust_it(fitted, posterior):
-    assert posterior.sizes == {"draw": 400, "quantity": 4}
+    assert posterior.sizes == {"draw": 150, "quantity": 4}
     assert posterior.quantity.values.tolist() == [*fitted.names, "inversion_temperature"]
-    assert 200 < posterior.effective_sample_size.item() < 400
+    assert 75 < posterior.effective_sample_size.item() < 150
     assert posterior.attrs["fixed"].startswith("n_d = ")
     for variable in posterior.data_vars.values():
         assert {"units", "long_name"} <= set(variable.attrs)
@@ -239,9 +239,14 @@ def informed(coarse):
     return fit(data, coarse.probe, priors=priors, fixed={"a0": None, "a1": None})
 
 
-def test_the_posterior_of_a_fit_with_priors_agrees_with_its_covariance(informed):
+@pytest.fixture(scope="module")
+def by_two_processes(informed):
+    return sample_posterior(informed, samples=150, processes=2)
+
+
+def test_the_posterior_of_a_fit_with_priors_agrees_with_its_covariance(informed, by_two_processes):
     assert {"heater_length_um", "series_resistance_ohm"} < set(informed.names)
-    posterior = sample_posterior(informed, samples=400, processes=1)
+    posterior = by_two_processes
     for name in ("n_d", "c_kappa", "heater_length_um", "series_resistance_ohm"):
         known = informed.parameters[name]
         assert posterior[name].mean().item() == pytest.approx(known.value, abs=0.4 * known.stderr)

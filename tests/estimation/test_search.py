@@ -105,6 +105,7 @@ def test_a_fit_of_data_below_the_knee_ends_though_they_leave_a_valley_open(n_d, 
     assert np.all(np.abs(off) < error)
 
 
+@pytest.mark.slow
 def test_a_current_that_saturates_is_not_described(reference_curve, monkeypatch):
     monkeypatch.setattr(Diagnosis, "named", lambda _: "is the current clipped?")
     top = np.sort(reference_curve.current_mA)[-5]

@@ -10,19 +10,20 @@ from hotlever.estimate import read_calibration
 from hotlever.measurement import read_measurement
 
 pytest.importorskip("pyvisa")
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
 
 TWIN = ("measure", "--source", "twin:3", "--settle", "0s", "--laws", "paper")
 
 
 def test_a_twin_is_measured_and_calibrated(run, tmp_path):
-    words = ("--reader", "twin", "--bias", "1.5:6:4", "--stay-below", "500K")
+    words = ("--reader", "twin", "--bias", "1.5:5:3", "--stay-below", "500K")
     status, out, err = run(*TWIN, *words, "-o", "iv.csv", "--calibration", "cal.json")
     assert status == 0
-    assert "4 rows in iv.csv: " in out
+    assert "3 rows in iv.csv: " in out
     assert "below" in err
     data = read_measurement(tmp_path / "iv.csv")
     assert data.observables == ("current", "reader")
-    assert (data.bias_V.size, data.medium) == (4, "vacuum")
+    assert (data.bias_V.size, data.medium) == (3, "vacuum")
     text = (tmp_path / "iv.csv").read_text()
     assert text.index("# source: KEITHLEY") < text.index("V_b (V),I_h (mA),V_r (V)")
     last = read_calibration(tmp_path / "cal.json").table.isel(bias=-1)

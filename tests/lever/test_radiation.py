@@ -109,7 +109,7 @@ def test_a_solid_strip_radiates_as_a_flat_one_and_its_edges(bright, monkeypatch)
     monkeypatch.setattr(heat_laws, "STEFAN_BOLTZMANN", 0.1 * heat_laws.STEFAN_BOLTZMANN)
     probe, bias = strip(4.0, 1.0), 1.0
     expected, light = exact_strip(4.0, 1.0, bias)
-    for lever in (Lever(probe), SolidLever(probe)):
+    for lever in (Lever(probe), SolidLever(probe, SolidMeshOptions(refinement=0.6))):
         swept = lever.dataset(lever.solve([bias]))
         assert swept.tip_K.item() - BASE == pytest.approx(expected - BASE, rel=3e-4)
         assert swept.radiated_mW.item() == pytest.approx(light, rel=3e-4)

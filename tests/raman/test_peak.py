@@ -98,11 +98,11 @@ def _pulls(instrument, options, count, seed):
 
 
 def test_standard_errors_are_honest_at_the_papers_counts_with_spikes_and_band():
-    """On 400 spectra: width of the pulls 1 within 10 %, no failure."""
-    pulls = _pulls(Instrument(), PeakOptions(), 400, seed=42)
+    """On 150 spectra: the width of the pulls, known to 6 %, is 1, and nothing fails."""
+    pulls = _pulls(Instrument(), PeakOptions(), 150, seed=42)
     width = pulls.std(axis=0)
-    assert np.all(np.abs(width - 1.0) < 0.1), width
-    assert np.all(np.abs(pulls.mean(axis=0)) < 0.15)
+    assert np.all(np.abs(width - 1.0) < 0.15), width
+    assert np.all(np.abs(pulls.mean(axis=0)) < 0.25)
     assert np.abs(pulls[:, 0]).max() < 5.0
 
 
@@ -117,10 +117,10 @@ def test_standard_errors_are_honest_at_the_papers_counts_with_spikes_and_band():
     ],
 )
 def test_errors_of_the_centre_are_honest_on_other_instruments(instrument, options):
-    # 150 pulls: their width is known to 6 %
-    pulls = _pulls(instrument, options, 150, seed=3)[:, 0]
-    assert 0.85 < pulls.std() < 1.17
-    assert abs(pulls.mean()) < 0.25
+    # 100 pulls: their width is known to 7 %
+    pulls = _pulls(instrument, options, 100, seed=3)[:, 0]
+    assert 0.8 < pulls.std() < 1.2
+    assert abs(pulls.mean()) < 0.3
 
 
 def test_leaving_the_band_out_reads_a_hot_line_wrong():
@@ -253,13 +253,13 @@ def test_no_line_is_an_error_of_its_own(y):
 def test_noise_alone_hardly_ever_makes_a_line():
     rng = np.random.default_rng(6)
     found = 0
-    for _ in range(200):
+    for _ in range(60):
         try:
             fit_peak(X, rng.poisson(100.0, X.size).astype(float))
             found += 1
         except NoSiliconLine:
             pass
-    assert found <= 2
+    assert found <= 1
 
 
 def test_options_are_checked():

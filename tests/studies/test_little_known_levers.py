@@ -25,7 +25,7 @@ from twins import (
     little_known_lever,
 )
 
-NUMBERS = range(12)
+NUMBERS = range(6, 12)
 
 
 @pytest.fixture(autouse=True)
@@ -36,18 +36,14 @@ def coarse_levers(monkeypatch):
 
 @pytest.fixture(scope="module")
 def some():
-    """A dozen levers in vacuum."""
+    """Some levers in vacuum."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(twins, "_finer", lambda true: Lever(true, COARSE))
         return [little_known_lever(number, "vacuum") for number in NUMBERS]
 
 
-def test_a_lever_is_the_same_each_time_and_in_the_medium_that_is_asked_for():
-    once, again, in_air = (
-        little_known_lever(4, "vacuum"),
-        little_known_lever(4, "vacuum"),
-        little_known_lever(4, "air"),
-    )
+def test_a_lever_is_the_same_each_time_and_in_the_medium_that_is_asked_for(some):
+    once, again, in_air = some[4], little_known_lever(10, "vacuum"), little_known_lever(10, "air")
     assert (once.true, once.nominal) == (again.true, again.nominal)
     np.testing.assert_array_equal(once.measurement.current_mA, again.measurement.current_mA)
     assert in_air.true.surroundings.medium == in_air.nominal.surroundings.medium == "air"
@@ -55,7 +51,7 @@ def test_a_lever_is_the_same_each_time_and_in_the_medium_that_is_asked_for():
 
 
 def test_every_shape_has_its_turn_and_nominal_levers_differ(some):
-    assert [lever.nominal.shape.shape for lever in some] == [*SHAPES] * 4
+    assert [lever.nominal.shape.shape for lever in some] == [*SHAPES] * 2
     doping = np.array([lever.nominal.material.n_d for lever in some])
     assert np.all((doping >= 3e16) & (doping <= 1e18))
     assert doping.max() > 5 * doping.min()
@@ -74,7 +70,7 @@ def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
     assert priors["thickness_um"].spread == 0.20
     assert priors["length_um"].spread == 0.12
     assert priors["n_d"].spread in (0.6, pytest.approx(np.log(2.5)))
-    while len(away) < 200:
+    while len(away) < 100:
         try:
             true = twins._drawn(rng, nominal, obey=False)
         except twins.HotleverError:
@@ -84,7 +80,7 @@ def test_levers_scatter_about_what_their_owners_know_as_the_priors_say():
         away.append([prior.deviation(v) for prior, v in zip(priors.values(), values, strict=True)])
     # levers that cannot be drawn are left out, so that the scatter is somewhat smaller
     spread = np.std(away, axis=0)
-    assert np.all((spread > 0.75) & (spread < 1.2)), dict(zip(priors, spread, strict=True))
+    assert np.all((spread > 0.7) & (spread < 1.25)), dict(zip(priors, spread, strict=True))
 
 
 def test_owners_state_priors_as_probe_files_do(some, tmp_path):
@@ -108,7 +104,7 @@ def test_data_end_anywhere_from_350_K_to_melting_half_of_them_below_the_knee(som
     ends = [float(lever.branch.read(lever.true.circuit, np.array([0.0])).last_K) for lever in some]
     assert max(ends) > 1000.0
     below = sum(lever.below_knee for lever in some)
-    assert 2 <= below <= 10
+    assert 1 <= below <= 5
     for lever in some:
         tip = lever.tip_K(lever.measurement.bias_V)
         assert 18 <= tip.size <= 55
