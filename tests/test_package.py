@@ -148,7 +148,6 @@ def test_a_plain_sweep_imports_what_it_needs_and_no_more(tmp_path):
 @pytest.mark.parametrize(
     "words",
     [
-        f"fit {EXAMPLES}/lever-a.csv -o out.json",
         f"calibrate {EXAMPLES}/lever-a.csv -o out.json",
         "pulse --pulse 8V,5us -o out.csv",
     ],

@@ -27,6 +27,7 @@ from hotlever.estimate.power_law import EQ12
 from hotlever.files import CALIBRATION, TABLE
 from hotlever.probe import Probe
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
 LEVER_A = (EXAMPLES / "lever-a.csv").read_bytes()
 FIT: dict[str, Any] = {"kind": "fit"}
 OTHER = "Something else is chosen now; this is still the result of:"

@@ -37,7 +37,10 @@ def test_peltier_heat_is_set_free_where_the_current_enters_the_heater(n_type):
     assert 0.2 < peltier.sel(bias=7.22, method="nearest").max() < 0.3
 
 
-@pytest.mark.parametrize(("kind", "along"), [("n-silicon", -1), ("p-silicon", 1)])
+@pytest.mark.parametrize(
+    ("kind", "along"),
+    [("n-silicon", -1), pytest.param("p-silicon", 1, marks=pytest.mark.slow)],
+)
 def test_parts_are_those_of_one_dimension(kind, along, coarse, n_type):
     axis = Axis(kind, BIAS)
     shift = n_type

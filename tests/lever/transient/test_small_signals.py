@@ -17,9 +17,8 @@ def impedance(data):
     return data.impedance_real_ohm.values + 1j * data.impedance_imag_ohm.values
 
 
-@pytest.mark.parametrize("bias", [4.0, 10.7])
-def test_all_frequencies_are_those_of_a_direct_solution(coarse, bias):
-    (state,) = coarse.solve([bias])
+def test_all_frequencies_are_those_of_a_direct_solution(coarse):
+    (state,) = coarse.solve([10.7])
     frequency = np.array([1.0, 3e3, 1e5, 1e7])
     data = spectrum(state, frequency)
     equations, unit = coarse.equations, np.eye(len(state.x))
