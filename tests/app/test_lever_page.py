@@ -94,10 +94,24 @@ def test_layers_change_what_they_are_made_of(palladium: dict[str, Any]) -> None:
 def test_a_layer_is_named_after_what_it_is_made_of() -> None:
     sections = {"probe": {"shape": "drawing"}, "layers": {"heater": "2/0"}, "terminals": {}}
     row = row_of(sections, "heater")
+    assert row.role == "heater"
     once = with_layer(sections, row, "film", "+metal-film/Pt")
     assert once["layers"] == {"Pt": {"drawn": "2/0", "material": "Pt"}}
-    assert with_layer(once, row, "film", "")["layers"] == {"heater": "2/0"}
+    assert with_layer(once, row, "film", "")["layers"] == {"low-doped": "2/0"}
     assert with_layer(once, row, "supply", "")["terminals"] == {"supply": "2/0"}
+
+
+def test_the_layer_of_the_heater_is_called_so_whatever_it_is_made_of() -> None:
+    layers = {"silicon": "1/0", "part": {"drawn": "2/0", "edge_bias_um": 0.1}, "heater": "3/0"}
+    sections = {"probe": {"shape": "drawing"}, "layers": layers, "terminals": {}, "material": {}}
+    row = row_of(sections, "part")
+    changed = with_layer(sections, row, "heater", "")
+    # of two heaters the one that was it is none
+    assert changed["layers"] == {"silicon": "1/0", "heater": layers["part"]}
+    assert changed["material"] == {}
+    once = with_layer(changed, row, "heater", "+metal-film/Pt")["layers"]["heater"]
+    # edges of a metal have no shift
+    assert once == {"drawn": "2/0", "material": "Pt"}
 
 
 def test_a_material_is_renamed_wherever_it_is_named(palladium: dict[str, Any]) -> None:

@@ -34,14 +34,15 @@ from hotlever.probe.drawing.outlines import DrawingError
 from hotlever.probe.drawing.shape import TOLERANCE_UM, DrawnShape
 from hotlever.probe.drawing.sheet import read_sheet
 from hotlever.probe.file_sections import file_text, read_sections
-from hotlever.probe.shapes import DRAWING, PARAMETRIC, SHAPE_SECTIONS
+from hotlever.probe.shapes import DRAWING, EDGE_BIAS, PARAMETRIC, SHAPE_SECTIONS
 
 # Sections of a probe file by name, and the names of a section and of those that it is in.
 Sections = dict[str, Any]
 Place = tuple[str, ...]
 
 #: What layers of a drawing may be beside films and parts, which have names of their own.
-BODIES, FILM, TERMINALS = ("silicon", "body"), "film", ("supply", "ground", "reader")
+BODIES, HEATER, FILM = ("silicon", "body"), "heater", "film"
+TERMINALS = ("supply", "ground", "reader")
 #: Numbers of other sections that can be set: keys, in the order in which they are shown.
 _OF_A_DRAWING = ("thickness_um", "tip_um")
 _OF_THE_CIRCUIT = ("series_resistance_ohm", "base_temperature_K")
@@ -140,7 +141,7 @@ class LayerRow:
     @property
     def role(self) -> str:
         """What it is, in one word."""
-        if self.part == "layers":
+        if self.part == "layers" and self.name != HEATER:
             return "body" if self.name in BODIES else FILM
         return self.name
 
@@ -174,23 +175,28 @@ def with_layer(sections: Sections, row: LayerRow, role: str, material: str) -> S
         for body in BODIES:
             layers.pop(body, None)
         name = "body" if material else "silicon"
+    elif role == HEATER:
+        layers.pop(HEATER, None)
+        name = HEATER
     elif role == FILM:
         former = of_before.get("material", "")
         # a name of its own stays, one after what it was made of does not
-        is_own = was_layer and name not in BODIES and bool(former) == bool(material)
-        if not is_own or (former and name.startswith(former)):
-            name = _free(material or "heater", layers)
+        named = was_layer and name not in (*BODIES, HEATER)
+        if not (named and bool(former) == bool(material)) or (former and name.startswith(former)):
+            name = _free(material or "low-doped", layers)
     elif role:
         terminals[role if role in TERMINALS else name] = row.drawn
-    if role in ("body", FILM):
-        thickness = of_before.get("thickness_um") if role == FILM else None
-        entry = {"drawn": row.drawn, "material": material}
-        entry |= {} if thickness is None else {"thickness_um": thickness}
-        layers[name] = entry if material else row.drawn
+    if role in ("body", HEATER, FILM):
+        # a film stays one of another material; edges of a metal have no shift
+        stays = {"thickness_um": material and role != "body"}
+        stays[EDGE_BIAS] = of_before.get("material", "") == material
+        kept = {key: of_before[key] for key in stays if stays[key] and key in of_before}
+        entry = {"drawn": row.drawn, **({"material": material} if material else {}), **kept}
+        layers[name] = entry if len(entry) > 1 else row.drawn
     used = {layer.get("material") for layer in layers.values() if isinstance(layer, dict)}
     for unused in materials.keys() - used:
         del materials[unused]
-    if layers and all(isinstance(layer, dict) for layer in layers.values()):
+    if layers and all(isinstance(layer, dict) and "material" in layer for layer in layers.values()):
         changed.pop("material", None)
     return {name: section for name, section in changed.items() if section or name != "materials"}
 

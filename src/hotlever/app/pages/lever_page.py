@@ -28,6 +28,7 @@ from hotlever.app.pages.frame import (
 from hotlever.app.pages.task_page import JobView, TaskPage
 from hotlever.app.probe_fields import (
     FILM,
+    HEATER,
     TERMINALS,
     LayerRow,
     Place,
@@ -50,7 +51,7 @@ _SAVED = (
     "What is set is saved as a new file; comments of the file that was opened are not in it. Other "
     "pages take the lever as its file says."
 )
-_ROLES = {"": "not used", "body": "outline of the lever", FILM: "film or part"}
+_ROLES = {"": "not used", "body": "outline of the lever", HEATER: "heater", FILM: "film or part"}
 _ROLES |= {name: f"terminal: {name}" for name in TERMINALS}
 _SILICON = "silicon of [material]"
 _LAWS = (
@@ -73,7 +74,7 @@ class LeverPage(TaskPage):
         self._turn = 0
         self._opened_for: str | None = None
         self._held_for = ""
-        with two_columns() as (left, right):
+        with two_columns("live") as (left, right):
             with left:
                 drop_zone(session, banner, _DROP, self._dropped)
                 self.lever_choice()
@@ -88,18 +89,23 @@ class LeverPage(TaskPage):
                 self._picture = ui.column().classes("w-full gap-1")
                 self._holds = ui.expansion("What the drawing holds")
                 self._holds.set_visibility(False)
-                with ui.row().classes("items-center w-full"):
-                    self._name = ui.input("Save as", on_change=self.show_command)
-                    ui.button("Save", icon="save", on_click=self._save)
-                    for page, icon in _ON.items():
-                        go = ui.button(page.capitalize(), icon=icon)
-                        go.props("outline").on_click(partial(self._go_on, page))
-                    for suffix in FIGURE_FILES:
-                        flat_button(suffix[1:].upper(), partial(self._give, suffix))
-                caption(_SAVED)
-                self._edited = ui.label().classes("remark").props("role=status")
-                self.command()
+                with ui.column().classes("w-full gap-3 last"):
+                    self._show_saving()
         self._offer_drawings()
+
+    def _show_saving(self) -> None:
+        """Ask what to save the probe as, where to go on with it, and what to have of it."""
+        with ui.row().classes("items-center w-full"):
+            self._name = ui.input("Save as", on_change=self.show_command)
+            ui.button("Save", icon="save", on_click=self._save)
+            for page, icon in _ON.items():
+                go = ui.button(page.capitalize(), icon=icon)
+                go.props("outline").on_click(partial(self._go_on, page))
+            for suffix in FIGURE_FILES:
+                flat_button(suffix[1:].upper(), partial(self._give, suffix))
+        caption(_SAVED)
+        self._edited = ui.label().classes("remark").props("role=status")
+        self.command()
 
     async def open(self) -> None:
         """Show the lever; the one of a drawing, if that was awaited and is there."""
@@ -144,7 +150,8 @@ class LeverPage(TaskPage):
         """Draw what is open, and show its fields; only what was asked for last counts."""
         self._turn += 1
         turn, drawn, sections = self._turn, None, self._sections
-        title, mesh = self._name.value or "lever", self.chosen["mesh"]
+        own = (self._name.value if self._is_edited else self.probe) or "lever"
+        title, mesh = own, self.chosen["mesh"]
         try:
             request = probe_fields.drawn, sections, title, mesh
             drawn = await self.session.ask("quick", *request)
@@ -346,7 +353,7 @@ class ProbeFields:
             made_of.classes("col min-w-36").props(f'aria-label="layer {row.label} is made of"')
             role_then = row.role or FILM
             made_of.on_value_change(lambda event: self._set_layer(row, role_then, event.value))
-            if row.role == FILM and row.material:
+            if row.role in (HEATER, FILM) and row.material:
                 thickness = self._sections["layers"][row.name].get("thickness_um")
                 key, words = "thickness_um", f"{row.label}: thickness (µm)"
                 shown = "" if thickness is None else f"{thickness:.12g}"
