@@ -85,7 +85,7 @@ def _read(page: Page) -> None:
 
 def _opened(page: Page, name: str) -> None:
     _choose(page, "Or open a result of the folder", name)
-    page.get_by_text("A result of the folder").wait_for(timeout=_WORK_MS)
+    page.get_by_text("A result of the folder, made").wait_for(timeout=_WORK_MS)
     stand_still(page, _ALL_MS)
 
 

@@ -117,6 +117,19 @@ def test_the_budget_after_the_gum_is_the_table_s_row_by_row(calibrated, tmp_path
         together = np.linalg.norm([parts[name] for name in names])
         of_table = hottest.budget_K.sel(source=source).item()
         assert together == pytest.approx(of_table, rel=1e-6)
+    # what was estimated, and the prior beside it
+    by_name = {row["quantity"]: row for row in rows}
+    for name in others:
+        use = calibrated.priors[name]
+        assert (by_name[name]["estimate"], by_name[name]["prior"]) == (
+            use.posterior_value,
+            use.value,
+        )
+    coefficients = calibrated.probe.values(DEPARTURES["kappa"].names)
+    at_1000_K = float(coefficients @ DEPARTURES["kappa"].modes(1000.0))
+    assert by_name["law.kappa"]["estimate"] == pytest.approx(at_1000_K)
+    assert by_name["law.kappa"]["prior"] == 0.0
+    assert by_name["model"]["prior"] is None
     for row in rows:
         assert abs(row["sensitivity"]) * row["u"] == pytest.approx(row["contribution_K"])
         assert (row["type"] == "A") == (row["quantity"] == "noise of current")

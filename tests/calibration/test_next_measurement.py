@@ -120,6 +120,10 @@ def test_spectra_at_one_bias_do_not_beat_the_scale_of_their_thermometer():
     common, then = THERMOMETER * (plan.at_K - 293.0), plan.proposals.stderr_then_K.values
     assert then[0] > 1.5 * common
     assert then[-1] == pytest.approx(common, rel=0.1)
+    assert "60 spectra at 6.400 V: no other measurement that is allowed tells more" in (
+        text := plan.text()
+    )
+    assert f"the last takes off {then[-2] - then[-1]:.1f} K." in text
 
 
 def test_no_meter_is_better_than_the_model(first):
@@ -161,7 +165,7 @@ def test_the_command_writes_a_row_for_each_proposal(run, first):
     words = ("cal.json", "--at", "500K", "--stay-below", "700K", "--allow", "bias=2,spectra=1")
     status, out, err = run("next", *words, "-o", "next.csv", "--plot", "next.png")
     assert (status, err) == (0, "")
-    assert "keeps the tip below 700 K with a certainty of 99%" in out
+    assert "the tip stays below 700 K, with a certainty of 99%" in out
     rows = list(csv.DictReader(Path("next.csv").read_text(encoding="utf-8").splitlines()))
     names = "what,bias_V,gain,tip_K,tip_high_K,stderr_now_K,stderr_then_K"
     assert list(rows[0]) == names.split(",")

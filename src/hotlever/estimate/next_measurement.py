@@ -500,23 +500,39 @@ class Plan:
             f"The tip at {self.at_K:.0f} K is known to ± "
             f"{self.proposals.stderr_now_K.values[0]:.1f} K now (standard error)."
         )
-        return "\n".join([now, "", *aligned([head, *rows], right=True), "", self._safety])
+        after = [*self._repeated, self._safety]
+        return "\n".join([now, "", *aligned([head, *rows], right=True), "", *after])
+
+    @property
+    def _repeated(self) -> list[str]:
+        """Why some are proposed several times, and what the last of them brings, in words."""
+        rows = self.proposals.to_dataframe()
+        before = np.append(rows.stderr_now_K.to_numpy()[:1], rows.stderr_then_K.to_numpy()[:-1])
+        rows = rows.assign(brings_K=before - rows.stderr_then_K.to_numpy())
+        return [
+            f"{len(same)} {what} at {bias:.3f} V: no other measurement that is allowed tells more "
+            f"of the tip at {self.at_K:.0f} K. Each lessens the noise of the mean, but not what "
+            f"all {what} have wrong in common; the last takes off "
+            f"{same.brings_K.iloc[-1]:.1f} K."
+            for (what, bias), same in rows.groupby(["what", "bias_V"], sort=False)
+            if len(same) > 1
+        ]
 
     @property
     def _safety(self) -> str:
         """How far the bias may go now, and will be allowed to go then, in words."""
         limit = (
-            "leaves all below melting"
+            "nothing melts"
             if self.stay_below_K is None
-            else f"keeps the tip below {self.stay_below_K:.0f} K"
+            else f"the tip stays below {self.stay_below_K:.0f} K"
         )
-        text = f"A bias of up to {self.safe_V:.3g} V {limit} with a certainty of {SURE:.0%}"
+        text = f"Up to {self.safe_V:.3g} V {limit}, with a certainty of {SURE:.0%}."
         then = f"{self.safe_then_V:.3g} V"
         if then == f"{self.safe_V:.3g} V":
-            return f"{text}."
+            return text
         return (
-            f"{text}; after these measurements probably one of up to {then}: "
-            "calibrate and ask again before going there."
+            f"{text} After these measurements that is probably so up to {then}: calibrate and ask "
+            "again before you go there."
         )
 
 

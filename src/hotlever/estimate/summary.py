@@ -11,9 +11,10 @@ import xarray as xr
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.tip_table import BUDGETS, PulseCalibration, budgets_of
 from hotlever.estimate.uncertainty_budget import TemperatureBudget
-from hotlever.materials.parameters import scale_of, scaled_unit
+from hotlever.materials.parameters import own_name, scale_of, scaled_unit
 from hotlever.probe.priors import PriorUse
 from hotlever.probe.probe_parameters import parameters_of
+from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.text import NOT_DETERMINED, aligned, significant, value_with_error
 from hotlever.types import Array
 
@@ -149,10 +150,9 @@ def calibration_parts(calibration: Estimate) -> Parts:
         if calibration.pulse is not None:
             tables.append((calibration.pulse.timing.text, _pulse_rows(calibration.pulse)))
         stated = significant(calibration.tip_temperature_uncertainty_K)
-        sure = f"sure to ± {stated} K (standard error, largest in the table)"
-        after.append(f"{sure}: {_verdict(calibration)}")
+        after.append(f"sure to ± {stated} K at worst (standard error), {_verdict(calibration)}")
         if calibration.gum is not None:
-            after.append(_budget_line(calibration.gum))
+            after += _budget_lines(calibration.gum)
     else:
         knee = [f"its knee: {_knee_point(calibration)}"] if calibration.knee.measured else []
         before = [calibration.doubt, f"{NEAREST}; it is {basis}", *knee]
@@ -172,14 +172,15 @@ def calibration_text(calibration: Estimate) -> str:
     return "\n".join([*lines, *([""] if parts.tables else []), *parts.after])
 
 
-def _budget_line(stated: TemperatureBudget) -> str:
-    """Return what the uncertainty budget comes to."""
+def _budget_lines(stated: TemperatureBudget) -> list[str]:
+    """Return what the uncertainty budget comes to, and whether it holds."""
     away = significant(stated.budget.expanded())
     linear = linear_words(stated)
-    return (
-        f"uncertainty budget, {stated.measurand}: {stated.estimate_K:.0f} K ± "
-        f"{away} K (95 %, k = {stated.budget.coverage_factor():.2f})" + (linear and f"; {linear}")
-    )
+    return [
+        f"{stated.measurand}: {stated.estimate_K:.0f} K ± {away} K with 95 %, by its uncertainty "
+        f"budget (k = {stated.budget.coverage_factor():.2f})",
+        *([f"this budget is {linear}"] if linear else []),
+    ]
 
 
 def linear_words(stated: TemperatureBudget) -> str:
@@ -305,8 +306,13 @@ def _verdict(calibration: Estimate) -> str:
     word = "good" if stated <= _GOOD else "fair" if stated <= _FAIR else "rough"
     budget = budgets_of(calibration.table)[BUDGETS[0]]
     largest = max(budget, key=lambda source: np.fmax.reduce(budget[source]))
-    text = f"{word}; mostly from {largest}"
+    text = f"which is {word}; most of it is from {largest}"
     by_law = calibration.route == "power law"
+    if largest == "geometry" and not calibration.probe.shape.outline_moves:
+        # of a drawing there is no share of all dimensions
+        edges = [f"{name}=±0.05" for name in calibration.priors if own_name(name) == EDGE_BIAS]
+        known = ", ".join([*edges, "thickness_um=±2%"])
+        return f"{text}: a better known drawing would help (--prior {known})"
     if largest in _ADVICE and not (by_law and largest == "constant k"):
         return f"{text}: {_ADVICE[largest]}"
     if by_law:

@@ -28,6 +28,7 @@ from hotlever.estimate.surrogate import Rows
 from hotlever.estimate.tip_table import BUDGETS, budgets_of
 from hotlever.materials.departures import DEPARTURES, departure_of
 from hotlever.materials.parameters import own_name
+from hotlever.probe.parts import ProbeParts
 from hotlever.probe.priors import SCALES
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import FITTED, OBSERVABLES
@@ -59,9 +60,10 @@ class InputQuantity:
     ----------
     quantity : str
     estimate : float
+        What was estimated.
     unit : str
     u : float
-        Standard uncertainty, in the unit.
+        Standard uncertainty, in the unit: of what was known beforehand, where that is stated.
     type : {"A", "B"}
         Evaluated from a series of observations, or by other means.
     distribution : str
@@ -70,6 +72,9 @@ class InputQuantity:
     dof : float
         Degrees of freedom; infinite (in files: none) if the uncertainty is taken as exact, NaN if
         it is not known how many it has.
+    prior : float, optional
+        What was known beforehand, in the unit; None of what has no such value, and in files of
+        version 3.0, in which it stands as the estimate.
     """
 
     quantity: str
@@ -80,6 +85,7 @@ class InputQuantity:
     distribution: str
     sensitivity: Number
     dof: _Dof = math.inf
+    prior: Number | None = None
 
     @property
     def contribution(self) -> float:
@@ -361,21 +367,34 @@ def budget_of_estimate(solution: Solution, row: xr.Dataset, of: BudgetOf) -> Tem
     by_fit = contributions.pop(_FIT, None)
     for law, parts in _by_law(contributions).items():
         # a row for a law, whatever its coefficients are called
-        spread = DEPARTURES[own_name(law)].spread_hot * priors[next(iter(parts))].spread
+        departure, start = DEPARTURES[own_name(law)], law.removesuffix(own_name(law))
+        spread = departure.spread_hot * priors[next(iter(parts))].spread
         sensitivity = float(np.linalg.norm([*parts.values()])) / spread
-        rows.append(InputQuantity(f"law.{law}", 0.0, "1", spread, "B", "normal", sensitivity))
+        found = departure.hot(
+            solution.probe.values([start + own for own in departure.names]).tolist()
+        )
+        rows.append(
+            InputQuantity(f"law.{law}", found, "1", spread, "B", "normal", sensitivity, prior=0.0)
+        )
     for name, by in contributions.items():
         use = priors[name]
         sensitivity = by.item() / use.spread
         rows.append(
             InputQuantity(
-                name, use.value, units[name], use.spread, "B", use.distribution, sensitivity
+                quantity=name,
+                estimate=use.posterior_value,
+                unit=units[name],
+                u=use.spread,
+                type="B",
+                distribution=use.distribution,
+                sensitivity=sensitivity,
+                prior=use.value,
             )
         )
     rows += [correction(name, error) for name, error in model.items()]
     correlation = None
     if by_fit is not None:
-        of_fit, among = _rows_of_fit(objective.prior, by_fit, units)
+        of_fit, among = _rows_of_fit(solution.probe, objective.prior, by_fit, units)
         correlation = np.eye(len(rows) + len(of_fit))
         correlation[len(rows) :, len(rows) :] = among
         rows += of_fit
@@ -417,7 +436,7 @@ def _by_law(contributions: dict[str, Array]) -> dict[str, dict[str, float]]:
 
 
 def _rows_of_fit(
-    prior: PriorDensity, by_fit: Array, units: Mapping[str, str]
+    probe: ProbeParts, prior: PriorDensity, by_fit: Array, units: Mapping[str, str]
 ) -> tuple[list[InputQuantity], Array]:
     """Return the parameters that a fit to other data has left as rows, and their correlation.
 
@@ -432,10 +451,13 @@ def _rows_of_fit(
     names = [prior.names[number] for number in numbers]
     distributions = np.where(relative, "log-normal", "normal").tolist()
     errors, sensitivities = (spread * unit).tolist(), (by_fit @ whitening / unit).tolist()
-    columns = zip(names, values.tolist(), errors, distributions, sensitivities, strict=True)
+    found = probe.values(names).tolist()
+    columns = zip(names, found, errors, distributions, sensitivities, values.tolist(), strict=True)
     rows = [
-        InputQuantity(f"{name} of the fit", value, units[name], u, "B", distribution, sensitivity)
-        for name, value, u, distribution, sensitivity in columns
+        InputQuantity(
+            f"{name} of the fit", value, units[name], u, "B", distribution, sensitivity, prior=known
+        )
+        for name, value, u, distribution, sensitivity, known in columns
     ]
     return rows, covariance / np.outer(spread, spread)
 

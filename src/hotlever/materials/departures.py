@@ -70,6 +70,10 @@ class Departure:
         """The names of its coefficients."""
         return tuple(f"{self.law}_{number + 1}" for number in range(self.count))
 
+    def hot(self, coefficients: Sequence[float]) -> float:
+        """Return the departure of some coefficients, at 1000 K if it depends on temperature."""
+        return float(self.spread_hot * sum(coefficients))
+
 
 @dataclass(frozen=True)
 class SmoothFactor(Departure):
@@ -98,6 +102,10 @@ class SmoothFactor(Departure):
     def modes(self, T: ArrayLike) -> Array:
         """Return the modes at temperatures (K), (modes, ...): the derivatives of δ."""
         return np.asarray(chebyshev.chebval(_position(np.asarray(T, dtype=float)), self._modes.T))
+
+    def hot(self, coefficients: Sequence[float]) -> float:
+        """Return δ at 1000 K."""
+        return float(np.asarray(coefficients) @ self.modes(HOT_K))
 
     def departed(self, T: Array, coefficients: Sequence[float]) -> tuple[Array, Array]:
         """Return exp(δ) at temperatures (K), and the derivative of δ by the temperature."""

@@ -35,7 +35,7 @@ _POINTS = 110
 _ROWS = 15
 #: Rows of an uncertainty budget that the page of a calibration shows, the others together.
 _CONTRIBUTIONS = 10
-_HEAD = ["quantity", "estimate", "u", "type", "distribution", "sensitivity", "in K", "dof"]
+_HEAD = ["quantity", "estimate", "prior", "u", "type", "distribution", "sensitivity", "in K", "dof"]
 
 
 def estimate_page(
@@ -264,8 +264,10 @@ def budget_page(calibration: Estimate) -> Page:
         _add_row_correlation(page, budget, budget.correlation)
     page.text(
         "Evaluated after the GUM (JCGM 100:2008), linearised, and checked after JCGM 101:2008. "
-        "Sensitivities are in K per unit of the quantity; u of an infinite number of degrees of "
-        "freedom is taken as exact. No traceability to standards and no accreditation is claimed."
+        "Prior is what was known beforehand of a quantity, with the standard uncertainty u, and "
+        "estimate what was found. Sensitivities are in K per unit of the quantity; u of an "
+        "infinite number of degrees of freedom is taken as exact. No traceability to standards and "
+        "no accreditation is claimed."
     )
     return page
 
@@ -298,7 +300,7 @@ def _add_rows(page: Page, budget: Budget, caption: str = "", most: int | None = 
     cells = [_cells(row) for row in budget.inputs[:most]]
     rest = budget.part(np.arange(len(cells), len(budget.inputs)))
     if rest.inputs:
-        cells.append([f"{len(rest.inputs)} more, together", *[""] * 5, f"{rest.u:.1f}", ""])
+        cells.append([f"{len(rest.inputs)} more, together", *[""] * 6, f"{rest.u:.1f}", ""])
     columns = len(_HEAD) if budget.correlation is None else -1
     page.table(_HEAD[:columns], [row[:columns] for row in cells], caption)
 
@@ -307,6 +309,7 @@ def _cells(row: InputQuantity) -> list[str]:
     return [
         row.quantity,
         with_unit(f"{row.estimate:.4g}", row.unit),
+        "" if row.prior is None else with_unit(f"{row.prior:.4g}", row.unit),
         with_unit(significant(row.u), row.unit),
         row.type,
         row.distribution,
