@@ -202,7 +202,7 @@ def test_each_drawing_has_a_probe_file_and_a_picture_of_its_own(
         assert (tmp_path / "own.toml").read_text() == edited
         # a plate: no heater, no terminals
         await drop(user, "plate.gds", drawing_of((1, 0, 0, 50, 10)))
-        await until(lambda: "plate-2.toml" in text_of(user, "role=alert"))
+        await until(lambda: "plate.toml" in text_of(user, "role=alert"))
         assert "The lever from above: regions, terminals and tip" not in images(user)
         assert not all_of(user, ui.table)
         # one that cannot be read leaves the lever as it is
