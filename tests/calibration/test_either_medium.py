@@ -138,7 +138,7 @@ def test_what_cannot_be_solved_is_said():
     failure = ComputationError("it melts")
     answer = likelier({"vacuum": failure, "air": ("", 1.0)})
     assert answer.medium == "air"
-    assert answer.notes[0].endswith("in vacuum none can be solved: it melts")
+    assert answer.notes[0].endswith("in vacuum there is none: it melts")
     with pytest.raises(ComputationError, match="it melts"):
         likelier({"vacuum": failure, "air": failure})
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from documents import EXAMPLES
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, calibrate, estimator
 from hotlever.estimate.calibration import what_data_lack
@@ -19,6 +20,7 @@ from hotlever.estimate.problem import Problem
 from hotlever.estimate.verdict import check_plausible
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
+from hotlever.measurement import read_measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
 from synthetic_curves import measured_curve, measurement_of
@@ -137,6 +139,14 @@ def test_another_lever_is_asked_for_before_one_is_searched_for(long_u_shape, mon
     asked = "no lever like the probe shows such currents: is the drawing that of another lever, u-"
     with pytest.raises(InputError, match=asked):
         calibrate(long_u_shape, probe=Probe.reference())
+
+
+def test_a_lever_that_nothing_known_explains_is_no_search_either(monkeypatch):
+    """A real curve of 120 µm in air, taken for the reference probe: 40 s, and no cause named."""
+    monkeypatch.setattr(estimator, "solve", lambda *_: pytest.fail("a search"))
+    data = read_measurement(EXAMPLES / "uiuc-lever.csv")
+    with pytest.raises(InputError, match="such currents: is it another lever, or in another med"):
+        calibrate(data, probe=Probe.reference())
 
 
 def test_no_right_lever_is_taken_for_another(curve, long_u_shape):

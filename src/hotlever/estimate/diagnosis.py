@@ -66,6 +66,9 @@ _BETTER, _EACH, _ALTOGETHER = 0.5, 2.0, 10.0
 #: Data that leave so many times that, with all that is known of a lever, are those of another: of
 #: right levers of which little is known the farthest left twice.
 _ANOTHER = 4.0
+_ANOTHER_LEVER = (
+    "is it another lever, or in another medium, or known less well than its priors say?"
+)
 #: Hypotheses within a factor or a difference of the best are as likely; so many are named.
 _AS_LIKELY, _AS_LIKELY_BY, _CAUSES_NAMED = 1.3, 4.0, 2
 #: The most promising are solved anew where they lead.
@@ -287,18 +290,22 @@ class Diagnosis:
         return self._questions(sorted(map(self._again, explanations[:_AGAIN]), key=_squares))
 
     def of_another_lever(self) -> str:
-        """Return questions if no lever like the probe is near the data, but one of another drawing.
+        """Return a question if no lever like the probe is near the data; empty otherwise.
 
-        Asked before a lever is searched for, since it takes a second or two. What else makes
-        resistances and powers those of another lever is asked with it, if it explains them as well.
+        Asked before a lever is searched for, since it takes a second or two. Another drawing comes
+        first, with what else makes resistances and powers those of another lever, if it explains
+        them as well; then what may be behind data in general.
         """
-        if not self._probe.circuit.starts_cold or self._is_near(self._as_stated):
+        near = (self._as_stated, self._without)
+        if not self._probe.circuit.starts_cold or any(map(self._is_near, near)):
             return ""
         drawing, *others = of_another_lever(self._rows, self._probe, self._curve.names)
-        explanations = [] if self._is_near(self._without) else self._searched([drawing])
-        if not explanations or not self._explains(explanations[0]):
-            return ""
-        return self._questions(sorted(explanations + self._searched(others), key=_squares))
+        explanations = self._searched([drawing])
+        if explanations and self._explains(explanations[0]):
+            explanations += self._searched(others)
+            if question := self._questions(sorted(explanations, key=_squares)):
+                return question
+        return self.likeliest() or _ANOTHER_LEVER
 
     def _searched(self, hypotheses: Sequence[Hypothesis]) -> list[_Explanation]:
         """Return where searches with hypotheses end, the likeliest first."""

@@ -15,7 +15,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.diagnosis import Diagnosis, outlier_notes
 from hotlever.estimate.estimate import Estimate, read_fit
@@ -34,7 +34,7 @@ from hotlever.estimate.tip_temperature import (
     limits_of_range,
 )
 from hotlever.estimate.uncertainty_budget import limits_of
-from hotlever.estimate.verdict import check_drawing, check_plausible, no_ramp, verdict_on
+from hotlever.estimate.verdict import check_plausible, check_similar, no_ramp, verdict_on
 from hotlever.measurement import Measurement, given_measurement, with_measured_circuit
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
@@ -196,7 +196,7 @@ def calibrate(
         check_plausible(problem, causes)
         check_in_range(options.at_V, *limits_of_range(problem.measurement, problem.probe))
         if fit is None:
-            check_drawing(problem, causes)
+            check_similar(problem, causes)
         try:
             if fit is None:
                 solution = solve(problem, progress)
@@ -336,17 +336,17 @@ def in_medium(
 
     Raises
     ------
-    ComputationError
-        If the lever can be solved in none of them.
+    InputError, ComputationError
+        If there is no such lever in any of them.
     """
     if requested_medium != UNKNOWN_MEDIUM:
         return answered(requested_medium)
     answers: dict[str, tuple[Solution, Estimate]] = {}
-    failures: dict[str, ComputationError] = {}
+    failures: dict[str, HotleverError] = {}
     for medium in get_args(Medium):
         try:
             answers[medium] = answered(medium)
-        except ComputationError as error:
+        except (InputError, ComputationError) as error:
             failures[medium] = error
     if not answers:
         raise next(iter(failures.values()))
@@ -358,7 +358,7 @@ def in_medium(
 
     best, *rest = sorted(answers, key=unlikeliness)
     texts = [f"in {medium} a lever {_how_well(*answers[medium])}" for medium in (best, *rest)]
-    texts += [f"in {medium} none can be solved: {error}" for medium, error in failures.items()]
+    texts += [f"in {medium} there is none: {error}" for medium, error in failures.items()]
     note = f"the medium is not known: {'; '.join(texts)}"
     solution, answer = answers[best]
     for other in (answers[medium][1] for medium in rest if not answers[medium][1].reason):

@@ -109,13 +109,13 @@ def check_plausible(problem: Problem, causes: Diagnosis) -> None:
     )
 
 
-def check_drawing(problem: Problem, causes: Diagnosis) -> None:
-    """Refuse data that no lever like the probe is near to, but one of another drawing.
+def check_similar(problem: Problem, causes: Diagnosis) -> None:
+    """Refuse data that no lever like the probe is near to.
 
     Raises
     ------
     InputError
-        Asking for that drawing, and for what else it may be.
+        Asking for what may be behind it: another drawing first.
     """
     if cause := causes.of_another_lever():
         where = problem.measurement.path or "measurement"
