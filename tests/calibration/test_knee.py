@@ -34,7 +34,7 @@ def test_noisy_knees_scatter_as_stated(reference, lever_3):
     """40 points with 0.2 % noise; the curve is smoothed with the help of another lever."""
     rng = np.random.default_rng(1)
     true = reference.knee
-    knees = [find_knee(measured_curve(reference, rng), lever_3) for _ in range(40)]
+    knees = [find_knee(measured_curve(reference, rng), lever_3) for _ in range(25)]
     error = np.array([knee.power_mW / true.power_mW - 1 for knee in knees])
     assert np.sqrt(np.mean(error**2)) < 0.008
     assert np.quantile(np.abs(error), 0.95) < 0.015
@@ -46,9 +46,9 @@ def test_noisy_knees_scatter_as_stated(reference, lever_3):
                 for knee in knees
             ]
         )
-        # 40 trials: two standard deviations of the counts are 15 and 7 %
-        assert 0.52 < np.mean(np.abs(pull) < 1.0) < 0.86, name
-        assert np.mean(np.abs(pull) < 1.96) > 0.87, name
+        # 25 trials: two standard deviations of the counts are 19 and 9 %
+        assert 0.49 < np.mean(np.abs(pull) < 1.0) < 0.88, name
+        assert np.mean(np.abs(pull) < 1.96) > 0.85, name
     assert np.median([knee.current_noise for knee in knees]) == pytest.approx(0.002, rel=0.2)
 
 

@@ -187,7 +187,7 @@ def write_many_times(arguments):
 def test_two_processes_may_write_the_same_file(coarse, reduced, tmp_path):
     store_arrays(tmp_path / "one.npz", reduced.arrays())
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        assert all(pool.map(write_many_times, [(tmp_path, 20)] * 2))
+        assert all(pool.map(write_many_times, [(tmp_path, 8)] * 2))
     domain = ParameterDomain.of(coarse.probe)
     loaded = stored(
         tmp_path / "one.npz",
