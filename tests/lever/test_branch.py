@@ -92,18 +92,6 @@ def test_the_curve_converges_with_the_spacing_of_the_states(coarse):
     assert away.max() < 3e-3
 
 
-def test_fields_between_states_nearly_solve_the_equations(coarse):
-    branch = coarse.branch(1000.0)
-    u = 0.5 * (branch.u[2:-1] + branch.u[3:])
-    x = branch.states(u)
-    rest = branch.equations.balance(x)
-    rest[-1] = 0.0
-    away = branch.equations.factorised(x).solve(rest, np.arange(u.size))
-    hot = branch.equations.space.is_temperature
-    assert np.abs(away[hot]).max() < 0.1
-    assert np.abs(away[~hot]).max() < 1e-3
-
-
 def test_power_and_temperature_are_inverse(reference):
     tip = np.array([293.5, 400.0, 700.0, 899.0, 950.0, 1200.0])
     np.testing.assert_allclose(reference.tip_temperature(reference.power(tip)), tip, atol=0.02)
@@ -192,31 +180,14 @@ def test_what_was_reached_before_a_failure_is_kept(coarse, monkeypatch):
     assert read.value.partial.bias_V.values.tolist() == [1.0, 4.0]
 
 
-def test_the_end_with_no_resistance_is_the_limit_of_small_ones(coarse):
-    ends = []
-    for ohm in (0.0, 100.0, 200.0):
-        with pytest.raises(BranchEndError) as caught:
-            with_series(coarse, ohm).sweep([6.0])
-        ends.append(caught.value.bias_reached)
-    assert ends[1] - ends[0] == pytest.approx(ends[2] - ends[1], rel=0.05)
-
-
-def test_a_large_resistor_makes_the_lever_jump_and_the_sweep_says_so(coarse):
-    lever = with_series(coarse, 30000.0)
-    sweep = lever.sweep(np.linspace(25, 36, 23))
-    assert "jumps from a tip at" in sweep.attrs["notes"]
-    rise = np.diff(sweep.tip_K)
-    assert rise.max() > 80  # the jump
-    assert (rise > 0).all()
-    np.testing.assert_allclose(sweep.lever_V + 30.0 * sweep.current_mA, sweep.bias_V, rtol=1e-9)
-
-
 def test_a_lever_that_jumps_goes_back_another_way(coarse):
     lever = with_series(coarse, 30000.0)
     sweep = lever.sweep(np.linspace(25, 36, 23), and_back=True)
+    assert "jumps from a tip at" in sweep.attrs["notes"]
     up, down = (sweep.isel(bias=(sweep.ramp == way).values) for way in ("up", "down"))
     assert up.bias_V.values.tolist() == np.linspace(25, 36, 23).tolist()
     assert down.bias_V.values.tolist() == np.linspace(25, 36, 23)[-2::-1].tolist()
+    assert np.diff(up.tip_K).max() > 80  # the jump
     warmer = down.tip_K.values[::-1] - up.tip_K.values[:-1]
     assert warmer.max() > 200  # between the jumps
     assert (warmer > -1e-9).all()
