@@ -217,16 +217,15 @@ class _CondensedFactors:
         inner: Index,
         outer: Index,
     ) -> None:
-        self._factors, self._by_rows, self._by_columns = factors, by_rows, by_columns
-        self._inner, self._outer = inner, outer
+        self._factors, self._inner, self._outer = factors, inner, outer
+        # before and after the factors; in air there are many right-hand sides one by one
+        self._around = {False: (by_columns.T, by_rows), True: (by_rows.T, by_columns)}
 
     def solve(self, right_hand_side: Array, transposed: bool = False) -> Array:
         """See `LinearSolver`."""
-        before, after = self._by_columns, self._by_rows
-        if transposed:
-            before, after = after, before
+        before, after = self._around[transposed]
         inner, outer = self._inner, self._outer
-        solution = right_hand_side - before.T @ right_hand_side[inner]
+        solution = right_hand_side - before @ right_hand_side[inner]
         solution[outer] = self._factors.solve(solution[outer], transposed)
         solution[inner] = right_hand_side[inner]
         solution[inner] = -(after @ solution)
