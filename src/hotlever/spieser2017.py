@@ -22,6 +22,8 @@ DOI = "10.1063/1.4981883"
 NOMINAL_DOPING = 3.3e17
 #: The ramp of the bias (V).
 RAMP = np.linspace(1.0, 11.0, 25)
+#: Nominal thickness of the lever and length of its heater (µm).
+THICKNESS_UM, HEATER_LENGTH_UM = 0.4, 4.0
 #: Temperature of the leg ends, and room temperature of the thermometer (K).
 BASE_TEMPERATURE_K = 293.0
 #: Annealing that makes the diffusion length: temperature (K) and time (s).
@@ -43,6 +45,15 @@ POWER_LAW = {
 }
 #: How closely T_tip is said to follow it (K), in vacuum and, with P/k, in air.
 POWER_LAW_SPREAD_K = 25.0
+#: Power at the hottest tip (mW).
+HOTTEST_MW = 4.0
+#: What the resistance of the legs adds to the temperature of the knee (K).
+KNEE_BY_LEGS_K = 15.0
+#: Tip temperatures (K) up to which the heater's resistance is the larger one, and from which on
+#: that of the legs is (Fig. 5).
+HEATER_PREVAILS_K, LEGS_PREVAIL_K = 1200.0, 1300.0
+#: Radius (µm) of the sphere of air around the lever.
+SPHERE_UM = 60.0
 #: Power in air over the power in vacuum at the same tip temperature.
 K_IN_AIR = 1.29
 
@@ -131,6 +142,11 @@ OPERATING_POINTS = (
     PublishedPoint("knee", 3.06, 0.93, 893.0),
     PublishedPoint("hot", 2.74, 1.43),
 )
+#: How closely the current is described by every option (share), Section IV.
+CURRENT_ERROR = 0.02
+#: How far the tip temperature is off above `MISPREDICTED_FROM_K` where the current alone is fitted
+#: (K, at most), and up to where it is described by current and reader voltage (K).
+MISPREDICTED_K, MISPREDICTED_FROM_K, DESCRIBED_TO_K = 100.0, 850.0, 1100.0
 #: Tip temperature of the simulated knee (K).
 [KNEE_PREDICTED_K] = [point.tip_K for point in OPERATING_POINTS if point.tip_K is not None]
 #: How far the measured knee lies above the predicted one (K).

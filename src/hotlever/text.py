@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 #: What is written of a quantity whose error says that it may be anything.
 NOT_DETERMINED = "not determined"
@@ -98,6 +98,18 @@ def significant(value: float) -> str:
     if value and not _WITHOUT_POWER[0] <= abs(float(rounded)) < _WITHOUT_POWER[1]:
         return f"{mantissa}e{int(power)}"
     return f"{value:.{max(0, 1 - int(power))}f}"
+
+
+def listed(words: Iterable[object]) -> str:
+    """Return words with commas and an "and".
+
+    Examples
+    --------
+    >>> listed(["a", "b", "c"]), listed(["a"])
+    ('a, b and c', 'a')
+    """
+    *first, last = map(str, words)
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def with_unit(text: str, unit: str) -> str:

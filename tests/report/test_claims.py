@@ -33,12 +33,12 @@ def test_lines_above_the_knee_are_judged_by_the_paper_s_spread(quick_page, monke
     assert kinds(quick_page)[:2] == ["figure", "text"]
     straight, proportional = quick_page.claims
     assert straight[2].startswith("holds within")
-    assert proportional[2].startswith("does not hold here")
+    assert proportional[2].startswith("does not hold, because")
 
 
-@pytest.mark.parametrize(("scatter", "verdict"), [(0.02, "holds"), (0.3, "does not hold here")])
+@pytest.mark.parametrize(("scatter", "verdict"), [(0.02, "holds"), (0.3, "does not hold, because")])
 def test_parameters_are_judged_apart_from_the_doping(page, monkeypatch, scatter, verdict):
-    def made_up(probe, geometries, errors, progress):
+    def made_up(probe, geometries, errors):
         value = np.ones((len(errors), 2, len(geometries), len(PARAMETERS)))
         value[errors.index("all"), :, 0, 1] += scatter
         value[errors.index("mobility"), :, :, 3] += 0.04
@@ -73,11 +73,11 @@ def test_k_with_a_surface_is_judged_by_what_the_best_one_leaves(quick_page, monk
     air.one_sided_section(quick_page)
     assert set(kinds(quick_page)) == {"figure", "table", "text"}
     [claim] = quick_page.claims
-    assert claim[2].startswith("does not hold here")
+    assert claim[2].startswith("does not hold, because")
     assert "most at 1 µm" in claim[3]
 
 
 def test_radiation_is_judged_by_all_of_the_lever(page):
     claims.radiation_section(page)
     [claim] = page.claims
-    assert claim[2].startswith("does not hold here, because 1.1 µW is what the heater's faces")
+    assert claim[2].startswith("does not hold, because 1.1 µW is what the heater's faces")

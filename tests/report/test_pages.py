@@ -52,13 +52,9 @@ def judged(monkeypatch):
 
 @pytest.mark.parametrize(("quick", "count"), [(False, 12), (True, 2)])
 def test_levers_never_seen_are_made_with_both_laws_and_counted(coarse, judged, quick, count):
-    progress = []
-    page = Findings(
-        coarse, quick=quick, progress=lambda done, total: progress.append((done, total))
-    )
+    page = Findings(coarse, quick=quick)
     inference.levers_section(page)
     assert judged == [(n, law) for law in (False, True) for n in range(count)]
-    assert progress[-1] == (2 * count, 2 * count)
     why, same_law, other_law = (one["text"] for one in page.blocks if one["kind"] == "text")
     assert f"{count} levers" in why
     assert "With the mobility of Eq. 8" in same_law

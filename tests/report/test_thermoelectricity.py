@@ -53,15 +53,16 @@ def verdicts(coarse, monkeypatch):
 
 
 def test_shift_and_direction_are_judged_apart(verdicts):
-    (_, _, size, found), (_, _, direction, _) = verdicts(-100.0)
+    (_, _, size, found, layouts), (_, _, direction, *_) = verdicts(-100.0)
     assert size == "holds"
     assert found.startswith("by up to 100 nm")
+    assert layouts.endswith(" nm")
     assert "along the electrons" in direction
     # where the strip turns
     assert "hotter than 825 K" in direction
-    (_, _, size, _), (_, _, direction, found) = verdicts(600.0)
-    assert size.startswith("does not hold here")
-    assert direction == "holds"
+    (_, _, size, *_), (_, _, direction, found, _) = verdicts(600.0)
+    assert size.startswith("holds; not for the reference probe, because")
+    assert direction == "does not hold; for the reference probe it holds"
     assert found == "+600 to +600 nm, of which Thomson heat is +60 nm at most"
 
 

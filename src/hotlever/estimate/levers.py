@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.tip_table import STATED, interpolated
 from hotlever.materials.parameters import INVERSION, heading, is_of_material, parameter_named
 from hotlever.quantities import QUANTITIES
-from hotlever.text import aligned, value_with_error
+from hotlever.text import aligned, listed, value_with_error
 
 #: Rows of a table for people that are of all levers: mean, scatter twice, Birge ratio.
 _OF_ALL = 4
@@ -114,7 +114,7 @@ def compare_levers(estimates: Mapping[str, Estimate], at: Setting | None = None)
     names = list(next(iter(quantities.values()), ()))
     for lever, own in quantities.items():
         if missing := [name for name in names if name not in own]:
-            words = _listed([_compared(name).words for name in missing])
+            words = listed([_compared(name).words for name in missing])
             raise InputError(
                 f"{lever}: {words} is missing, expected a lever of the same materials as "
                 f"{next(iter(estimates))}"
@@ -285,7 +285,7 @@ def statements(levers: xr.Dataset) -> list[str]:
     alike = levers.words.values[chi_square <= limit]
     if alike.size:
         texts.append(
-            f"the scatter of {_listed(alike)} between the levers is no larger than the standard "
+            f"the scatter of {listed(alike)} between the levers is no larger than the standard "
             "errors explain"
         )
     many = levers.isel(quantity=np.isfinite(chi_square) & (count >= _FEWEST))
@@ -306,15 +306,8 @@ def statements(levers: xr.Dataset) -> list[str]:
 def _by_lever(chosen: xr.DataArray) -> list[tuple[str, str]]:
     """Return the levers of which some quantities are chosen, with these in words."""
     return [
-        (str(row.lever.item()), _listed(row.words.values[row.values]))
-        for row in chosen
-        if row.any()
+        (str(row.lever.item()), listed(row.words.values[row.values])) for row in chosen if row.any()
     ]
-
-
-def _listed(words: Iterable[str]) -> str:
-    *first, last = map(str, words)
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def lever_rows(levers: xr.Dataset) -> list[list[str]]:

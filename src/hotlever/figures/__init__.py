@@ -19,7 +19,6 @@ from matplotlib.figure import Figure
 from hotlever.errors import InputError
 from hotlever.figures.claim_figures import (
     disc_between_planes,
-    knee_discrepancy,
     linear_branches,
     parameter_deviations,
     predicted_and_published,
@@ -40,6 +39,11 @@ from hotlever.figures.estimate_figures import (
     posterior_corner,
     profile_curves,
     tip_band,
+)
+from hotlever.figures.layout_figures import (
+    knee_carried,
+    layouts_by_length,
+    printed_statements,
 )
 from hotlever.figures.lever_figures import (
     doping_profile,

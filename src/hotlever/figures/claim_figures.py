@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 #: Marker of each shape, colour of each type of the heater.
 _BY_SHAPE, _BY_DOPANT = {"three-leg": "o", "u-shape": "s"}, {"n": BLUE, "p": VERMILION}
-#: Of the bars of each medium.
-_BY_MEDIUM = {"vacuum": BLUE, "air": ORANGE}
 #: Slopes (K/mW) that are marked, and ratios of published and predicted numbers.
 _SLOPES = (50, 100, 150, 200, 300, 400, 600, 800)
 _RATIOS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
@@ -176,33 +174,6 @@ def radiated_shares(levers: Mapping[str, xr.Dataset]) -> Figure:
             axes.set(xlabel=axis_label("tip_K"), yscale="log")
         share.set_ylim(top=10.0 * share.get_ylim()[1])  # for the legend
         share.legend(loc="upper left")
-    return fig
-
-
-def knee_discrepancy(studies: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw what each suspect carries of the knee's discrepancy, by medium.
-
-    Parameters
-    ----------
-    studies : mapping of str to xarray.Dataset
-        Of `hotlever.studies.knee_study.compare_suspects`, by medium.
-    """
-    first = next(iter(studies.values()))
-    names = [*map(str, first.suspect.values), "what remains"]
-    rows, height = np.arange(len(names)), 0.8 / len(studies)
-    with figure(7.4, 0.42 * len(names) + 1.0) as (fig, axes):
-        for number, (medium, study) in enumerate(studies.items()):
-            lengths = np.append(study.shift_K.values, study.left_K)
-            error = np.where(rows == rows[-1], study.total_stderr_K, np.nan)
-            offset = (number - (len(studies) - 1) / 2) * height
-            style: Any = {"color": _BY_MEDIUM[medium], "ecolor": BLACK, "capsize": 2}
-            axes.barh(rows + offset, lengths, height, xerr=error, label=f"in {medium}", **style)
-        axes.axvline(0.0, color=BLACK, lw=0.6)
-        axes.axvline(first.discrepancy_K, color=BLACK, lw=0.8, ls=":", label="in the paper")
-        axes.set_yticks(rows, names)
-        axes.invert_yaxis()
-        axes.set_xlabel("knee as read less that of the fitted model (K)")
-        axes.legend(loc="center right")
     return fig
 
 

@@ -7,11 +7,13 @@ of the heater is as hot as the tip; and dV_l/dI_h = 0 is not dR_l/dT = 0, becaus
 voltage still rises where the resistance is highest.
 
 The paper fits a model to a lever and predicts the temperature at its knee; the measured one is 50 K
-higher. Each suspect is a lever that has one thing more than the model, measured as the paper did:
-currents, reader voltages and tip temperatures of a bias ramp. The model is fitted to that, and what
-the knee is read to be above what the fit predicts is what the suspect carries; beside it stands
-what it would carry were the model not fitted. What is not known moves a prediction either way: such
-uncertainties are standard deviations, added in quadrature.
+higher. Each suspect is a lever that has one thing more than the model, or another law, measured as
+the paper did: currents, reader voltages and tip temperatures of a bias ramp. The model is fitted to
+that, and what the knee is read to be above what the fit predicts is what the suspect carries;
+beside it stands what it would carry were the model not fitted, and what it carries where both knees
+are read off the ramp, at its highest V_l. A law is known to within a departure
+(`hotlever.materials.departures`), each coefficient of which is a suspect of the size of a standard
+deviation.
 
 Of a tip on the heater, which the paper suspects, three things are told apart: how it moves the knee
 of the same lever, how it moves the temperature at the same power, and by how much a tipless model
@@ -21,8 +23,9 @@ heater, and in air its surface gives heat to the air; what the latter does by it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -33,13 +36,19 @@ from hotlever import spieser2017 as paper
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError
 from hotlever.estimate import Estimate, Measurement, fit
+from hotlever.estimate.options import FitOptions
+from hotlever.estimate.problem import Problem
+from hotlever.estimate.search import solve
 from hotlever.lever import Branch, Lever, OperatingPoint
 from hotlever.lever.lever import COARSE
-from hotlever.materials.silicon import inversion_temperature
+from hotlever.materials.departures import FACTORS, MODES_FROM, MODES_TO, departure_of
+from hotlever.materials.heat import thermal_conductivity
+from hotlever.materials.kinds import BY_THICKNESS
+from hotlever.materials.silicon import intrinsic_density, inversion_temperature
 from hotlever.probe import Probe, Tip
-from hotlever.probe.probe_parameters import nuisances, parameters_of
 from hotlever.raman.raman_calibration import published_raman_calibration
 from hotlever.steps import each
+from hotlever.studies.simulation_based_calibration import MinimosMaterial
 from hotlever.types import Array, Progress
 
 #: Diffusion length (µm) of a heater with uniform doping: far below the mesh size.
@@ -54,14 +63,29 @@ SIZES = ((0.5, 15.0), (0.5, 30.0), (0.7, 20.0), (1.0, 15.0), (1.0, 30.0))
 TALL = ((2.0, 15.0), (3.0, 10.0), (5.0, 8.0))
 #: A tip of the usual size of lithography probes.
 TIP = Tip(height_um=0.7, half_angle_deg=20.0)
+#: The row of the ramp with the highest V_l is no further from the knee (K).
+_NEAR_K = 150.0
 #: A change by which derivatives of the knee are differenced, in standard errors.
 _STEP = 0.5
 #: What is read by a line and is curved, what has a tip, and what counts beyond the paper.
 RAMAN, IN_VACUUM, IN_AIR = "curved Raman law", "tip", "tip with its surface in air"
 TOWARDS, AWAY = "thermoelectricity, current to the bridge", "thermoelectricity, current from it"
-RADIATION, TOGETHER = "radiation", "all together"
-SUSPECTS = (RAMAN, IN_VACUUM, IN_AIR, TOWARDS, AWAY, RADIATION, TOGETHER)
-LAYOUT, COVARIANCE = "layout", "covariance of the fit"
+RADIATION, CHIP_WARMS, TOGETHER = "radiation", "warm chip, 2 K/mW", "all together"
+#: Other laws: of films, by their thickness or with all that c_κ takes away scattered at surfaces,
+#: whatever the temperature; of carriers as they were measured, and as few as were calculated; and
+#: of their mobility.
+FILM, SURFACES = "κ of a film of this thickness", "κ with all of c_κ by surfaces"
+CARRIERS, FEW_CARRIERS = "carriers of Misiakos and Tsamakis", "0.6 of the carriers of Eq. 7"
+MOBILITY = "mobility of MINIMOS"
+OTHER_LAWS = (FILM, SURFACES, CARRIERS, FEW_CARRIERS, MOBILITY)
+SUSPECTS = (
+    *(RAMAN, *OTHER_LAWS, IN_VACUUM, IN_AIR, TOWARDS, AWAY, RADIATION, CHIP_WARMS),
+    TOGETHER,
+)
+#: What all together have of suspects that exclude each other.
+_IN_TOGETHER = (RAMAN, SURFACES, CARRIERS, MOBILITY, TOWARDS, RADIATION, CHIP_WARMS)
+#: A chip that is usual (K/mW), and what Barber calculated n_i to be at 700 K, over Eq. 7.
+_CHIP_K_PER_MW, _FEW = 2.0, 0.6
 
 
 def knee_of(branch: Branch, which: str = "the lever") -> OperatingPoint:
@@ -234,23 +258,88 @@ def read_by_the_line(tip_K: ArrayLike) -> Array:
     return np.asarray(law.linear.temperature(shift, law.room_temperature_K))
 
 
+def measured_carriers(T: ArrayLike) -> Array:
+    """Return n_i (cm⁻³): K. Misiakos and D. Tsamakis, J. Appl. Phys. 74, 3293 (1993)."""
+    temperature = np.asarray(T, dtype=float)
+    return np.asarray(5.29e19 * (temperature / 300.0) ** 2.54 * np.exp(-6726.0 / temperature))
+
+
+def _departed(probe: Probe, law: str, ratio: Callable[[Array], Array]) -> Probe:
+    """Return a probe one of whose laws is another, by the modes of its departure."""
+    factor, T = FACTORS[law], np.linspace(MODES_FROM, MODES_TO, 100)
+    coefficients = np.linalg.lstsq(factor.modes(T).T, np.log(ratio(T)), rcond=None)[0]
+    return probe.with_(**dict(zip(factor.names, coefficients.tolist(), strict=True)))
+
+
+def _more_carriers(T: Array) -> Array:
+    """Return n_i as measured over that of Eq. 7."""
+    return measured_carriers(T) / intrinsic_density(T, 0.0)[0]
+
+
+def scattered_at_surfaces(T: ArrayLike, c_kappa: float) -> Array:
+    """Return κ over c_κ κ_Si where surfaces add a resistivity that does not depend on T.
+
+    It is what c_κ adds at 300 K: M. Asheghi et al., J. Appl. Phys. 91, 5079 (2002).
+    """
+    bulk = thermal_conductivity(np.asarray(T, dtype=float))[0]
+    added = (1.0 / c_kappa - 1.0) / thermal_conductivity(np.array(MODES_FROM))[0]
+    return np.asarray(1.0 / (1.0 + added * bulk) / c_kappa)
+
+
 def suspect_lever(probe: Probe, suspect: str) -> tuple[Probe, bool]:
-    """Return a probe with what a suspect has beyond the paper's model, and if a line reads it."""
+    """Return a probe with what a suspect has beyond the paper's model, and if a line reads it.
+
+    The coefficient of a law's departure, by its name, is a suspect as well.
+    """
     everything = suspect == TOGETHER
+    has = set(_IN_TOGETHER) if everything else {suspect}
     if suspect == IN_VACUUM or everything:
         probe = probe.model_copy(update={"tip": TIP})
     if suspect == IN_AIR or (everything and probe.surroundings.medium == "air"):
         probe = probe.model_copy(update={"tip": TIP.with_(in_air=True)})
-    effects = ["thermoelectric"] if suspect in (TOWARDS, AWAY, TOGETHER) else []
-    effects += ["radiation"] if suspect in (RADIATION, TOGETHER) else []
-    return probe.with_physics(effects), suspect in (RAMAN, TOGETHER)
+    if FILM in has:
+        probe = probe.with_(c_kappa=BY_THICKNESS)
+    if SURFACES in has:
+        c_kappa = float(probe.values(["c_kappa"])[0])
+        probe = _departed(probe, "kappa", lambda T: scattered_at_surfaces(T, c_kappa))
+    if CARRIERS in has:
+        probe = _departed(probe, "n_i", _more_carriers)
+    if FEW_CARRIERS in has:
+        probe = probe.with_(intrinsic_scale=_FEW)
+    if CHIP_WARMS in has:
+        probe = probe.with_(chip_K_per_mW=_CHIP_K_PER_MW)
+    if departure_of(suspect) is not None:
+        probe = probe.with_(**{suspect: 1.0})
+    if MOBILITY in has:
+        probe = probe.with_material("material", MinimosMaterial)
+    effects = ["thermoelectric"] if has & {TOWARDS, AWAY} else []
+    effects += ["radiation"] if RADIATION in has else []
+    return probe.with_physics(effects), RAMAN in has
 
 
-def carried_by(probe: Probe, suspect: str, own_K: float | None = None) -> tuple[float, float]:
-    """Return how far the knee of a suspect's lever is read above two predictions (K).
+class Carried(NamedTuple):
+    """How far the knee of a suspect's lever is read above predictions (K).
 
-    That of the model with the lever's own parameters, which may be given where it is known, and
-    that of the model fitted to it.
+    Attributes
+    ----------
+    moved_K : float
+        That of the model with the lever's own parameters.
+    shift_K : float
+        That of the model fitted to it.
+    ramp_K : float
+        The latter where both knees are read off the paper's ramp, at its highest V_l.
+    fitted : Probe
+        That model.
+    """
+
+    moved_K: float
+    shift_K: float
+    ramp_K: float
+    fitted: Probe
+
+
+def carried_by(probe: Probe, suspect: str, own_K: float | None = None) -> Carried:
+    """Return what a suspect carries; the knee of the probe may be given where it is known.
 
     Raises
     ------
@@ -265,9 +354,44 @@ def carried_by(probe: Probe, suspect: str, own_K: float | None = None) -> tuple[
     if by_line:
         data = replace(data, tip_K=read_by_the_line(data.tip_K))
         apparent_K = float(read_by_the_line(apparent_K))
-    fitted = fit(data, probe).probe
+    # what describes the data badly is asked for all the same, and nobody asks why
+    fitted = solve(Problem.of(data, probe, FitOptions())).probe
+    model = Lever(fitted)
+    ramp_K = read_off_the_ramp(data) - read_off_the_ramp(Measurement.of_sweep(ramp_of(model, 1)))
     own_K = knee_K(probe) if own_K is None else own_K
-    return apparent_K - own_K, apparent_K - knee_K(fitted)
+    fitted_K = knee_of(model.branch(), "the fitted lever").tip_K
+    return Carried(apparent_K - own_K, apparent_K - fitted_K, ramp_K, fitted)
+
+
+def steps_at_the_knee(lever: Lever) -> dict[str, float]:
+    """Return how the paper's ramp shows a knee: its row of the highest V_l, and those beside it.
+
+    Returns
+    -------
+    dict of str to float
+        ``row_K``, the tip temperature of that row; ``up_K``, how much hotter the next one is; and
+        ``up_current``, by what share the current of either must be off for the next one to have
+        the highest V_l; ``down_K`` and ``down_current`` of the one before.
+    """
+    ramp = lever.sweep(paper.RAMP)
+    tip, lever_V, current = (ramp[name].values for name in ("tip_K", "lever_V", "current_mA"))
+    # from rows beyond the knee V_l may rise again
+    knee = lever.branch().knee
+    hottest = np.inf if knee is None else knee.tip_K + _NEAR_K
+    row = int(np.argmax(np.where(tip < hottest, lever_V, 0.0)))
+    steps = {"row_K": float(tip[row])}
+    for name, other in (("up", min(row + 1, tip.size - 1)), ("down", max(row - 1, 0))):
+        off_mA = (lever_V[row] - lever_V[other]) / lever.circuit.series_kohm
+        steps[f"{name}_K"] = float(tip[other] - tip[row])
+        steps[f"{name}_current"] = float(off_mA / current[other])
+    return steps
+
+
+def read_off_the_ramp(data: Measurement) -> float:
+    """Return the tip temperature (K) of the row with the highest V_l."""
+    assert data.current_mA is not None
+    kohm = (data.series_resistance_ohm or 0.0) / 1000.0
+    return float(data.tip_K[np.argmax(data.bias_V - kohm * data.current_mA)])
 
 
 def ramp_of(lever: Lever, polarity: int) -> xr.Dataset:
@@ -308,20 +432,6 @@ def described_without(probe: Probe) -> xr.Dataset:
     return labelled(columns, "polarity", {"polarity": list(polarities)})
 
 
-def by_layout(probe: Probe, progress: Progress | None = None) -> float:
-    """Return the standard deviation (K) of what a fit predicts, by dimensions that are not known.
-
-    Each is off by the standard deviation of its usual prior in the model that is fitted.
-    """
-    data, true, off = Measurement.of_sweep(Lever(probe).sweep(paper.RAMP)), knee_K(probe), []
-    parameters = parameters_of(probe)
-    for name in each(nuisances(probe), progress):
-        value, spread = float(probe.values([name])[0]), parameters[name].spread or 0.0
-        perturbed_probe = probe.replace({name: value * (1.0 + spread)})
-        off.append(knee_K(fit(data, perturbed_probe).probe) - true)
-    return float(np.linalg.norm(off))
-
-
 def by_covariance(result: Estimate) -> float:
     """Return the standard error (K) of the knee that a fit predicts, by its covariance."""
     errors = {name: result.parameters[name].stderr or 0.0 for name in result.names}
@@ -339,7 +449,10 @@ def by_covariance(result: Estimate) -> float:
 
 
 def compare_suspects(
-    probe: Probe, example: Estimate, *, layout: bool = True, progress: Progress | None = None
+    probe: Probe,
+    example: Estimate,
+    suspects: Sequence[str] = SUSPECTS,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Compute what each suspect carries of the knee's discrepancy, in one medium.
 
@@ -349,18 +462,18 @@ def compare_suspects(
         In vacuum or in air.
     example : Estimate
         Of a measurement with noise as the paper's, for the covariance.
-    layout : bool
-        Whether the uncertain layout is computed, a fit for each dimension.
+    suspects : sequence of str
+        Of `SUSPECTS`.
     progress : callable, optional
-        Called with the steps done and their number.
+        Called with the suspects done and their number.
 
     Returns
     -------
     xarray.Dataset
         ``moved_K`` and ``shift_K`` on the dimension ``suspect``, see `carried_by`; NaN where one
-        does not count in the medium;
-        ``stderr_K`` on ``uncertainty``; the published ``discrepancy_K``, the sum of the suspects
-        with the current to the bridge, and what is ``left_K`` after all together, as attributes.
+        does not count in the medium. As attributes the published ``discrepancy_K``; what is
+        ``left_K`` after the last suspect, all together; and ``stderr_K``, the error of the knee
+        that a fit predicts, by its covariance.
 
     Raises
     ------
@@ -368,24 +481,19 @@ def compare_suspects(
         If a lever has no knee, or a fit does not come to an end.
     """
     shifts, own_K = [], knee_K(probe)
-    for suspect in each(SUSPECTS, progress):
+    for suspect in each(suspects, progress):
         counts = suspect != IN_AIR or probe.surroundings.medium == "air"
-        shifts.append(carried_by(probe, suspect, own_K) if counts else (np.nan, np.nan))
+        shifts.append(carried_by(probe, suspect, own_K)[:2] if counts else (np.nan, np.nan))
     own, fitted = np.transpose(shifts)
-    errors = {COVARIANCE: by_covariance(example)}
-    if layout:
-        errors[LAYOUT] = by_layout(probe, progress)
-    stderr = list(errors.values())
     return labelled(
         {
             "moved_K": ("suspect", own, {"units": "K", "long_name": "above the model's knee"}),
             "shift_K": ("suspect", fitted, {"units": "K", "long_name": "above the fit's knee"}),
-            "stderr_K": ("uncertainty", stderr, {"units": "K", "long_name": "standard error"}),
         },
         "suspect",
-        {"suspect": list(SUSPECTS), "uncertainty": list(errors)},
+        {"suspect": list(suspects)},
         medium=probe.surroundings.medium,
         discrepancy_K=paper.KNEE_OFF_K,
         left_K=paper.KNEE_OFF_K - float(fitted[-1]),
-        total_stderr_K=float(np.linalg.norm(stderr)),
+        stderr_K=by_covariance(example),
     )

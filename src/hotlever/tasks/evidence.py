@@ -31,8 +31,8 @@ def reproduce(
     """Compute the paper's tables and figures and put them on one page."""
     from hotlever.report.reproduce import reproduce_page
 
-    with reporter.progress_bars("reproduce", "levers") as (update, within):
-        page = reproduce_page(quick=quick, progress=update, within=within)
+    with reporter.progress("reproduce") as update:
+        page = reproduce_page(quick=quick, progress=update)
     reporter.give(f"{page.write(output)}\n")
 
 

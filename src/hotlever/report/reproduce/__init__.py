@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 from hotlever.lever import Lever
 from hotlever.materials import published
 from hotlever.probe import Probe
-from hotlever.report.report_page import Page
+from hotlever.processes import PROCESSORS, local_processes
+from hotlever.report.report_page import Block, Page
 from hotlever.report.reproduce import air_sections as air
 from hotlever.report.reproduce import claim_sections as claims
+from hotlever.report.reproduce import layout_sections as layout
 from hotlever.report.reproduce import paper_sections as inference
 from hotlever.report.reproduce import paper_sections as vacuum
-from hotlever.report.reproduce.findings import Findings
-from hotlever.steps import each
+from hotlever.report.reproduce.findings import Claim, Findings
 from hotlever.types import Progress
 
 #: Headings and sections, in the order of the page.
 SECTIONS: dict[str, Callable[[Findings], None]] = {
+    "The lever of the paper, from all that is printed of it": layout.layouts_section,
     "The reference probe": vacuum.probe_section,
     "Published parameters and inversion temperatures (Tables I and II)": vacuum.parameter_section,
     "Published operating points": vacuum.operating_points_section,
@@ -35,7 +38,7 @@ SECTIONS: dict[str, Callable[[Findings], None]] = {
     "A surface on one side (Section V)": air.one_sided_section,
     "Radiation (Section IV)": claims.radiation_section,
     "Where the heat goes": air.map_section,
-    "What remains of the 50 K that the knee is off": vacuum.discrepancy_section,
+    "The 50 K that the knee is off (Figs. 6 and 10)": layout.discrepancy_section,
     "A lever never seen: how wrong is its calibration?": inference.levers_section,
     "Balances": vacuum.balance_section,
 }
@@ -49,8 +52,18 @@ LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
 }
 
 
-def reproduce_page(quick: bool, progress: Progress, within: Progress | None = None) -> Page:
+#: Sections that take longest, the longest first: with these two processes begin.
+_LONGEST = (
+    "A lever never seen: how wrong is its calibration?",
+    "The same parameters from other levers? (Table II)",
+    "T(P) above the knee on other levers (Eq. 12)",
+)
+
+
+def reproduce_page(quick: bool, progress: Progress) -> Page:
     """Compute everything and return the page, the claims of the paper first.
+
+    Sections are computed side by side, by as many processes as there are processors.
 
     Parameters
     ----------
@@ -58,20 +71,41 @@ def reproduce_page(quick: bool, progress: Progress, within: Progress | None = No
         Leave out `LONG_SECTIONS`; others are of fewer levers.
     progress : callable
         Called with the sections done and their number.
-    within : callable, optional
-        Called with the steps done and their number, where a section takes long.
     """
-    material = published("option III").material
-    lever = Lever(Probe.reference().with_(**material.model_dump()))
-    page = Findings(lever, quick=quick, progress=within)
-    sections = SECTIONS if quick else SECTIONS | LONG_SECTIONS
-    for heading, section in each(sections.items(), progress):
-        page.heading(heading)
-        section(page)
-    filled, page.blocks = page.blocks, []
+    headings = list(_sections(quick))
+    order = sorted(headings, key=[*_LONGEST, *headings].index)
+    with local_processes(PROCESSORS) as run:
+        done = run(filled_section, [(heading, quick) for heading in order], progress)
+    filled = dict(zip(order, done, strict=True))
+    page = _shared_page(quick)
     page.heading("What the paper says, and what was found")
-    caption = "Every verdict is computed from the sections below."
-    columns = ("where", "claim", "verdict", "found in this run")
-    page.table(columns, page.claims, caption, prose=True)
-    page.blocks += filled
+    caption = (
+        "Where the layout of the paper's lever matters, the verdict is that of the layouts which "
+        "what is printed leaves, by their weight, and the last column is their range of what "
+        "decides. Other numbers are of the reference probe in this run, from the sections below."
+    )
+    columns = ("where", "the paper says", "verdict", "found", "over the layouts")
+    claims = [claim for heading in headings for claim in filled[heading][1]]
+    page.table(columns, claims, caption, prose=True)
+    page.blocks += [block for heading in headings for block in filled[heading][0]]
     return page
+
+
+def _sections(quick: bool) -> dict[str, Callable[[Findings], None]]:
+    return SECTIONS if quick else SECTIONS | LONG_SECTIONS
+
+
+@cache
+def _shared_page(quick: bool) -> Findings:
+    """Return a page with what sections of this process share."""
+    material = published("option III").material
+    return Findings(Lever(Probe.reference().with_(**material.model_dump())), quick=quick)
+
+
+def filled_section(heading: str, quick: bool) -> tuple[list[Block], list[Claim]]:
+    """Compute one section; return its blocks, and its claims."""
+    page = _shared_page(quick)
+    page.blocks, page.claims = [], []
+    page.heading(heading)
+    _sections(quick)[heading](page)
+    return page.blocks, page.claims

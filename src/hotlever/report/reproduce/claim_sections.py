@@ -55,7 +55,7 @@ _MATTERS = 0.1
 def linear_section(page: Findings) -> None:
     """How straight T(P) is above the knee, and what its slope follows."""
     cases = dict(list(all_cases().items())[:: _EVERY if page.quick else 1])
-    study = linear_branch_study(cases, progress=page.progress)
+    study = linear_branch_study(cases)
     regression, alone = (slope_regression(study, names) for names in (_EXPLAINED, _EXPLAINED[:1]))
     spread = paper.POWER_LAW_SPREAD_K
     page.draw("linear_branches", figures.linear_branches(study, regression, spread))
@@ -66,8 +66,8 @@ def linear_section(page: Findings) -> None:
     numbers |= {"regression": regression, "alone": alone, "span": SPAN_K, "within": WITHIN_K}
     page.say("linear_branch", **numbers)
     numbers["by_doping"] = _tabulate_slopes(page, solved)
-    page.claim("linear_branch", holds=most.straight_K.item() < spread, **numbers)
-    page.claim("proportional_branch", holds=most.proportional_K.item() < spread, **numbers)
+    page.judge("linear_branch", most.straight_K.item(), **numbers)
+    page.judge("proportional_branch", most.proportional_K.item(), **numbers)
 
 
 def _tabulate_slopes(page: Findings, solved: xr.Dataset) -> float:
@@ -91,7 +91,7 @@ def consistency_section(page: Findings) -> None:
     errors = _FEW_ERRORS if page.quick else tuple(ERRORS)
     geometries = dict(list(GEOMETRIES.items())[: _FIRST if page.quick else None])
     probe = page.lever.probe
-    study = consistency_study(probe, geometries, errors, progress=page.progress)
+    study = consistency_study(probe, geometries, errors)
     published = published_levers()
     numbers: Any = {"count": len(geometries), "common": RAMAN[1]}
     numbers["dimensions"] = default_priors(probe)["thickness_um"].spread
@@ -148,9 +148,9 @@ def radiation_section(page: Findings) -> None:
     )
     sheets = sheet_emissivities(page.lever.probe, [paper.BASE_TEMPERATURE_K, tip]).emissivity
     share = (black.radiated_mW / black.power_mW).item()
-    page.claim(
+    page.judge(
         "radiation",
-        holds=share < 1e-3,
+        share,
         black=black,
         grey=grey,
         light_uW=1e3 * black.radiated_mW,
@@ -185,15 +185,15 @@ def shift_section(page: Findings) -> None:
     at_points = n_type.sel(bias=points, method="nearest")
     largest = abs(at_points.moved_nm).max().item()
     numbers: Any = {"largest": largest, "cold": shift_nm[0], "bias": at_bias}
-    page.claim("thermoelectric_size", holds=largest < paper.SHIFT_NM, **numbers)
+    page.judge("thermoelectric_size", largest, **numbers)
     thomson = at_points.share_nm.sel(heat="Thomson").sum("side")
     silicon = page.lever.probe.heater_silicon
     assert silicon is not None
     strip = self_heated(silicon, _STRIP_K)
     boron = [p_type.sel(polarity=1).sel(bias=bias, method="nearest") for bias in points[:2]]
-    page.claim(
+    page.judge(
         "thermoelectric_direction",
-        holds=bool((at_points.moved_nm > 0.0).all()),
+        at_points.moved_nm.max().item(),
         least=at_points.moved_nm.max(),
         most=at_points.moved_nm.min(),
         thomson=thomson.min(),

@@ -16,7 +16,7 @@ from hotlever import spieser2017 as paper
 from hotlever.estimate import Estimate, Measurement, fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.report.report_page import Page
-from hotlever.types import Progress
+from hotlever.studies.published_lever.verdicts import CRITERIA, verdict_on
 
 #: Biases (V) of a curve without visible corners.
 MANY = np.linspace(0.1, paper.RAMP[-1], 110)
@@ -24,6 +24,8 @@ MANY = np.linspace(0.1, paper.RAMP[-1], 110)
 _TEXTS = tomllib.loads(
     (files("hotlever") / "report" / "reproduce" / "texts.toml").read_text(encoding="utf-8")
 )
+# Where the paper says what, the verdict, what was found, and its range over the layouts.
+Claim = tuple[str, str, str, str, str]
 
 
 class Findings(Page):
@@ -35,15 +37,12 @@ class Findings(Page):
         The reference lever in vacuum, with the published option III.
     quick : bool
         Whether sections that take long are to be of fewer levers.
-    progress : callable, optional
-        For a section that takes long: called with its steps done and their number.
 
     Attributes
     ----------
-    air : Lever
-        The same lever in still air, freely suspended.
     claims : list of tuple of str
-        Where the paper says what, the verdict, and what was found in this run.
+        Where the paper says what, the verdict, what was found in this run, and the range of that
+        over the layouts of the paper's lever, if it depends on the layout.
 
     Notes
     -----
@@ -51,18 +50,20 @@ class Findings(Page):
     ``{paper.SHIFT_NM:.0f}``; these may be parts of an object, as ``{factor.best_k:.2f}``.
     """
 
-    def __init__(
-        self, lever: Lever, *, quick: bool = False, progress: Progress | None = None
-    ) -> None:
+    def __init__(self, lever: Lever, *, quick: bool = False) -> None:
         super().__init__(
             "Joule-heated cantilever probes: the published results, computed",
             f"Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:{paper.DOI}, with hotlever's "
             "reference probe, whose dimensions are inferred: no drawing of the published lever "
             "exists.",
         )
-        self.lever, self.air = lever, lever.in_medium("air")
-        self.quick, self.progress = quick, progress
-        self.claims: list[tuple[str, str, str, str]] = []
+        self.lever, self.quick = lever, quick
+        self.claims: list[Claim] = []
+
+    @cached_property
+    def air(self) -> Lever:
+        """The lever in still air, freely suspended."""
+        return self.lever.in_medium("air")
 
     @cached_property
     def fitted_example(self) -> Estimate:
@@ -81,7 +82,11 @@ class Findings(Page):
         self, name: str, columns: Sequence[str], rows: Sequence[Sequence[str]], /, **numbers: Any
     ) -> None:
         """Add a table with the caption of its name."""
-        self.table(columns, rows, _filled(_TEXTS["tables"][name], numbers))
+        self.table(columns, rows, self.caption(name, **numbers))
+
+    def caption(self, name: str, /, **numbers: Any) -> str:
+        """Return the caption of a table of a name."""
+        return _filled(_TEXTS["tables"][name], numbers)
 
     def columns(
         self, name: str, columns: Mapping[str, tuple[xr.DataArray, str]], /, **numbers: Any
@@ -91,11 +96,34 @@ class Findings(Page):
         self.tabulate(name, list(columns), list(zip(*cells, strict=True)), **numbers)
 
     def claim(self, name: str, /, *, holds: bool, **numbers: Any) -> None:
-        """Add the claim of a name, and whether it holds in this run."""
+        """Add the claim of a name that does not go by layouts, and whether it holds in this run."""
+        text = self._claim(name, numbers)
+        verdict = text["holds"] if holds else f"does not hold, because {text['fails']}"
+        row = text["claim"], verdict, text["ours"], "–"
+        self.claims.append((self.linked(text["where"]), *row))
+
+    def judge(self, name: str, value: float, /, **numbers: Any) -> None:
+        """Add the claim of a name by the layouts for which it holds.
+
+        The value is what a `hotlever.studies.published_lever.verdicts.Criterion` judges, of the
+        reference probe in this run.
+        """
+        text, (words, over_layouts) = self._claim(name, numbers), verdict_on(name)
+        here = bool(CRITERIA[name].holds(value))
+        if words == "holds" and here:
+            words = text["holds"]
+        elif words == "does not hold" and not here:
+            words = f"does not hold, because {text['fails']}"
+        elif here:
+            words = f"{words}; for the reference probe it {text['holds']}"
+        else:
+            words = f"{words}; not for the reference probe, because {text['fails']}"
+        row = text["claim"], words, text["ours"], over_layouts
+        self.claims.append((self.linked(text["where"]), *row))
+
+    def _claim(self, name: str, numbers: Mapping[str, Any]) -> dict[str, str]:
         claim = {"holds": "holds", **_TEXTS["claims"][name]}
-        text = {key: _filled(words, numbers) for key, words in claim.items()}
-        verdict = text["holds"] if holds else f"does not hold here, because {text['fails']}"
-        self.claims.append((self.linked(text["where"]), text["claim"], verdict, text["ours"]))
+        return {key: _filled(words, numbers) for key, words in claim.items()}
 
 
 def _filled(words: str, numbers: Mapping[str, Any]) -> str:

@@ -1,0 +1,257 @@
+"""The ensemble: layouts with weights, what each shows, and how the paper's statements fare in it.
+
+What each layout shows is stored, as ``benchmarks/published_lever.py`` writes it. A layout after
+drawn errors weighs as much as its length is likely, by either of two priors (`SIZES`), and as those
+statements make it which have no derivatives and did not guide the search (`WEIGHED`).
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from operator import itemgetter
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hotlever import spieser2017 as paper
+from hotlever.datasets import labelled
+from hotlever.materials import PUBLISHED
+from hotlever.materials.silicon import inversion_temperature
+from hotlever.studies.published_lever.layouts import FOLDER, stored_layouts
+from hotlever.studies.published_lever.statements import SEARCHED
+from hotlever.types import Array
+
+#: How likely a length (µm) is, over how often it was drawn: any that fits into the air of the
+#: paper's sphere, and only such that fit if the sphere has the tip in its middle.
+SIZES: dict[str, Callable[[Array], Array]] = {
+    "any size in the sphere of air": lambda length: np.ones_like(length),
+    "sphere about the tip": lambda length: (length <= paper.SPHERE_UM).astype(float),
+}
+ANY, SMALL = SIZES
+#: How names of the layouts begin that suit best what guided the search, at their length.
+BEST = "best of"
+#: Of "about" and "approximately": half a unit of the digit that counts.
+_LEGS_K, _CROSSING_K, _MISPREDICTED_K = 5.0, 50.0, 50.0
+#: "Approximately a factor of 2", and errors with one or two digits.
+_HALF, _ERRORS = 0.15, 1.5
+#: Half a unit of the last digit of T_i (K).
+_DIGIT_K = 0.5
+#: What a thickness of nominally 400 nm and a length of 4 µm may be off by (µm).
+_THICKNESS_UM, _HEATER_UM = 0.02, 0.5
+
+
+class Weighed(NamedTuple):
+    """A statement that did not guide the search: how far a layout is from it.
+
+    Attributes
+    ----------
+    where, words : str
+        As of `hotlever.studies.published_lever.statements.Printed`.
+    deviation : callable
+        From the numbers of a layout, in units of what the statement may be off by.
+    counts : bool
+        Whether it counts in the weight; not what is a dimension itself, or follows from the
+        parameters alone.
+    """
+
+    where: str
+    words: str
+    deviation: Callable[[Mapping[str, float]], float]
+    counts: bool = True
+
+
+WEIGHED: dict[str, Weighed] = {
+    "legs at the knee": Weighed(
+        "Section IV",
+        f"the resistance of the legs raises the knee by about {paper.KNEE_BY_LEGS_K:.0f} K, "
+        f"± {_LEGS_K:.0f} K",
+        lambda found: (found["by_legs_K"] - paper.KNEE_BY_LEGS_K) / _LEGS_K,
+    ),
+    "legs prevail": Weighed(
+        "Section IV, Fig. 5",
+        f"only above {paper.LEGS_PREVAIL_K:.0f} K is the resistance of the legs the larger one, "
+        f"to {_CROSSING_K:.0f} K",
+        lambda found: max(paper.LEGS_PREVAIL_K - found["legs_prevail_K"], 0.0) / _CROSSING_K,
+    ),
+    "option I mispredicts": Weighed(
+        "Section I, Fig. 4c",
+        f"above {paper.MISPREDICTED_FROM_K:.0f} K option I is up to {paper.MISPREDICTED_K:.0f} K "
+        f"off, ± {_MISPREDICTED_K:.0f} K",
+        lambda found: (found["tip_I_K"] - paper.MISPREDICTED_K) / _MISPREDICTED_K,
+    ),
+    "heater halved": Weighed(
+        "Fig. 7a",
+        "diffusion leaves about half of the heater's length",
+        lambda found: (found["heater_left"] - 0.5) / _HALF,
+    ),
+    "one k": Weighed(
+        "Section V, Fig. 10b",
+        f"in air T follows Eq. 12 with P/{paper.K_IN_AIR} within {paper.POWER_LAW_SPREAD_K:.0f} K",
+        lambda found: found["eq12_air_K"] / paper.POWER_LAW_SPREAD_K,
+    ),
+    "knee in air": Weighed(
+        "Section V",
+        f"its power is {paper.K_IN_AIR} P_th, to the power of {paper.POWER_LAW_SPREAD_K:.0f} K",
+        lambda found: (
+            (found["knee_air_mW"] / paper.K_IN_AIR - paper.POWER_LAW["threshold_mW"])
+            / (paper.POWER_LAW_SPREAD_K / paper.POWER_LAW["hot_K_per_mW"])
+        ),
+    ),
+    "inversion temperatures": Weighed(
+        "Table I",
+        f"T_i follows from n_d and p, to {_DIGIT_K} K",
+        lambda found: _inversion_off_K() / _DIGIT_K,
+        counts=False,
+    ),
+    "thickness": Weighed(
+        "Section II",
+        f"nominally {1e3 * paper.THICKNESS_UM:.0f} nm, to {1e3 * _THICKNESS_UM:.0f} nm",
+        lambda found: (found["thickness_um"] - paper.THICKNESS_UM) / _THICKNESS_UM,
+        counts=False,
+    ),
+    "heater": Weighed(
+        "Section II",
+        f"{paper.HEATER_LENGTH_UM:.0f} µm long, to {_HEATER_UM} µm",
+        lambda found: (found["heater_length_um"] - paper.HEATER_LENGTH_UM) / _HEATER_UM,
+        counts=False,
+    ),
+    "sphere of air": Weighed(
+        "Section V",
+        f"the lever fits into {paper.SPHERE_UM:.0f} µm of radius",
+        lambda found: found["length_um"] / (2.0 * paper.SPHERE_UM),
+        counts=False,
+    ),
+    "errors of the parameters": Weighed(
+        "Table I",
+        f"standard errors of each option are in these proportions, within a factor of {_ERRORS}",
+        lambda found: (
+            np.log(max(found[f"errors_{option}"] for option in ("I", "II", "III")))
+            / np.log(_ERRORS)
+        ),
+        counts=False,
+    ),
+}
+
+
+@cache
+def _inversion_off_K() -> float:
+    """Return the largest difference of a printed inversion temperature from ours (K)."""
+    options = paper.INVERSION_TEMPERATURES_K
+    ours = {name: PUBLISHED[name].material for name in options}
+    return max(
+        abs(float(inversion_temperature(material.n_d, material.p)) - options[name])
+        for name, material in ours.items()
+    )
+
+
+def _read(name: str) -> dict[str, dict[str, float]]:
+    """Return the rows of a stored table of numbers, by their first column."""
+    with (FOLDER / name).open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    key = next(iter(rows[0]))
+    return {
+        row[key]: {name: float(value) for name, value in row.items() if name != key} for row in rows
+    }
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """All layouts with what they show.
+
+    Attributes
+    ----------
+    numbers : xarray.Dataset
+        On ``layout`` the columns of ``numbers.csv``, dimensions, and whether each was ``drawn``
+        with errors and so has a weight.
+    deviations : xarray.DataArray
+        On ``layout`` and ``statement``: how far off, over what the statement may be off by.
+    weights : xarray.DataArray
+        On ``size``, of `SIZES`, and ``layout``: they add up to one.
+    """
+
+    numbers: xr.Dataset
+    deviations: xr.DataArray
+    weights: xr.DataArray
+
+    @property
+    def names(self) -> list[str]:
+        """The layouts."""
+        return [str(name) for name in self.numbers.layout.values]
+
+    @property
+    def nearest(self) -> str:
+        """The layout that is nearest to all that was printed, by the sum of squares."""
+        best = [name for name in self.names if name.startswith(BEST)]
+        return min(best, key=lambda name: float(self._square.sel(layout=name)))
+
+    @property
+    def _square(self) -> xr.DataArray:
+        counts = [each for each, statement in WEIGHED.items() if statement.counts]
+        weighed = 3.0 * (self.deviations.sel(statement=counts) ** 2).sum("statement")
+        return self.numbers.square + weighed
+
+    def met(self, layout: str) -> int:
+        """Return how many statements a layout meets."""
+        return int((abs(self.deviations.sel(layout=layout)) <= 1.0).sum())
+
+    def share(self, holds: xr.DataArray, size: str = ANY) -> float:
+        """Return the weight of the layouts for which something holds, on ``layout``."""
+        return float((self.weights.sel(size=size) * holds).sum())
+
+    def range(self, column: str) -> tuple[float, float]:
+        """Return the least and largest value among the layouts that have a weight."""
+        values = self.numbers[column].where(self.numbers.drawn, drop=True)
+        return float(values.min()), float(values.max())
+
+    def mean(self, column: str, size: str = ANY) -> tuple[float, float]:
+        """Return weighted mean and standard deviation of a column."""
+        weights, values = self.weights.sel(size=size), self.numbers[column]
+        mean = (weights * values).sum()
+        return float(mean), float(np.sqrt((weights * (values - mean) ** 2).sum()))
+
+
+@cache
+def stored_ensemble() -> Ensemble:
+    """Read the stored numbers, and weigh the layouts."""
+    rows, found = _read("numbers.csv"), stored_layouts()
+    all_numbers = {
+        name: {**row, "length_um": found[name].length_um, **found[name].values}
+        for name, row in rows.items()
+    }
+    statements: dict[str, Callable[[Mapping[str, float]], float]] = {
+        each.name: itemgetter(each.name) for each in SEARCHED
+    }
+    statements |= {name: each.deviation for name, each in WEIGHED.items()}
+    deviations = xr.DataArray(
+        [[float(of(numbers)) for of in statements.values()] for numbers in all_numbers.values()],
+        coords={"layout": list(rows), "statement": list(statements)},
+    )
+    columns = {
+        name: [numbers[name] for numbers in all_numbers.values()]
+        for name in next(iter(all_numbers.values()))
+        if name not in statements
+    }
+    steps = {way: np.array(columns[f"by_{way}_K"]) for way in ("ends", "voltage", "doping")}
+    columns["doping_share"] = (steps["doping"] / sum(steps.values())).tolist()
+    columns["share_growth"] = np.divide(columns["share_hot"], columns["share_cold"]).tolist()
+    for name in ("drawn", "square"):
+        columns[name] = [getattr(found[layout], name) for layout in rows]
+    numbers = labelled(columns, "layout", {"layout": list(rows)})
+    return Ensemble(numbers, deviations, _weights(numbers, deviations))
+
+
+def _weights(numbers: xr.Dataset, deviations: xr.DataArray) -> xr.DataArray:
+    counts = [name for name, each in WEIGHED.items() if each.counts]
+    square = (deviations.sel(statement=counts) ** 2).sum("statement")
+    # half the width of a rectangle is √3 standard deviations
+    by_statements = np.exp(-1.5 * (square - square.where(numbers.drawn).min())) * numbers.drawn
+    rows = []
+    for likely in SIZES.values():
+        weight = by_statements * likely(numbers.length_um.values)
+        rows.append((weight / weight.sum()).values)
+    coordinates = {"size": list(SIZES), "layout": numbers.layout.values}
+    return xr.DataArray(rows, coords=coordinates, dims=("size", "layout"))

@@ -1,0 +1,210 @@
+"""What the paper prints of its lever, as data: a value, and half the width of where it may lie.
+
+A printed digit may be half a unit off, a spread is what the paper says, and where it says "about"
+half a unit of the last digit that it gives counts. Between the limits nothing is likelier than
+anything else (JCGM 100:2008, 4.3.7). A statement that is a curve, or several points, counts once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hotlever import spieser2017 as paper
+from hotlever.estimate.power_law import EQ12
+from hotlever.studies.published_lever.branch_readings import Readings
+from hotlever.types import Array
+
+#: The published parameter sets that describe the measured ramp of lever 1, by what they are called
+#: here; the first is that of the simulations that are printed.
+OPTIONS = {
+    "III": "option III",
+    "I": "option I",
+    "II": "option II",
+    "n_d held": "lever 1, n_d fixed",
+}
+MAIN = next(iter(OPTIONS))
+#: Half a unit of the last digit of printed voltages (V) and currents (mA).
+DIGIT_V, DIGIT_MA = 0.005, 0.005
+_PLATEAU, _KNEE, _HOT = paper.OPERATING_POINTS
+#: A reading of the knee off the ramp: half of what its neighbours there are apart (K).
+KNEE_READ_K = 25.0
+#: Powers (mW) and biases (V) at which curves are compared.
+POWERS_MW = np.array([1.0, 2.0, 2.75, 3.3, 4.0])
+BIASES_V = paper.RAMP[[4, 8, 12, 16, 18, 20, 22, 24]]
+#: The bias at which the tip is hottest (V).
+LAST_V = float(paper.RAMP[-1])
+
+# What is off, in units of what it may be off by, (n,), with derivatives by parameters, (n, p).
+Deviation = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A statement of the paper that a layout meets or not, with what the search needs of it.
+
+    Attributes
+    ----------
+    name : str
+    where : str
+        Table, figure, equation or section of the paper.
+    words : str
+        What is printed, and how far it may be off.
+    deviation : callable
+        From the readings of the published options, by their names in `OPTIONS`.
+    """
+
+    name: str
+    where: str
+    words: str
+    deviation: Callable[[Mapping[str, Readings]], Deviation]
+
+
+def _operating_point(options: Mapping[str, Readings]) -> Deviation:
+    values, slopes = options[MAIN].at_tip(paper.KNEE_PREDICTED_K)
+    unit = np.array([DIGIT_V, DIGIT_MA])
+    off = (values[:2, 0] - [_KNEE.lever_V, _KNEE.current_mA]) / unit
+    return off, slopes[:2, 0] / unit[:, None]
+
+
+def _passes(point: paper.PublishedPoint) -> Callable[[Mapping[str, Readings]], Deviation]:
+    def deviation(options: Mapping[str, Readings]) -> Deviation:
+        at = (point.lever_V, point.current_mA)
+        distance, slopes = options[MAIN].off_point(at, (DIGIT_V, DIGIT_MA))
+        return np.array([distance]), slopes[None]
+
+    return deviation
+
+
+def _on_the_ramp(options: Mapping[str, Readings]) -> Deviation:
+    circuit, names = options[MAIN].circuit, options[MAIN].linearised.names
+    beyond = circuit.bias(_HOT.lever_V, _HOT.current_mA) - LAST_V
+    unit = circuit.bias(DIGIT_V, DIGIT_MA)
+    by = np.array([circuit.bias_by(name, _HOT.current_mA) for name in names])
+    return np.array([max(beyond, 0.0)]) / unit, by[None] * (beyond > 0.0) / unit
+
+
+def _knee(options: Mapping[str, Readings]) -> Deviation:
+    knee_K, slopes = options[MAIN].knee_K()
+    return np.array([knee_K - paper.KNEE_PREDICTED_K]) / KNEE_READ_K, slopes[None] / KNEE_READ_K
+
+
+def _power_law(options: Mapping[str, Readings]) -> Deviation:
+    values, slopes = options[MAIN].at_power(POWERS_MW)
+    off = options[MAIN].branch.base_temperature_K + values[3] - EQ12.tip_temperature(POWERS_MW)
+    return off / paper.POWER_LAW_SPREAD_K, slopes[3] / paper.POWER_LAW_SPREAD_K
+
+
+def _hottest(options: Mapping[str, Readings]) -> Deviation:
+    values, slopes = options[MAIN].at_bias(LAST_V)
+    rise = paper.HOTTEST_TIP_K - options[MAIN].branch.base_temperature_K
+    spread = raman_error(rise)
+    return (values[3] - rise) / spread, slopes[3] / spread
+
+
+def raman_error(rise_K: Any) -> Any:
+    """Return the stated error of the paper's thermometer (K) at a rise above room temperature."""
+    return paper.RAMAN_ERROR_K + paper.RAMAN_ERROR_SHARE * rise_K
+
+
+def _same_current(option: str) -> Callable[[Mapping[str, Readings]], Deviation]:
+    def deviation(options: Mapping[str, Readings]) -> Deviation:
+        (ours, by), (main, main_by) = (options[o].at_bias(BIASES_V) for o in (option, MAIN))
+        ratio = ours[1] / main[1]
+        slopes = (by[1] - ratio[:, None] * main_by[1]) / main[1][:, None]
+        return (ratio - 1.0) / paper.CURRENT_ERROR, slopes / paper.CURRENT_ERROR
+
+    return deviation
+
+
+def _same_reader(option: str) -> Callable[[Mapping[str, Readings]], Deviation]:
+    def deviation(options: Mapping[str, Readings]) -> Deviation:
+        (ours, by), (main, main_by) = (options[o].at_bias(BIASES_V) for o in (option, MAIN))
+        # observables are compared over their largest values
+        unit = paper.CURRENT_ERROR * main[2].max()
+        return (ours[2] - main[2]) / unit, (by[2] - main_by[2]) / unit
+
+    return deviation
+
+
+def _same_tip(options: Mapping[str, Readings]) -> Deviation:
+    (ours, by), (main, main_by) = (options[o].at_bias(BIASES_V) for o in ("n_d held", MAIN))
+    unit = raman_error(main[3])
+    return (ours[3] - main[3]) / unit, (by[3] - main_by[3]) / unit[:, None]
+
+
+#: What a search is given: all that has derivatives.
+SEARCHED: tuple[Printed, ...] = (
+    Printed(
+        "knee point",
+        "Figs. 6a and 7b",
+        f"{_KNEE.lever_V} V and {_KNEE.current_mA} mA at a tip of {paper.KNEE_PREDICTED_K:.0f} K, "
+        "to half a unit of the last digits",
+        _operating_point,
+    ),
+    Printed(
+        "plateau point",
+        "Fig. 7b",
+        f"the I-V curve passes {_PLATEAU.lever_V:.2f} V, {_PLATEAU.current_mA} mA",
+        _passes(_PLATEAU),
+    ),
+    Printed(
+        "hot point",
+        "Fig. 7b",
+        f"the I-V curve passes {_HOT.lever_V} V, {_HOT.current_mA} mA",
+        _passes(_HOT),
+    ),
+    Printed(
+        "hot point on the ramp",
+        "Section IV, Fig. 7b",
+        f"its bias is at most {LAST_V:.0f} V",
+        _on_the_ramp,
+    ),
+    Printed(
+        "knee temperature",
+        "Fig. 6a",
+        f"the highest V_l at {paper.KNEE_PREDICTED_K:.0f} K, read off the ramp to "
+        f"{KNEE_READ_K:.0f} K",
+        _knee,
+    ),
+    Printed(
+        "Eq. 12",
+        "Eq. 12, Fig. 6b",
+        f"T(P) within {paper.POWER_LAW_SPREAD_K:.0f} K of it up to {POWERS_MW[-1]:.0f} mW",
+        _power_law,
+    ),
+    Printed(
+        "hottest tip",
+        "Section IV",
+        f"{paper.HOTTEST_TIP_K:.0f} K at {LAST_V:.0f} V, to the thermometer's error",
+        _hottest,
+    ),
+    *(
+        Printed(
+            f"current, {option}",
+            f"{where}, Figs. 3 and 4",
+            f"{OPTIONS[option]} has the I_h of option III within {paper.CURRENT_ERROR:.0%}",
+            _same_current(option),
+        )
+        for option, where in (("I", "Table I"), ("II", "Table I"), ("n_d held", "Table II"))
+    ),
+    *(
+        Printed(
+            f"reader, {option}",
+            f"{where}, Figs. 3 and 4",
+            f"{OPTIONS[option]} has the V_r of option III, over its largest value within "
+            f"{paper.CURRENT_ERROR:.0%}",
+            _same_reader(option),
+        )
+        for option, where in (("II", "Table I"), ("n_d held", "Table II"))
+    ),
+    Printed(
+        "tip, n_d held",
+        "Table II",
+        f"{OPTIONS['n_d held']} has the T_tip of option III within the thermometer's error",
+        _same_tip,
+    ),
+)
