@@ -133,7 +133,7 @@ def _best_like(found: Ensemble, layout: xr.Dataset) -> float:
 
 
 def _cell(deviation: float) -> str:
-    return f"{'met' if deviation <= 1.0 else 'off'}, {deviation:.1f}"
+    return f"{'met' if deviation <= 1.0 else 'off'}, {deviation:.2g}"
 
 
 def _say_tensions(page: Findings, found: Ensemble) -> None:
@@ -209,11 +209,11 @@ def discrepancy_section(page: Findings) -> None:
         nearest=nearest,
     )
     by_law = [
-        (DEPARTURES[str(law)].words, "± " + _of(study.stderr_K.sel(law=law), nearest, sign=""))
+        (DEPARTURES[str(law)].words, f"± {study.stderr_K.sel(law=law, layout=nearest):.1f}")
         for law in study.law.values
     ]
-    total = np.sqrt((study.stderr_K**2).sum("law"))
-    by_law.append(("all laws", "± " + _of(total, nearest, sign="")))
+    total = np.sqrt((study.stderr_K.sel(layout=nearest) ** 2).sum("law"))
+    by_law.append(("all laws", f"± {total:.1f}"))
     page.tabulate("knee_laws", ("law", "may carry (K)"), by_law)
     alone = study.shift_K.sel(layout=nearest, suspect=study.suspect != TOGETHER)
     few, film = (study.sel(suspect=name, layout=nearest) for name in (FEW_CARRIERS, SURFACES))
@@ -227,7 +227,7 @@ def discrepancy_section(page: Findings) -> None:
         few=few,
         few_n_d=paper.PUBLISHED_VALUES["option III"]["n_d"] ** 2 / few.n_d,
         together=study.shift_K.sel(suspect=TOGETHER, layout=nearest),
-        total=total.sel(layout=nearest),
+        total=total,
     )
     if not page.quick:
         _in_air(page)
@@ -249,15 +249,16 @@ def _of_the_ramp(found: Ensemble) -> dict[str, Any]:
         "median": np.median(least),
         "most": np.max(least),
         "step": np.median(step),
+        "noise": found.numbers.noise_III.sel(layout=found.nearest),
         "off": (drawn.ramp_row_K - drawn.knee_K).min(),
         "above": (drawn.ramp_row_K - drawn.knee_K).max(),
     }
 
 
-def _of(values: xr.DataArray, nearest: str, sign: str = "+") -> str:
+def _of(values: xr.DataArray, nearest: str) -> str:
     """Return the value of the nearest layout, and the range over those that were computed."""
     low, high = _range(values)
-    return f"{values.sel(layout=nearest).item():{sign}.1f} ({low:{sign}.0f} to {high:{sign}.0f})"
+    return f"{values.sel(layout=nearest).item():+.1f} ({low:+.0f} to {high:+.0f})"
 
 
 def _range(values: xr.DataArray) -> tuple[float, float]:

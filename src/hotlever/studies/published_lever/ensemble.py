@@ -64,6 +64,17 @@ class Weighed(NamedTuple):
     counts: bool = True
 
 
+@cache
+def _inversion_off_K() -> float:
+    """Return the largest difference of a printed inversion temperature from ours (K)."""
+    options = paper.INVERSION_TEMPERATURES_K
+    ours = {name: PUBLISHED[name].material for name in options}
+    return max(
+        abs(float(inversion_temperature(material.n_d, material.p)) - options[name])
+        for name, material in ours.items()
+    )
+
+
 WEIGHED: dict[str, Weighed] = {
     "legs at the knee": Weighed(
         "Section IV",
@@ -95,7 +106,8 @@ WEIGHED: dict[str, Weighed] = {
     ),
     "knee in air": Weighed(
         "Section V",
-        f"its power is {paper.K_IN_AIR} P_th, to the power of {paper.POWER_LAW_SPREAD_K:.0f} K",
+        f"the power of the knee in air is {paper.K_IN_AIR} P_th, to that of "
+        f"{paper.POWER_LAW_SPREAD_K:.0f} K",
         lambda found: (
             (found["knee_air_mW"] / paper.K_IN_AIR - paper.POWER_LAW["threshold_mW"])
             / (paper.POWER_LAW_SPREAD_K / paper.POWER_LAW["hot_K_per_mW"])
@@ -109,13 +121,14 @@ WEIGHED: dict[str, Weighed] = {
     ),
     "thickness": Weighed(
         "Section II",
-        f"nominally {1e3 * paper.THICKNESS_UM:.0f} nm, to {1e3 * _THICKNESS_UM:.0f} nm",
+        f"the lever is nominally {1e3 * paper.THICKNESS_UM:.0f} nm thick, to "
+        f"{1e3 * _THICKNESS_UM:.0f} nm",
         lambda found: (found["thickness_um"] - paper.THICKNESS_UM) / _THICKNESS_UM,
         counts=False,
     ),
     "heater": Weighed(
         "Section II",
-        f"{paper.HEATER_LENGTH_UM:.0f} µm long, to {_HEATER_UM} µm",
+        f"the heater is {paper.HEATER_LENGTH_UM:.0f} µm long, to {_HEATER_UM} µm",
         lambda found: (found["heater_length_um"] - paper.HEATER_LENGTH_UM) / _HEATER_UM,
         counts=False,
     ),
@@ -135,17 +148,6 @@ WEIGHED: dict[str, Weighed] = {
         counts=False,
     ),
 }
-
-
-@cache
-def _inversion_off_K() -> float:
-    """Return the largest difference of a printed inversion temperature from ours (K)."""
-    options = paper.INVERSION_TEMPERATURES_K
-    ours = {name: PUBLISHED[name].material for name in options}
-    return max(
-        abs(float(inversion_temperature(material.n_d, material.p)) - options[name])
-        for name, material in ours.items()
-    )
 
 
 def _read(name: str) -> dict[str, dict[str, float]]:

@@ -160,7 +160,7 @@ SEARCHED: tuple[Printed, ...] = (
     Printed(
         "hot point on the ramp",
         "Section IV, Fig. 7b",
-        f"its bias is at most {LAST_V:.0f} V",
+        f"the bias of the hot point is at most {LAST_V:.0f} V",
         _on_the_ramp,
     ),
     Printed(
