@@ -168,6 +168,10 @@ def test_a_shift_of_all_edges_is_that_of_the_outline(tmp_path):
         read = Probe.from_file(tmp_path / "own.toml")
         assert read.shape.dimensions() == probe.shape.dimensions()
     values = reference_points()
+    values["prior"] = dict.fromkeys(("edge_bias_um", "silicon.edge_bias_um"), "± 0.1")
+    with pytest.raises(InputError, match=r"\[prior\]: edge_bias_um: expected silicon.edge_bias_um"):
+        Probe.from_sections(values, "p")
+    values = reference_points()
     values["probe"]["edge_bias_um"] = 0.1
     values["layers"]["silicon"] = {"drawn": values["layers"]["silicon"], "edge_bias_um": 0.1}
     with pytest.raises(InputError, match=r"expected it in \[layers.silicon\] only"):
@@ -269,5 +273,10 @@ def test_a_prior_of_edges_is_stated_by_layer(run, tmp_path):
 
     assert "in its unit such as '± 0.2'" in refused("heater.edge_bias_um=0.1x/2")
     assert "did you mean 'heater.edge_bias_um'" in refused("heatre.edge_bias_um=±0.1")
+    status, _, err = run(
+        *("calibrate", "iv.csv", "--probe", "own.toml", "--prior", "edge_bias_um=±0.1"),
+        *("--prior", "silicon.edge_bias_um=±0.1"),
+    )
+    assert (status, "silicon.edge_bias_um alone" in err) == (2, True)
     err = refused("dimensions=±2%")
     assert "a spread such as '± 0.1' of silicon.edge_bias_um, heater.edge_bias_um" in err

@@ -198,6 +198,12 @@ def check_together(probe: ProbeParts, stated: Mapping[str, Any], where: str) -> 
         )
     if probe.monitor is not None:
         probe.monitor.check(layout, f"{where}: [monitor]")
+    if probe.prior is not None:
+        for name in probe.prior.model_extra or {}:
+            # what has two names is said by one of them
+            full = probe.shape.named(name)
+            if full != name and full in (probe.prior.model_extra or {}):
+                raise InputError(f"{where}: [prior]: {name}: expected {full} alone, it is the same")
     priors_of(probe.stated_priors, probe, f"{where}: [prior]")
 
 

@@ -89,7 +89,11 @@ def parse_priors(texts: Sequence[str] | None, probe: Probe) -> dict[str, str] | 
         return {}
     expected = "NAME=VALUE±SPREAD, NAME=VALUE×/FACTOR, usual, or none alone"
     pairs = parse_pairs("--prior", [text for text in texts if text != USUAL], expected)
-    pairs = {probe.shape.named(name): text for name, text in pairs.items()}
+    for name in [name for name in pairs if probe.shape.named(name) != name]:
+        full = probe.shape.named(name)
+        if full in pairs:
+            raise InputError(f"--prior {name}: expected {full} alone, it is the same")
+        pairs[full] = pairs.pop(name)
     priors_of(pairs, probe, "--prior")
     return pairs
 
