@@ -1,11 +1,12 @@
 """Drawn levers: against parametric ones, in air, and how good the doping by distances is.
 
-python benchmarks/drawings.py [same|doping|air|solid]
+python benchmarks/drawings.py [same|edges|doping|air|solid]
 
 same: the reference probe as a drawing against the parametric one: results, times of a sweep and of
 a layout, and of loading what each needs; derivatives by the logarithms of its dimensions, where a
 function draws it, with the tip below the step of κ_Si and above, and what they change by on finer
-meshes. doping: the distance to each border against diffusion
+meshes. edges: the drawn reference probe whose outline or heater's window is shifted against one
+that is drawn so, which has other parts. doping: the distance to each border against diffusion
 solved in the plane, for heaters of several shapes; between parallel borders both are the same,
 which shows how good the diffusion is solved. air: the panels of each lever, what making its
 operator costs beside a parametric lever of as many panels, and what finer panels change. solid:
@@ -45,19 +46,17 @@ from hotlever.probe.shapes import ThreeLeg
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.threads import one_blas_thread
-from problems import BIAS, processor_seconds, table
+from problems import BIAS, box, drawn_reference, processor_seconds, table
 
 REFERENCE = ThreeLeg.reference()
 #: Of the diffusion in the plane: largest edge in the heater (share of its width), and time steps.
 FINE, STEPS = MeshOptions(heater=0.02, lever=0.05), 400
 #: What has to be loaded for a probe by its dimensions, and for one that is drawn.
 LOADED = {"parametric": "hotlever.probe.probe", "drawn": "hotlever.probe.drawing.parametric"}
+#: By how much edges are shifted (µm).
+SHIFT = 0.1
 #: Biases of levers in air (V).
 IN_AIR = [4.0, 12.0]
-
-
-def box(x0: float, y0: float, x1: float, y1: float) -> list[list[float]]:
-    return [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
 
 
 def drawn(silicon: Any, heater: Any, tip: Any, supply: Any, ground: Any) -> Probe:
@@ -125,6 +124,23 @@ def same() -> None:
             kinds = (f"{apart[some].max():.1e}" for some in (below, ~below))
             rows.append([name, f"sizes / {refinement:g}", *kinds])
     table(["lever", "mesh", f"tip below {STEP:g} K", "above"], rows)
+
+
+def edges() -> None:
+    """Print what shifted edges do, and by how much that differs from levers that are drawn so."""
+    probe, bias = drawn_reference("", 0.0), np.array([7.0, 8.27])
+    plain, rows = Lever(probe).sweep(bias), []
+    for layer in ("silicon", "heater"):
+        for shift in (-SHIFT, SHIFT):
+            shifted = Lever(probe.with_(**{f"{layer}.edge_bias_um": shift})).sweep(bias)
+            anew = Lever(drawn_reference(layer, shift)).sweep(bias)
+            apart = np.abs(shifted.tip_K.values - anew.tip_K.values)
+            current = np.abs(shifted.current_mA.values / anew.current_mA.values - 1.0)
+            does = shifted.tip_K.values - plain.tip_K.values
+            cells = [[f"{each:.1f}" for each in does], [f"{each:.2f}" for each in apart]]
+            rows.append([layer, f"{shift:+g}", *cells[0], *cells[1], f"{current.max():.1e}"])
+    head = [f"{what} at {V:g} V (K)" for what in ("does", "apart") for V in bias]
+    table(["layer", "shift (µm)", *head, "I_h apart"], rows)
 
 
 def three_leg(
@@ -287,6 +303,6 @@ def diffused_share(probe: Probe, points: np.ndarray) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    kinds = {"same": same, "doping": doping, "air": air, "solid": solid}
+    kinds = {"same": same, "edges": edges, "doping": doping, "air": air, "solid": solid}
     for kind in sys.argv[1:] or kinds:
         kinds[kind]()

@@ -15,12 +15,14 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from shapely import Polygon, union_all
 
 from beyond_the_paper import reduced_seebeck_polynomial
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.materials import Kind, full_name
 from hotlever.materials.kinds import PSilicon, Silicon
 from hotlever.probe import Probe, ProbeMesh
+from hotlever.probe.drawing import Drawing
 from hotlever.probe.layout import BorderTaper, Region
 from hotlever.spieser2017 import RAMP
 
@@ -256,3 +258,30 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
         print(f"| {line} |")
         if number == 0:
             print("|" + "|".join("-" * (width + 2) for width in widths) + "|")
+
+
+def box(x0: float, y0: float, x1: float, y1: float) -> list[list[float]]:
+    return [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+
+
+def drawn_reference(layer: str, shift_um: float) -> Probe:
+    """The reference probe as a drawing, one of whose layers is drawn larger."""
+    layout = Probe.reference().layout()
+    sections = Drawing.of_layout(layout).sections()
+    (x0, y0), (x1, y1) = layout.heater.box
+    away = shift_um if layer == "heater" else 0.0
+    # the window is wider than the silicon, as is usual
+    sections["layers"]["heater"] = box(x0 - away, y0 - 1 - away, x1 + away, y1 + 1 + away)
+    if layer == "silicon":
+        ends = {end.name: sorted((end.start[1], end.end[1])) for end in layout.terminals}
+        # legs end on their line
+        longer = [Polygon(box(-1.0, low, 0.0, high)) for low, high in ends.values()]
+        (_, low), (right, high) = layout.box
+        whole = union_all([layout.polygon, *longer]).buffer(shift_um, join_style="mitre")
+        inside = whole.intersection(Polygon(box(0.0, low - 1, right + 1, high + 1)))
+        sections["layers"]["silicon"] = [list(inside.exterior.coords)[:-1]]
+        sections["terminals"] = {
+            name: [[0.0, low - shift_um], [0.0, high + shift_um]]
+            for name, (low, high) in ends.items()
+        }
+    return Probe.from_sections(sections, "drawn")

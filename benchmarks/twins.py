@@ -58,7 +58,6 @@ from hotlever.lever import Branch, Lever
 from hotlever.lever.discretisation import chosen_space, energy_between_degrees, making
 from hotlever.lever.full_space import FullSpace
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.drawing import Drawing
 from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import ALL_LAWS, PAPERS, UNCERTAIN, default_priors, updated
 from hotlever.probe.probe_parameters import parameters_of
@@ -78,7 +77,7 @@ from hotlever.studies.simulation_based_calibration import (
     values_from_priors,
 )
 from hotlever.types import Array
-from problems import table
+from problems import drawn_reference, table
 
 
 def judged(
@@ -152,24 +151,17 @@ _SHIFT = "heater.edge_bias_um"
 _EXACT = "± 0.01%"
 
 
-def drawn_reference(shift_um: float = 0.0) -> Probe:
-    """The reference probe as a drawing whose window of the heater is drawn larger."""
-    layout = Probe.reference().layout()
-    sections = Drawing.of_layout(layout).sections()
-    (x0, y0), (x1, y1) = layout.heater.box + shift_um * np.array([[-1.0], [1.0]])
-    # it is drawn wider than the silicon, as is usual
-    low, high = y0 - 1.0, y1 + 1.0
-    sections["layers"]["heater"] = [[x0, low], [x1, low], [x1, high], [x0, high]]
-    return Probe.from_sections(sections, "drawn")
-
-
 def heaters_off() -> dict[str, tuple[Probe, Probe, dict[str, str]]]:
     """The true lever, the nominal one and the prior of its owner, of each kind."""
     meant = Probe.reference()
     length_um = meant.shape.dimensions()["heater_length_um"]
     longer = length_um + 2 * _WINDOW_UM
     return {
-        "drawn": (drawn_reference(_WINDOW_UM), drawn_reference(), {_SHIFT: f"± {_WINDOW_UM}"}),
+        "drawn": (
+            drawn_reference("heater", _WINDOW_UM),
+            drawn_reference("heater", 0.0),
+            {_SHIFT: f"± {_WINDOW_UM}"},
+        ),
         "built-in": (
             meant.with_(heater_length_um=longer),
             meant,
