@@ -53,9 +53,10 @@ class Findings(Page):
     def __init__(self, lever: Lever, *, quick: bool = False) -> None:
         super().__init__(
             "Joule-heated cantilever probes: the published results, computed",
-            f"Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:{paper.DOI}, with hotlever's "
-            "reference probe, whose dimensions are inferred: no drawing of the published lever "
-            "exists.",
+            f"Spieser et al., J. Appl. Phys. 121, 174503 (2017), doi:{paper.DOI}, with the paper's "
+            "tables and figures by their numbers. No drawing of the published lever exists: what "
+            "depends on it is judged on layouts that were estimated from all that is printed, and "
+            "drawn for hotlever's reference probe, one more inference.",
         )
         self.lever, self.quick = lever, quick
         self.claims: list[Claim] = []

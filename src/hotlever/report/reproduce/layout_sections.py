@@ -191,6 +191,13 @@ def discrepancy_section(page: Findings) -> None:
     found, study = stored_ensemble(), carried()
     nearest = found.nearest
     page.say("ramp", **_of_the_ramp(found))
+    reference = found.numbers.sel(layout=REFERENCE)
+    page.judge(
+        "knee_misses",
+        reference.ramp_up_current.item(),
+        reference=reference,
+        nearest=found.numbers.sel(layout=nearest),
+    )
     page.draw("knee_carried", figures.knee_carried(study, nearest, paper.KNEE_OFF_K))
     rows = [
         (

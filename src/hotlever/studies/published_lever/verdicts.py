@@ -64,6 +64,8 @@ CRITERIA: dict[str, Criterion] = {
         "by_legs_K", 0.5 * paper.KNEE_BY_LEGS_K, 1.5 * paper.KNEE_BY_LEGS_K, *_K
     ),
     "knee_by_doping": Criterion("doping_share", 0.75, 1.25, ".0%"),
+    # as large as it must be for the highest V_l to be that of another row
+    "knee_misses": _above("ramp_up_current", paper.CURRENT_ERROR, ".2%"),
     "dependent_parameters": _above("coupling_I", 0.8, ".2f"),
     "decoupled_groups": _below("coupling_III", 0.6, ".2f"),
     "one_factor": _below("eq12_air_K", paper.POWER_LAW_SPREAD_K, *_K),
