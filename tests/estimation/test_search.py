@@ -82,7 +82,9 @@ def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
             )
 
 
-@pytest.mark.parametrize(("n_d", "known"), [(2e17, 1.5e17), (4e17, 3e17)])
+@pytest.mark.parametrize(
+    ("n_d", "known"), [(2e17, 1.5e17), pytest.param(4e17, 3e17, marks=pytest.mark.slow)]
+)
 def test_a_fit_of_data_below_the_knee_ends_though_they_leave_a_valley_open(n_d, known):
     """Each step along it gained a hundredth of the noise, until no more levers were left."""
     true = Probe.u_shape().with_(n_d=n_d)
