@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 
@@ -130,7 +129,7 @@ def test_a_line_that_is_lost_as_the_output_is_turned_on_is_said_aloud():
         def source_answer(self, message: str) -> str | None:
             answer = super().source_answer(message)
             if self.output_on:
-                threading.Thread(target=self.break_lines).start()
+                self.break_lines()
             return answer
 
     with (
