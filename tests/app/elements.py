@@ -53,6 +53,12 @@ def texts(user: User) -> list[str]:
     return [one.text for one in there if isinstance(one, ui.label) and one.visible]
 
 
+def plots(user: User) -> list[Any]:
+    """Return what is plotted: the figures of all plots that have points."""
+    figures = [one.figure for one in all_of(user, ui.plotly)]
+    return [figure for figure in figures if figure["data"][0].get("x")]
+
+
 def images(user: User) -> list[str]:
     """Return what the pictures of a page show."""
     return [one.props["alt"] for one in user.client.elements.values() if one.tag == "img"]

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from elements import of, press
+from elements import of, plots, press
 from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import Here, Run, drop, text_of, until, visit
@@ -181,8 +181,7 @@ def test_without_a_measurement_an_example_is_shown(tmp_path: Path) -> None:
     async def story(user: User, session: Session) -> None:
         await user.open("/measurements")
         await until(lambda: "An example, lever-a.csv" in titles(user))
-        plots = [one for one in user.client.elements.values() if isinstance(one, ui.plotly)]
-        assert len(plots[0].figure["data"][0]["x"]) == 25  # type: ignore[index,call-overload]
+        assert len(plots(user)[0]["data"][0]["x"]) == 25
         assert not text_of(user, "role=alert").strip()
         assert session.chosen["measurements"]["data"] == []
         user.find("Try the example").click()

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from elements import plots
 from nicegui import ui
 from nicegui.testing import User
 from test_app_pages import Here, text_of, until, visit
@@ -90,8 +91,7 @@ def test_the_lever_that_is_fitted_is_drawn_beside_the_data(
         session.chosen["measurements"] = {"kind": "fit", "data": ["mine.csv"]}
         await user.open("/measurements")
         await user.should_see("Line: the lever as the fit has it", retries=50)
-        plots = [one for one in user.client.elements.values() if isinstance(one, ui.plotly)]
-        measured, model = plots[0].figure["data"]  # type: ignore[index,call-overload]
+        measured, model = plots(user)[0]["data"]
         assert len(measured["x"]) == len(model["x"]) == len(data["bias_V"])
         assert model["y"] == pytest.approx(curves[-1]["current_mA"], rel=1e-4)
 
