@@ -74,7 +74,7 @@ class InputQuantity:
         it is not known how many it has.
     prior : float, optional
         What was known beforehand, in the unit; None of what has no such value, and in files of
-        version 3.0, in which it stands as the estimate.
+        versions 1 and 2, in which it stands as the estimate.
     """
 
     quantity: str
