@@ -165,7 +165,7 @@ def test_work_survives_a_reload_is_cancelled_and_may_die(
     page.reload()
     expect(button(page, "Cancel")).to_be_visible()
     button(page, "Cancel").click()
-    expect(page.get_by_text("cancelled: nothing was written")).to_be_visible(timeout=_CANCEL)
+    expect(page.get_by_text("cancelled: only what was done")).to_be_visible(timeout=_CANCEL)
     button(page, "Fit").click()
     expect(button(page, "Cancel")).to_be_visible()
     page.wait_for_timeout(500)
@@ -173,7 +173,9 @@ def test_work_survives_a_reload_is_cancelled_and_may_die(
         if _is_worker(pid):
             os.kill(pid, signal.SIGKILL)
     expect(page.get_by_text("the process that worked on this died").first).to_be_visible()
-    assert _files(folder) == before
+    # the fit may have been done, and is whole; nothing else is there
+    for name in set(_files(folder)) ^ set(before):
+        assert json.loads((folder / name).read_text())["parameters"]
     # the app goes on, with new processes
     go(page, app, "lever")
     expect(page.locator("img[alt^='The lever from above']")).to_be_visible(timeout=_WORK)

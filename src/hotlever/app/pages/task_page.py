@@ -376,7 +376,7 @@ class JobView:
             return
         self._seen = (id(job), job.version)
         cancelled = job.standing == "cancelled"
-        message = "cancelled: nothing was written" if cancelled else job.message
+        message = "cancelled: only what was done before is written" if cancelled else job.message
         self._message.set_text("" if running else message)
         self._message.set_visibility(not running and bool(message))
         self._notes.clear()
