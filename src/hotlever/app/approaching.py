@@ -62,7 +62,9 @@ def described(report: Report, name: str, tilt_deg: float | None) -> dict[str, An
 
 
 @one_blas_thread
-def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str, Any]:
+def answer(
+    report: Report, task: Task, distance: float, quick: bool, jump_K: float | None
+) -> dict[str, Any]:
     """Return what a reader shows at a distance (µm), and if `quick` by the distance too.
 
     Parameters
@@ -73,6 +75,9 @@ def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str
     distance : float
     quick : bool
         Whether the coarse lever is to answer.
+    jump_K : float or None
+        The temperature as at which the air jumps for it while the bias moves, so that its levers
+        need not be solved anew; that of its own tip if None. The full lever takes the latter.
 
     Raises
     ------
@@ -87,7 +92,11 @@ def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str
     probe = surrounded_probe(report, told, finds_air=True)
     probe = over_a_surface(report, probe, medium, distances)
     bias = float(parse_bias(told["bias"], probe.lowest_bias_V).item())
-    probe = jumping_at_tip(report, _coarse(probe), bias)
+    stated = probe.surroundings
+    if quick and jump_K is not None:
+        probe = probe.with_(jump_temperature_K=jump_K)
+    else:
+        probe = jumping_at_tip(report, _coarse(probe), bias)
     if quick:
         return _moving(report, Reader(probe, noise), distances, distance, bias)
     lever = make_lever(report, probe.with_(surface_gap_um=distance))
@@ -95,9 +104,10 @@ def answer(report: Report, task: Task, distance: float, quick: bool) -> dict[str
     if not data.tip_K.notnull().any():
         raise ComputationError(notes_of(data)[0])
     report.note(*notes_of(data))
-    values = {name: float(data[name].item()) for name in _READ}
+    values, around = {name: float(data[name].item()) for name in _READ}, probe.surroundings
     return {
         "now": {"bias_V": bias, "surface_gap_um": distance, **values},
+        "jump_K": None if around == stated else around.jump_temperature_K,
         "read_at": data.attrs["read_at"],
     }
 

@@ -23,8 +23,12 @@ _OF_THE_SURFACE = (
     ("tilt_deg", "Tilt", "°", "surface_tilt_deg: of the surface; positive: the base is farther"),
     ("accommodation", "Accommodation", "", "for the temperature jump at surfaces, 0.01 to 1"),
 )
-_MOVING = "coarse lever, while the full one is solved"
+_MOVING = (
+    "coarse lever, while the full one is solved; the air's temperature jumps as at the bias before"
+)
 _AT_REST = "full lever: the numbers of hotlever reader"
+#: Temperatures (K) as at which the air jumps alike: the voltage is the same within 0.1 %.
+_SAME_JUMP_K = 2.0
 #: What is said of the curves, which are of a coarse lever: how far they are off here.
 _OFF = {"reader_V": "voltage", "reader_ohm": "resistance", "dlnR_dz_per_um": "d ln R/dz"}
 _ABOUT = (
@@ -134,8 +138,10 @@ class ReaderPage(LivePage):
         "tip_K": ("tip", "{:.1f} K", 1.0),
     }
     state = ("distance_um",)
-    #: The last answer of the coarse lever.
+    #: The last answers of the coarse and the full lever, and as at what the air jumps for curves.
     _coarse: Mapping[str, Any] = MappingProxyType({})
+    _full: Mapping[str, Any] = MappingProxyType({})
+    _jump_K: float | None = None
 
     def controls(self) -> None:
         """Ask for tilt and accommodation, of which each value needs other levers."""
@@ -146,7 +152,7 @@ class ReaderPage(LivePage):
 
     async def described(self) -> dict[str, Any]:
         """Return which distances there are, and what the file says of the surroundings."""
-        self._coarse = {}
+        self._coarse, self._jump_K = {}, None
         request = approaching.described, self.probe, self.chosen["tilt_deg"]
         answer: dict[str, Any] = await self.session.ask("quick", *request)
         nearest, farthest = answer["nearest_um"], answer["farthest_um"]
@@ -181,17 +187,34 @@ class ReaderPage(LivePage):
         }
         return Task("reader", self.probe_files, options)
 
+    def also_asked(self) -> tuple[float | None]:
+        """Return as at which temperature the air jumps, at the tip of the full lever."""
+        return (self._jump_K,)
+
     def completed(self, answer: dict[str, Any], quick: bool) -> dict[str, Any]:
         """Return an answer with the curves, which are of the coarse lever."""
         if quick:
             self._coarse = answer
         return {**self._coarse, **answer}
 
+    async def follow_answer(self, at: list[float], quick: bool) -> None:
+        """Have the curves follow, too, if the air jumps as at another temperature by now."""
+        jump_K = self._full.get("jump_K")
+        if quick or jump_K is None or abs(jump_K - (self._jump_K or 0.0)) <= _SAME_JUMP_K:
+            return
+        self._jump_K, wanted = jump_K, (self.of_lever(), at)
+        with self.banner.caught():
+            request = approaching.answer, *wanted[:1], *at, True, jump_K
+            coarse = await self.session.ask("quick", *request)
+            if not self.is_gone and self._follower.last == wanted:
+                self.draw({**self.completed(coarse, True), **self._full}, False)
+
     def model_and_remark(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return whose numbers these are, where they are read, and how far curves are off."""
         remark = "; ".join([f"Read at the terminal {answer['read_at']}", *answer["on_curves"]])
         if quick:
             return _MOVING, remark
+        self._full = {key: answer[key] for key in ("now", "jump_K", "read_at")}
         coarse, now = self._coarse["now"], answer["now"]
         off = (f"{100 * (coarse[key] / now[key] - 1):+.2g} % in {_OFF[key]}" for key in _OFF)
         return _AT_REST, f"{remark}; curves: coarse lever, here {', '.join(off)}"
