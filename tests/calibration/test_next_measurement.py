@@ -15,6 +15,7 @@ from hotlever.estimate import calibrate, plan_next, read_calibration
 from hotlever.estimate.experiment import TIP
 from hotlever.estimate.next_measurement import LinearisedLever
 from hotlever.estimate.surrogate import Rows
+from hotlever.lever.lever import COARSE, Lever
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import THERMOMETER
@@ -57,6 +58,27 @@ def plan(first):
     return plan_next(first[1], at_K=500.0, stay_below_K=700.0, count=6)
 
 
+def with_proposed(calibration, plan, measure):
+    """Return what was calibrated, and beside it what a plan proposes, measured."""
+    before, proposed = calibration.measurement, plan.proposals
+    # a spectrum that is taken twice is two rows
+    added = proposed.bias_V.values + 1e-4 * np.arange(proposed.sizes["proposal"])
+    more = measure(added, added[proposed.what.values == "spectra"])
+    columns = {
+        name: np.concatenate([getattr(before, name), getattr(more, name)])
+        for name in ("bias_V", "current_mA", "reader_V", "tip_K", "tip_error_K")
+    }
+    return replace(before, **columns)
+
+
+def scatter_of_the_knee(lever, count=400):
+    """Return the standard deviation of the knees (K) of levers drawn as they are known."""
+    spread = np.linalg.cholesky(lever.information.covariance)[: len(lever.names)]
+    drawn = spread @ np.random.default_rng(1).standard_normal((spread.shape[1], count))
+    levers = (lever.surrogate.branch_at(lever.parameters(away)) for away in drawn.T)
+    return np.std([branch.knee.tip_K for branch in levers if branch.knee is not None])
+
+
 def test_the_error_now_is_the_one_that_the_calibration_states(first, tmp_path):
     first[1].write(tmp_path / "cal.json")
     calibration = read_calibration(tmp_path / "cal.json")
@@ -71,22 +93,48 @@ def test_the_error_now_is_the_one_that_the_calibration_states(first, tmp_path):
 
 
 def test_the_error_that_is_foretold_is_the_one_that_then_comes(first, plan, measure):
-    before = first[1].measurement
-    added, what = plan.proposals.bias_V.values, plan.proposals.what.values
-    # a spectrum that is taken twice is two rows
-    added = added + 1e-4 * np.arange(added.size)
-    more = measure(added, added[what == "spectra"])
-    both = replace(
-        before,
-        **{
-            name: np.concatenate([getattr(before, name), getattr(more, name)])
-            for name in ("bias_V", "current_mA", "reader_V", "tip_K", "tip_error_K")
-        },
-    )
-    then = calibrate(both).table
+    then = calibrate(with_proposed(first[1], plan, measure)).table
     stated = np.interp(500.0, then.tip_K, then.tip_stderr_K)
     assert plan.proposals.stderr_then_K.values[-1] == pytest.approx(stated, rel=0.25)
     assert stated < 0.9 * plan.proposals.stderr_now_K.values[0]
+
+
+@pytest.mark.parametrize("name", ["c_kappa", "delta", "n_d", "p", "a0", "base_temperature_K"])
+def test_the_knee_moves_with_parameters_as_those_of_levers_that_have_others(name):
+    lever = LinearisedLever.of_priors(Probe.reference(), {"base_temperature_K": "293 ± 2"})
+    number, slopes = lever.names.index(name), lever.knee()[2]
+    moved = [
+        Lever(lever.probe.replace(dict(zip(lever.names, values, strict=True))), COARSE)
+        for way in (-2e-3, 2e-3)
+        for values in [lever.parameters(way * np.eye(len(lever.names))[number]).tolist()]
+    ]
+    differences = np.diff([each.branch().knee.tip_K for each in moved]) / 4e-3
+    assert slopes[number] == pytest.approx(differences.item(), rel=2e-2, abs=0.05)
+
+
+def test_the_error_of_the_knee_is_the_scatter_of_the_knees_of_such_levers(measure):
+    """Now, and as foretold of the posterior once what is proposed has been measured.
+
+    Nor do the first spectra of a lever beat the scale of their thermometer.
+    """
+    calibration = calibrate(measure(np.linspace(0.6, 9.6, 16), []))
+    plan = plan_next(calibration, quantity="knee", count=4, noise={"tip": RAMAN})
+    now = scatter_of_the_knee(LinearisedLever.of_calibration(calibration))
+    assert plan.proposals.stderr_now_K.values[0] == pytest.approx(now, rel=0.15)
+    then = LinearisedLever.of_calibration(calibrate(with_proposed(calibration, plan, measure)))
+    foretold = plan.proposals.stderr_then_K.values[-1]
+    assert foretold == pytest.approx(scatter_of_the_knee(then), rel=0.25)
+    assert THERMOMETER * (plan.at_K - 293.0) * 0.8 < foretold < 0.8 * now
+    assert plan.text().startswith(f"The knee at {plan.at_K:.0f} K is known to ± ")
+
+
+def test_what_is_proposed_of_the_knee_tells_more_of_it_than_what_is_of_a_cold_tip(first):
+    knee, cold = (
+        plan_next(first[1], count=3, **aim) for aim in ({"quantity": "knee"}, {"at_K": 400.0})
+    )
+    lever = LinearisedLever.of_calibration(first[1])
+    assert knee.proposals.tip_K.values.max() > cold.proposals.tip_K.values.max()
+    assert knee.at_K == pytest.approx(lever.surrogate.branch.knee.tip_K)
 
 
 def test_nothing_is_proposed_beyond_the_limit(plan):
@@ -177,6 +225,8 @@ def test_the_command_writes_a_row_for_each_proposal(run, first):
     [
         (("--allow", "pulse"), "expected some of bias, reader, spectra"),
         (("--allow", "spectrum"), "did you mean 'spectra'"),
+        (("--quantity", "kne"), "did you mean 'knee'"),
+        (("--quantity", "knee", "--at", "800K"), "the knee has a temperature of its own"),
         (("--allow", "bias=0"), "a whole number from 1 to 100"),
         (("--stay-below", "250K"), "no bias is safe"),
         (("--at", "3000K"), "expected a temperature from 293 to"),

@@ -1,4 +1,4 @@
-"""What to measure next: the rows that lessen the error of a tip temperature most.
+"""What to measure next: the rows that lessen the error of a tip temperature most, or of the knee's.
 
 Of each measurement that could be made it is known before how much smaller it makes the standard
 error that the next calibration states, and how hot the tip may get there. A lever as far as it is
@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
+from typing import Literal, get_args
 
 import numpy as np
 import xarray as xr
@@ -32,6 +33,7 @@ from hotlever.estimate.tip_table import BUDGETS, budgets_of
 from hotlever.estimate.tip_temperature import error_of_model
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.observables import knee_by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
@@ -187,6 +189,15 @@ _USUAL_NOISE = {"tip": NoiseLaw(RAMAN_ERROR_K, 0.0)}
 _USUAL_OF_METERS = NoiseLaw(0.0, 1e-3)
 
 
+def _usual_scales(measured: Iterable[str]) -> dict[str, Prior]:
+    """Return the priors of scales of what was not measured yet, by their names."""
+    return {
+        scale: Prior(1.0, THERMOMETER if observable == "tip" else METERS)
+        for observable, scale in _SCALED.items()
+        if observable not in measured
+    }
+
+
 @dataclass(frozen=True)
 class LinearisedLever:
     """A lever, and what is known of it.
@@ -246,6 +257,7 @@ class LinearisedLever:
         hottest = calibration.table.isel(bias=int(np.nanargmax(calibration.table.tip_K)))
         above = float(hottest.tip_high_K - hottest.tip_K) / (BAND * float(hottest.tip_stderr_K))
         names = calibration.names or FitOptions(priors=priors).of(probe).varied
+        priors = {**_usual_scales(calibration.weights), **priors}
         return cls(probe, names, priors, measurement, calibration.weights, max(above, 1.0))
 
     @classmethod
@@ -261,10 +273,8 @@ class LinearisedLever:
             )
         probe.circuit.need_cold_start("what to measure next")
         values = {name: prior.value for name, prior in priors.items() if name not in SCALES}
-        shares = dict.fromkeys(SCALES, METERS) | {_SCALED["tip"]: THERMOMETER}
-        scales = {name: Prior(1.0, share) for name, share in shares.items()}
         names = FitOptions(priors=priors).of(probe).varied
-        return cls(probe.replace(values), names, {**scales, **priors}, None, {})
+        return cls(probe.replace(values), names, {**_usual_scales(()), **priors}, None, {})
 
     # --- what it shows ----------------------------------------------------------------------------
 
@@ -316,6 +326,26 @@ class LinearisedLever:
         values, slopes = self.predict(Rows(bias))
         slopes[TIP, :, len(self.names) :] = 0.0
         return values[TIP], slopes[TIP]
+
+    def knee(self) -> tuple[float, float, Array]:
+        """Return bias (V) and tip temperature (K) of the knee, and the latter's derivatives, (q,).
+
+        Raises
+        ------
+        InputError
+            If the lever has none.
+        """
+        surrogate, circuit = self.surrogate, self.probe.circuit
+        knee = surrogate.branch.knee
+        if knee is None:
+            raise InputError(
+                f"knee: the lever has none below {self.hottest_K:.0f} K; expected a temperature "
+                "of the tip"
+            )
+        slopes = knee_by_parameter(surrogate.branch, surrogate.by_parameter, self.names)
+        of_parameters = slopes * self._coordinates.rates(self._point)
+        bias = circuit.bias(knee.lever_V, knee.current_mA)
+        return bias, knee.tip_K, np.append(of_parameters, np.zeros(len(_SCALED)))
 
     def predict(self, rows: Rows) -> tuple[Array, Array]:
         """Return what rows show (observables, n), and derivatives by the unknowns (…, n, q)."""
@@ -434,6 +464,8 @@ class LinearisedLever:
 
 # --- proposals ------------------------------------------------------------------------------------
 
+#: What is to be known better.
+Aim = Literal["tip", "knee"]
 #: What can be measured, and what that shows beside the current.
 KINDS = {"bias": (), "reader": ("reader",), "spectra": ("tip",)}
 #: Of these several at one bias are proposed; a sweep does not return to one.
@@ -457,14 +489,17 @@ class Plan:
     proposals : xarray.Dataset
         On the dimension ``proposal``, best first: ``what`` of `KINDS`, ``bias_V``, ``gain``, the
         tip temperature ``tip_K`` expected there, ``tip_limit_K``, which it does not exceed with a
-        probability of 99 %, and ``stderr_now_K`` and ``stderr_then_K``, the standard errors of the
-        tip temperature at ``at_K`` now and after this and all proposals before. The gain is how
-        many kelvins (per unit of cost, if there are costs) this one takes off.
+        probability of 99 %, and ``stderr_now_K`` and ``stderr_then_K``, the standard errors of
+        the ``quantity`` now and after this and all proposals before. The gain is how many kelvins
+        (per unit of cost, if there are costs) this one takes off.
     errors : xarray.Dataset
         ``tip_K`` and ``tip_limit_K`` on ``bias``, and ``tip_stderr_K``, the standard errors after
         so many proposals, on (``added``, ``bias``).
+    quantity : {"tip", "knee"}
+        Whose error counts: of the tip temperature at the bias where it is ``at_K``, or of that at
+        the knee, wherever the knee is.
     at_K : float
-        Where the error counts.
+        What it is as far as is known.
     stay_below_K : float or None
     safe_V, safe_then_V : float
         The highest bias at which the tip is not too hot with that certainty, now and, as expected,
@@ -475,6 +510,7 @@ class Plan:
 
     proposals: xr.Dataset
     errors: xr.Dataset
+    quantity: Aim
     at_K: float
     stay_below_K: float | None
     safe_V: float
@@ -497,11 +533,16 @@ class Plan:
         ]
         rows = zip(self.proposals.what.values.tolist(), *columns, strict=True)
         now = (
-            f"The tip at {self.at_K:.0f} K is known to ± "
+            f"{self.aim[0].upper()}{self.aim[1:]} is known to ± "
             f"{self.proposals.stderr_now_K.values[0]:.1f} K now (standard error)."
         )
         after = [*self._repeated, self._safety]
         return "\n".join([now, "", *aligned([head, *rows], right=True), "", *after])
+
+    @property
+    def aim(self) -> str:
+        """What is to be known, in words."""
+        return f"the {self.quantity} at {self.at_K:.0f} K"
 
     @property
     def _repeated(self) -> list[str]:
@@ -511,9 +552,8 @@ class Plan:
         rows = rows.assign(brings_K=before - rows.stderr_then_K.to_numpy())
         return [
             f"{len(same)} {what} at {bias:.3f} V: no other measurement that is allowed tells more "
-            f"of the tip at {self.at_K:.0f} K. Each lessens the noise of the mean, but not what "
-            f"all {what} have wrong in common; the last takes off "
-            f"{same.brings_K.iloc[-1]:.1f} K."
+            f"of {self.aim}. Each lessens the noise of the mean, but not what all {what} have "
+            f"wrong in common; the last takes off {same.brings_K.iloc[-1]:.1f} K."
             for (what, bias), same in rows.groupby(["what", "bias_V"], sort=False)
             if len(same) > 1
         ]
@@ -543,6 +583,7 @@ def plan_next(
     priors: Mapping[str, Prior | str] | None = None,
     allowed: Mapping[str, int | None] | None = None,
     count: int = 5,
+    quantity: Aim = "tip",
     at_K: float | None = None,
     stay_below_K: float | None = None,
     bias: Array | None = None,
@@ -564,9 +605,12 @@ def plan_next(
         reader, and spectra where the heater is no silicon; these count where the data have them.
     count : int
         Proposals, at most.
+    quantity : {"tip", "knee"}
+        Whose error counts: that of a tip temperature, at the bias that leads to it, or of the tip
+        temperature at the knee, whose bias is uncertain too.
     at_K : float, optional
-        The tip temperature whose error counts; by default the hottest measured one, or without data
-        the hottest that is allowed.
+        That tip temperature, but not of a knee; by default the hottest measured one, or without
+        data the hottest that is allowed.
     stay_below_K : float, optional
         The tip is to stay below with 99 % probability. What could melt with more than 1 % is never
         proposed.
@@ -587,7 +631,7 @@ def plan_next(
     ------
     InputError
         If a kind does not exist or its observable has no sense, data are not described, no bias is
-        safe, or none leads to the temperature.
+        safe, none leads to the temperature, or there is no knee.
     ComputationError
         If the lever cannot be solved.
 
@@ -604,13 +648,20 @@ def plan_next(
     )
     most = _allowed(lever, allowed)
     limit = np.inf if stay_below_K is None else stay_below_K
+    if quantity not in get_args(Aim):
+        raise unknown_name("quantity", quantity, get_args(Aim))
+    if quantity == "knee" and at_K is not None:
+        raise InputError("at_K: the knee has a temperature of its own; leave it out")
     bias, highest_K, safe = _safe_biases(lever, bias, limit)
     tip_K, by_unknowns = lever.tip(bias)
-    if at_K is None:
-        tips = tip_K[:safe] if calibration is None else calibration.table.tip_K.values
-        at_K = float(np.nanmax(tips))
-    aim = lever.bias_for(at_K)
-    _, (gradient,) = lever.tip(np.array([aim]))
+    if quantity == "knee":
+        aim_V, at_K, gradient = lever.knee()
+    else:
+        if at_K is None:
+            tips = tip_K[:safe] if calibration is None else calibration.table.tip_K.values
+            at_K = float(np.nanmax(tips))
+        aim_V = lever.bias_for(at_K)
+        _, (gradient,) = lever.tip(np.array([aim_V]))
     candidates = _candidates(lever, most, bias[:safe], costs or {}, noise or {})
     limited = {kind: number for kind, number in most.items() if number is not None}
     chosen = best_first(lever.information, candidates, gradient, count, limited)
@@ -618,9 +669,9 @@ def plan_next(
         raise InputError("what to measure next: nothing is allowed, expected a measurement or more")
     each = (candidates[number].rows for number in chosen)
     after = list(accumulate(each, Information.with_rows, initial=lever.information))
-    stays, notes = _errors_that_stay(lever, calibration, np.append(bias, aim))
-    of_tip = np.array([information.stderr(gradient) for information in after])
-    stderr = np.hypot(of_tip, stays[-1])
+    stays, notes = _errors_that_stay(lever, calibration, np.append(bias, aim_V))
+    of_aim = np.array([information.stderr(gradient) for information in after])
+    stderr = np.hypot(of_aim, stays[-1])
     cost = np.array([candidates[number].cost for number in chosen])
     rows = np.array(chosen) % safe
     columns = {
@@ -642,6 +693,7 @@ def plan_next(
             "bias",
             {"bias": bias, "added": counts},
         ),
+        quantity,
         at_K,
         stay_below_K,
         float(bias[safe - 1]),

@@ -581,7 +581,7 @@ def planned_measurements(plan: Plan) -> Figure:
         last = errors.tip_stderr_K.isel(added=-1)
         by_tip.axvline(plan.at_K, color="0.6", lw=0.9, ls=":")
         above: Any = {"xycoords": by_tip.get_xaxis_transform(), "color": "0.4", "fontsize": 7}
-        by_tip.annotate(f"{plan.at_K:.0f} K, where it counts", (plan.at_K, 1.0), **above)
+        by_tip.annotate(plan.aim, (plan.at_K, 1.0), **above)
         by_bias.plot(errors.bias[finite], errors.tip_K[finite], color=BLACK, label="expected")
         limit: Any = {"color": VERMILION, "label": f"no hotter, by {SURE:.0%}"}
         by_bias.plot(errors.bias[finite], errors.tip_limit_K[finite], "--", **limit)

@@ -16,6 +16,7 @@ import numpy as np
 from hotlever.lever.branch import TIP_RISE, Branch
 from hotlever.lever.continuation import Enough, continued
 from hotlever.lever.equations import LeverEquations
+from hotlever.lever.laws import BASE
 from hotlever.lever.space import TIP, Constraint, Factors
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
@@ -79,7 +80,7 @@ def observed_by(circuit: Circuit, outputs: Array, slopes: Array, names: Sequence
         "current": current_mA,
         "reader": reader_V,
         "bridge": circuit.bridge_change(lever_V, 0.0) + of_divider,
-        "tip": rise_K + [float(name == "base_temperature_K") for name in names],
+        "tip": rise_K + [float(name == BASE) for name in names],
     }
     return np.stack([values[name] for name in OBSERVABLES])
 
@@ -111,6 +112,27 @@ def at_fixed_bias(
     missing = circuit.bias(output_slopes[:, 0], output_slopes[:, 1]) + of_circuit
     u_by_parameter = -missing / circuit.bias(along[:, 0], along[:, 1])[:, None]
     return np.moveaxis(output_slopes + along[:, :, None] * u_by_parameter[:, None], 1, 0)
+
+
+def knee_by_parameter(branch: Branch, output_slopes: Array, names: Sequence[str]) -> Array:
+    """Return how the tip temperature where V_l is highest changes with parameters, (p,).
+
+    A parameter bends V_l at fixed rises of the tip; its maximum moves until it is level again.
+
+    Parameters
+    ----------
+    branch : Branch
+        One that has a knee.
+    output_slopes : ndarray, shape (k, 4, p)
+        Derivatives of what its states show, see `by_parameter`.
+    names : sequence of str
+        The parameters.
+    """
+    u = branch.knee_u
+    assert u is not None
+    steeper = spline_through(branch.u, output_slopes[:, 0], 5).derivative()(u)
+    along, curvature = branch.curve(u, 1)[TIP_RISE], branch.curve(u, 2)[0]
+    return np.asarray(-along * steeper / curvature + [float(name == BASE) for name in names])
 
 
 # --- derivatives by parameters --------------------------------------------------------------------

@@ -444,6 +444,13 @@ def propose(
         int | None,
         Option(metavar="N", help="Proposals; 5, or as many as are allowed, if left out."),
     ] = None,
+    quantity: Annotated[
+        str,
+        Option(
+            metavar="tip|knee",
+            help="Whose error counts: that of the tip temperature --at, or of that at the knee.",
+        ),
+    ] = "tip",
     at: Annotated[
         str | None,
         Option(
@@ -491,14 +498,16 @@ def propose(
     ] = None,
     plot: Plot = None,
 ) -> None:
-    """Say what to measure next, so that the tip temperature is known best.
+    """Say what to measure next, so that a tip temperature or the knee's is known best.
 
     One row for each proposal, best first: how hot the tip would be there, and how hot at most
-    with 99 % certainty, and how sure its temperature is known then. Without data: where to begin.
+    with 99 % certainty, and how sure what counts is known then. Without data: where to begin.
     """
     from hotlever.estimate import plan_next, read_calibration
     from hotlever.estimate.options import UNKNOWN_MEDIUM
 
+    if quantity == "knee":
+        refuse("the knee has a temperature of its own; leave it out", at=at)
     # of a lever that was not measured nothing could tell in which it is
     check_medium(medium, *([] if data is None else [UNKNOWN_MEDIUM]))
     check_number("--count", count, 1, MOST_PROPOSALS)
@@ -506,6 +515,7 @@ def propose(
     limits = list((allowed or {"": None}).values())
     usual = sum(number or 0 for number in limits) if all(limits) else _PROPOSALS
     choices: dict[str, Any] = {
+        "quantity": quantity,
         "at_K": parse_temperature(at, "--at"),
         "stay_below_K": parse_temperature(stay_below, "--stay-below"),
         "allowed": allowed,

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError
-from hotlever.lever.branch import TIP_RISE, Branch, branch_end
-from hotlever.lever.observables import Linearised
-from hotlever.piecewise import Piecewise, spline_through
+from hotlever.lever.branch import Branch, branch_end
+from hotlever.lever.observables import Linearised, knee_by_parameter
+from hotlever.piecewise import Piecewise
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array
 
@@ -109,12 +109,10 @@ class Readings:
         ComputationError
             If V_l rises to the end of the branch.
         """
-        u = self.branch.knee_u
-        if u is None:
+        knee, solved = self.branch.knee, self.linearised
+        if knee is None:
             raise ComputationError("the lever has no knee")
-        slope = spline_through(self.branch.u, self.linearised.output_slopes[:, 0], 5).derivative()
-        moved = -slope(u) / self.branch.curve(u, 2)[0]
-        return float(self.branch.tip_K(u)), moved * self.branch.curve(u, 1)[TIP_RISE]
+        return knee.tip_K, knee_by_parameter(self.branch, solved.output_slopes, solved.names)
 
     def off_point(
         self, point: tuple[float, float], unit: tuple[float, float]
