@@ -156,6 +156,17 @@ def test_priors_say_what_was_known_and_what_the_data_made_of_it(calibrated):
     assert "gap_um" in text
 
 
+def test_nobody_is_told_to_measure_what_was_measured(calibrated):
+    """Temperatures were advised beside 24 of them."""
+    known = replace(calibrated, observables=(*calibrated.observables, "tip"))
+    with_some = calibration_text(known)
+    without = calibration_text(calibrated)
+    assert "tip temperatures at some points" in without
+    assert "more tip temp" not in without
+    assert "more tip temperatures" in with_some
+    assert "at some points" not in with_some
+
+
 def test_a_power_law_is_used_by_the_paper_s_rule(calibrated, lever_3):
     curve = measured_curve(lever_3, np.random.default_rng(1), to_V=9.5)
     law = calibrated.power_law

@@ -41,10 +41,10 @@ _BASIS = {
 }
 #: What would make the largest error smaller, by its source.
 _ADVICE = {
-    "measurement": "less noise, or tip temperatures at some points, would help",
+    "measurement": "less noise, or {temperatures}, would help",
     "geometry": "better known dimensions would help (--prior dimensions=±2%)",
-    "material": "a fit of this lever (--fit), or its tip temperatures, would know its material",
-    "laws": "tip temperatures at some points would help; what is known better of a law may be said "
+    "material": "a fit of this lever (--fit), or {temperatures}, would know its material",
+    "laws": "{temperatures} would help; what is known better of a law may be said "
     "(--prior law.n_i=±5%)",
     "fit": "more data for the fit would help",
     "air": "a fit in air would measure the loss to air",
@@ -314,7 +314,9 @@ def _verdict(calibration: Estimate) -> str:
         known = ", ".join([*edges, "thickness_um=±2%"])
         return f"{text}: a better known drawing would help (--prior {known})"
     if largest in _ADVICE and not (by_law and largest == "constant k"):
-        return f"{text}: {_ADVICE[largest]}"
+        measured = "tip" in calibration.observables
+        temperatures = "more tip temperatures" if measured else "tip temperatures at some points"
+        return f"{text}: {_ADVICE[largest].format(temperatures=temperatures)}"
     if by_law:
         return f"{text}; a probe (--probe) or a fit (--fit) would know more than a power law"
     return text
