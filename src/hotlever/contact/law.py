@@ -27,16 +27,10 @@ from hotlever.types import Array
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-#: Rises of the temperature at the base between which the law is tabulated, and how often.
-_LOWEST_K, _HIGHEST_K, _COOLER, _TABULATED = -60.0, 1500.0, 5, 115
-#: Rise (K) below which the apex's share of it is that at this rise.
-_WARM_K = 1.0
 #: Share of a parameter, or of all resistances, by which it is changed for a derivative.
 _STEP = 1e-3
 #: By this name the interface stands in probe files and fits.
 INTERFACE = "interface_K_per_mW"
-#: What else of a probe the law depends on.
-_NUMBERS = ("height_um", "half_angle_deg", "apex_radius_um", "base_temperature_K")
 
 
 class AtTheContact(NamedTuple):
@@ -95,7 +89,8 @@ class ContactLaw:
         below = self.below_apex_K_per_mW
         above = cold_resistance(self._tip, self.base_temperature_K)
         # where nothing else conducts and the cone is cold, this is the rise at the base
-        driving = _rises(_HIGHEST_K)
+        highest_K = 1500.0
+        driving = _rises(highest_K)
         for _ in range(2):
             at_apex = driving / (1.0 + above / below)
             heat = driving / (below + above)
@@ -103,7 +98,7 @@ class ContactLaw:
             _, T, into_tip, cone = up_the_cone(self._tip, base + at_apex, heat, base, air)
             rise = T[-1] - base
             # a hot cone resists more: no more of the table than is of use
-            driving = _rises(float(np.interp(_HIGHEST_K, rise, driving)))
+            driving = _rises(float(np.interp(highest_K, rise, driving)))
         return CubicSpline(rise, np.stack([into_tip[-1], heat, at_apex, cone[-1]], axis=1))
 
     def heat(self, rise: Array, names: Sequence[str] = ()) -> Evaluated:
@@ -136,7 +131,8 @@ class ContactLaw:
         which the law does not depend.
         """
         # the ratio of a tip that is hardly warm is that of one that is a little warmer
-        warm = np.maximum(rise, _WARM_K)
+        least_K = 1.0
+        warm = np.maximum(rise, least_K)
 
         def odds(law: ContactLaw, more: float = 1.0) -> Array:
             tip = more * warm
@@ -147,7 +143,7 @@ class ContactLaw:
         value = odds(self)
         by = {name: self._by(name, odds, value) for name in names}
         change = odds(self, 1.0 + _STEP) - odds(self, 1.0 - _STEP)
-        return value, {**by, "T": np.where(rise > _WARM_K, change / (2.0 * _STEP * warm), 0.0)}
+        return value, {**by, "T": np.where(rise > least_K, change / (2.0 * _STEP * warm), 0.0)}
 
     def along_axis(self, tip_K: float, depth_um: Array) -> tuple[Array, Array, Array]:
         """Return heights (µm) on the cone, the temperatures (K) there, and those under its middle.
@@ -169,7 +165,11 @@ class ContactLaw:
     @property
     def names(self) -> tuple[str, ...]:
         """The numbers of a probe on which the law depends."""
-        return (INTERFACE, *_NUMBERS, *(("gas_conductivity",) if self._air else ()))
+        return (
+            INTERFACE,
+            *("height_um", "half_angle_deg", "apex_radius_um", "base_temperature_K"),
+            *(("gas_conductivity",) if self._air else ()),
+        )
 
     def _by(self, name: str, what: Callable[[ContactLaw], Array], here: Array) -> Array:
         """Return how what something of the law is here changes with a number of the probe."""
@@ -192,8 +192,8 @@ class ContactLaw:
 
 def _rises(highest: float) -> Array:
     """Return rises (K) at which the law is tabulated, zero among them."""
-    cooler = np.linspace(_LOWEST_K, 0.0, _COOLER, endpoint=False)
-    return np.concatenate([cooler, np.linspace(0.0, highest, _TABULATED)])
+    cooler = np.linspace(-60.0, 0.0, 5, endpoint=False)
+    return np.concatenate([cooler, np.linspace(0.0, highest, 115)])
 
 
 @lru_cache(maxsize=16)

@@ -16,17 +16,6 @@ from hotlever.probe import Probe
 from hotlever.probe.tip import SampleContact
 from hotlever.types import Array
 
-#: Slices of the cone and of what is under it; height of the lever's bar in the picture.
-_SLICES, _BAR = 40, 0.7
-#: How deep the sample is shown: in radii, and in its films, whichever is more.
-_RADII, _FILMS = 30.0, 3.0
-#: The picture is at least as wide, for names beside the contact.
-_NARROWEST = 3.0
-#: A layer that is thinner in the picture has no room for its name.
-_THIN = 0.4
-#: The least depth at which temperatures are drawn, over the radius.
-_NEAREST = 1e-3
-
 Corners = list[tuple[float, float]]
 
 
@@ -75,18 +64,21 @@ def contact_picture(probe: Probe, tip_K: float) -> ContactPicture:
         return np.asarray(np.arcsinh(np.asarray(length_um) / end))
 
     films = sum(layer.thickness_um or 0.0 for layer in contact.layers)
-    deepest = max(_RADII * end, _FILMS * films)
-    down = end * np.sinh(np.linspace(0.0, float(coordinate(deepest)), _SLICES + 1))
-    down[0] = _NEAREST * end
+    # the sample is shown as deep as 30 radii, or three times its films, whichever is more
+    deepest = max(30.0 * end, 3.0 * films)
+    slices = 40
+    down = end * np.sinh(np.linspace(0.0, float(coordinate(deepest)), slices + 1))
+    down[0] = 1e-3 * end  # at the surface itself the depth has no logarithm
     height, cone_K, under_K = law.along_axis(tip_K, down)
-    up = np.linspace(float(coordinate(tip.height_um)), 0.0, _SLICES + 1)
+    up = np.linspace(float(coordinate(tip.height_um)), 0.0, slices + 1)
     along_K = np.interp(up, coordinate(height), cone_K)
     half = coordinate(end + tip.slope * end * np.sinh(up))
     below = -coordinate(down)
     below[0] = 0.0
-    width = max(_NARROWEST, 1.2 * float(half[0]))
-    top = float(up[0]) + _BAR
+    # wide enough for names beside the contact
+    width = max(3.0, 1.2 * float(half[0]))
     low = float(up[0])
+    top = low + 0.7
     bar = [(-width, low), (width, low), (width, top), (-width, top)]
     column = np.full_like(below, float(coordinate(end)))
     pieces = [
@@ -107,7 +99,7 @@ def contact_picture(probe: Probe, tip_K: float) -> ContactPicture:
         _ticks(end, tip.height_um, deepest),
         np.concatenate([up, below]),
         np.concatenate([along_K, under_K]),
-        _SLICES,
+        slices,
         width,
         float(floors[-1]),
         top,
@@ -120,7 +112,8 @@ def _named(contact: SampleContact, floors: list[float]) -> list[tuple[str, float
     for layer, top, bottom in zip(contact.layers, floors, floors[1:], strict=False):
         thick = "" if layer.thickness_um is None else f", {_length(layer.thickness_um)}"
         name = f"{above}{layer.material}{thick}"
-        above = f"{name} on\n" if top - bottom < _THIN else ""
+        # a layer that is thinner in the picture has no room for its name
+        above = f"{name} on\n" if top - bottom < 0.4 else ""
         named.append(("" if above else name, top, bottom))
     return named
 

@@ -22,7 +22,9 @@ import numpy as np
 
 from hotlever.contact.law import contact_of
 from hotlever.lever.branch import TIP_RISE, Branch, branch_end, shifted
+from hotlever.lever.equations import LeverEquations
 from hotlever.lever.laws import BASE
+from hotlever.lever.newton import NewtonResult
 from hotlever.lever.observables import (
     Linearised,
     at_fixed_bias,
@@ -30,7 +32,7 @@ from hotlever.lever.observables import (
     observed_by,
     with_changes,
 )
-from hotlever.lever.reduced.lever import ReducedLever, Solved
+from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.piecewise import Piecewise, crossing, spline_through
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.probe_parameters import parameters_of
@@ -347,7 +349,7 @@ class ReducedSurrogate(CurveSurrogate):
         few, states = self._on_few_points(local.probe.values(local.names))
         self._local_outputs = few.observed(states.x).T
 
-    def _on_few_points(self, parameters: Array) -> Solved:
+    def _on_few_points(self, parameters: Array) -> tuple[LeverEquations, NewtonResult]:
         """Return the equations and the states of a probe with some values of the parameters."""
         named = zip(self.names, parameters.tolist(), strict=True)
         probe = self.probe.replace(dict(named))

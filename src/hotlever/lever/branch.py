@@ -31,7 +31,6 @@ from hotlever.lever.readings import Reading, slow_ramp
 from hotlever.lever.solved_states import (
     NATURAL,
     UNIT_K,
-    UNIT_V,
     Parametrisation,
     PseudoArclength,
     solve_at,
@@ -40,14 +39,6 @@ from hotlever.piecewise import Piecewise, crossing, smooth_curve
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index
 
-#: Places along a branch that are looked at together.
-_AT_ONCE = 64
-#: Elements with this share of the highest rise at a state nearby come into question.
-_NEARLY = 0.85
-#: Points at which a temperature is looked for between two states, and how often between those.
-_POINTS, _ROUNDS = 17, 3
-#: Steps of Newton's method from the root of a rise to its place.
-_CORRECTIONS = 3
 #: Where a branch's values have the rise of the tip.
 TIP_RISE = len(ELECTRICAL_OUTPUTS)
 
@@ -242,7 +233,7 @@ class Branch:
     @cached_property
     def path(self) -> Piecewise:
         """Tip and lever voltage by u, in the units of `hotlever.lever.solved_states.in_plane`."""
-        own = self.curve.c[..., [TIP_RISE, 0]] / np.array([UNIT_K, UNIT_V])
+        own = self.curve.c[..., [TIP_RISE, 0]] / np.array([UNIT_K, 1.0])
         return Piecewise(own, self.curve.x)
 
     @property
@@ -268,7 +259,8 @@ class Branch:
         rise = np.asarray(tip_K, dtype=float) - self.base_temperature_K
         inside = (rise >= 0) & (rise <= self.end_u**2 * (1 + 1e-12))
         u = np.sqrt(np.where(inside, np.maximum(rise, 0.0), np.nan))
-        for _ in range(_CORRECTIONS):
+        # three steps of Newton's method lead from the root of a rise to its place
+        for _ in range(3):
             # before the first state points may differ from the root of the rise
             slope = self.curve(u, 1)[..., TIP_RISE]
             u = u - np.divide(self.rise(u) - rise, slope, out=np.zeros_like(u), where=slope > 0)
@@ -357,7 +349,8 @@ class Branch:
     def highest_rise_at(self, u: Array) -> Array:
         """Return the highest rise (K) anywhere in the lever at some u, (n,)."""
         highest, order = np.empty(u.size), np.argsort(u)
-        for some in np.split(order, range(_AT_ONCE, u.size, _AT_ONCE)):
+        together = 64
+        for some in np.split(order, range(together, u.size, together)):
             if some.size:
                 highest[some] = self._between_few(u[some])
         return highest
@@ -372,8 +365,9 @@ class Branch:
         if after == start:
             return float(self.u[start])
         low, high = self.u[after - 1 : after + 1]
-        for _ in range(_ROUNDS):
-            u = np.linspace(low, high, _POINTS)
+        # each round narrows down to one of 16 pieces between two states
+        for _ in range(3):
+            u = np.linspace(low, high, 17)
             rises = self.highest_rise_at(u)
             above = max(1, int(np.argmax(rises >= rise)))
             (low, high), ends = u[above - 1 : above + 1], rises[above - 1 : above + 1]
@@ -391,7 +385,8 @@ class Branch:
         equations, elements = self.equations, self.equations.space.elements
         rises = equations.nodal_rises(self.x[:, near])
         slopes = equations.space.nodal_rises(self.slopes[:, near])
-        dofs = elements.dofs[elements.near_highest(rises, _NEARLY)]
+        # elements with this share of the highest rise at a state nearby come into question
+        dofs = elements.dofs[elements.near_highest(rises, 0.85)]
         used, dofs = np.unique(dofs, return_inverse=True)
         values = np.hstack([rises[used], slopes[used]]) @ weights.T
         return elements.highest(values, dofs.reshape(-1, elements.dofs.shape[1]))

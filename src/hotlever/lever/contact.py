@@ -24,16 +24,11 @@ from hotlever.types import Array, Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-_OF_THE_CONTACT = (
-    *("tip_K", "apex_K", "sample_mW"),
+#: Columns of a file by bias; one in time has those of the time before them.
+CONTACT_COLUMNS: tuple[str, ...] = (
+    *("bias_V", "current_mA", "tip_K", "apex_K", "sample_mW"),
     *("tip_K_per_mW", "interface_K_per_mW", "spreading_K_per_mW", "current_change_mA"),
 )
-#: Columns of a file by bias.
-CONTACT_COLUMNS: tuple[str, ...] = ("bias_V", "current_mA", *_OF_THE_CONTACT)
-#: Columns of a file in time.
-HISTORY_COLUMNS: tuple[str, ...] = ("time_us", *CONTACT_COLUMNS)
-#: By this name probes have the radius of the contact.
-_RADIUS = "apex_radius_um"
 
 
 def law_of(lever: Lever) -> ContactLaw:
@@ -94,7 +89,7 @@ def state_in_contact(
 
     (away,) = free.solve([bias])
     # out of contact too, the air beside the cone depends on its radius
-    above = free.probe.replace({_RADIUS: float(probe.values([_RADIUS])[0])})
+    above = free.probe.replace({"apex_radius_um": float(probe.values(["apex_radius_um"])[0])})
     before = like_free(above).polished(away.x, bias)
     touching, after = like_free(probe), None
     for guess in (near, before):
@@ -187,7 +182,7 @@ def history_in_contact(
     Returns
     -------
     xarray.Dataset
-        One variable for each of `HISTORY_COLUMNS` on the dimension ``time``, and a history's
+        One variable for each of `CONTACT_COLUMNS` on the dimension ``time``, and a history's
         other ones.
     """
     law_of(lever)

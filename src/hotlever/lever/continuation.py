@@ -26,8 +26,6 @@ from hotlever.lever.space import LEVER
 from hotlever.piecewise import hermite_weights
 from hotlever.types import Array, Progress
 
-#: States that a branch has, more or less, for a progress bar to fill.
-_USUAL_STATES = 20
 #: Points and weights of Gauss's rule on a piece of the curve.
 _GAUSS = np.polynomial.legendre.leggauss(5)
 
@@ -96,7 +94,8 @@ def continued(
 
     def far_enough(branch: Branch) -> bool | np.bool_:
         if progress is not None:
-            progress(branch.u.size, max(_USUAL_STATES, branch.u.size + 1))
+            # a branch has some 20 states, which a progress bar fills
+            progress(branch.u.size, max(20, branch.u.size + 1))
         return enough(branch)
 
     follow = NaturalContinuation if equations.circuit.starts_cold else ArclengthContinuation

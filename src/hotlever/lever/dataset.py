@@ -49,12 +49,6 @@ SWEEP_COLUMNS = (
     *("bias_V", "current_mA", "lever_V", "reader_V"),
     *("tip_K", "power_mW", "heater_ohm", "legs_ohm"),
 )
-#: Further variables of a sweep.
-_MORE = (
-    *("leg1_ohm", "leg2_ohm", "lever_ohm", "max_K"),
-    *("ground_current_mA", "end_heat_mW", "air_heat_mW", "radiated_mW"),
-    "into_tip_mW",
-)
 
 
 def dataset_of_states(
@@ -120,7 +114,11 @@ def _dataset(
     # where all of the conductor is the heater there are no legs
     whole = np.where(np.isnan(columns["legs_ohm"]), 0.0, columns["legs_ohm"])
     columns["lever_ohm"] = whole + columns["heater_ohm"]
-    every = dict.fromkeys((*SWEEP_COLUMNS, *at_terminals, *_MORE, *outputs))
+    more = (
+        *("leg1_ohm", "leg2_ohm", "lever_ohm", "max_K"),
+        *("ground_current_mA", "end_heat_mW", "air_heat_mW", "radiated_mW", "into_tip_mW"),
+    )
+    every = dict.fromkeys((*SWEEP_COLUMNS, *at_terminals, *more, *outputs))
     ordered_columns = with_bridge(probe.circuit, {name: columns[name] for name in every})
     variables, coordinates = with_meanings(probe, ordered_columns, "bias")
     coordinates["bias"] = columns["bias_V"]

@@ -38,11 +38,6 @@ from hotlever.units import PER_CM3_TO_NANO_PER_UM3, PER_CM_TO_MILLI_PER_UM
 #: are within 2e-4 of a converged mesh, and T_tip within 0.2 K. The reference probe's usual mesh has
 #: 2.3e-4.
 TOLERANCE = 5e-4
-#: Of that energy, the share made by the triangles that are split at once; and how often they are.
-_SHARE, _MOST_ROUNDS = 0.8, 10
-#: Modes of the lever, and how fine the panels are: twice as many change a history by less than
-#: what its steps are off by.
-_MODES, _PANELS = 48, 0.5
 
 
 @lru_cache(maxsize=4)
@@ -66,11 +61,12 @@ def _chosen(
     kinds: tuple[tuple[str, Kind], ...],
 ) -> FullSpace:
     space = flat_space(layout, MeshOptions(), wiring)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(10):
         by_element = energy_between_degrees(space, dict(kinds), circuit)
         if by_element.sum() <= TOLERANCE:
             break
-        space = FullSpace(space.mesh.refined(making(by_element, _SHARE)), wiring=wiring)
+        # the triangles that make most of that energy are split at once
+        space = FullSpace(space.mesh.refined(making(by_element, 0.8)), wiring=wiring)
     return space
 
 
@@ -190,13 +186,15 @@ def taken_up_around(
     ComputationError
         If the dimensions of the lever differ too much.
     """
+    # twice as many modes, or panels, change a history by less than what its steps are off by
+    count, fineness = 48, 0.5
     facts = {
         "nodes": space.elements.nodes,
         "thickness_um": layout.thickness_um,
         "cone": layout.cone_in_air and layout.cone_in_air.model_dump(),
         "surroundings": surroundings.model_dump(exclude={"medium", "gas_conductivity"}),
         "base_K": base_temperature_K,
-        "panels": _PANELS,
+        "panels": fineness,
     }
     path = cache_file("stores", facts)
     names = tuple(AirStores.__dataclass_fields__)
@@ -204,11 +202,11 @@ def taken_up_around(
         path, lambda a: (a["modes"], AirStores(**{name: a[name] for name in names}))
     )
     if cache_entry is None:
-        modes = conduction_modes(space, _MODES)
-        panelled = PanelledAir(layout, surroundings, base_temperature_K, _PANELS)
+        modes = conduction_modes(space, count)
+        panelled = PanelledAir(layout, surroundings, base_temperature_K, fineness)
         sites = panelled.surface.sites
         # the modes are orthonormal over the lever's area
-        inside = layout.thickness_um * np.eye(_MODES)
+        inside = layout.thickness_um * np.eye(count)
         length = float(np.ptp(layout.corners, axis=0).max())
         cache_entry = modes, stores_of(panelled, space.rise_at(sites, modes), inside, length)
         store_arrays(path, {"modes": modes, **vars(cache_entry[1])})

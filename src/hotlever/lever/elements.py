@@ -24,16 +24,6 @@ if TYPE_CHECKING:
     from skfem.element import Element
 
 
-#: A point this share of an element's size outside it is taken to lie on its edge.
-_BY_ROUNDING = 1e-3
-#: Steps along an edge at which the highest value between the nodes is looked for: four times as
-#: many as a cubic element has. And how far above its nodes an element may reach, as a share of the
-#: difference between its nodes.
-_STEPS, _ABOVE_NODES = 12, 0.25
-#: Points that are looked for in all elements together.
-_POINTS_AT_ONCE = 256
-
-
 @dataclass(frozen=True)
 class FacetPoints:
     """Quadrature points on facets, each seen from the element behind it.
@@ -163,8 +153,10 @@ class FiniteElements:
     @cached_property
     def _lattice(self) -> Array:
         """The basis functions on a lattice over an element, (nodes, points)."""
-        steps = product(range(_STEPS + 1), repeat=len(self.positions))
-        points = np.array([point for point in steps if sum(point) <= _STEPS]).T / _STEPS
+        # four times as many steps along an edge as a cubic element has
+        steps_along = 12
+        steps = product(range(steps_along + 1), repeat=len(self.positions))
+        points = np.array([point for point in steps if sum(point) <= steps_along]).T / steps_along
         nodes = range(self.dofs.shape[1])
         return np.stack([self.basis.elem.lbasis(points, node)[0] for node in nodes])
 
@@ -184,7 +176,8 @@ class FiniteElements:
         each = values[self.dofs if dofs is None else dofs]
         most = each.max(axis=1)
         highest = most.max(axis=0)
-        reached = most + _ABOVE_NODES * (most - each.min(axis=1))
+        # how far above its nodes an element may reach, from the difference between these
+        reached = most + 0.25 * (most - each.min(axis=1))
         element, field = np.nonzero(reached >= highest)
         np.maximum.at(highest, field, (each[element, :, field] @ self._lattice).max(axis=1))
         return np.asarray(highest)
@@ -244,15 +237,17 @@ class FiniteElements:
         elements = np.empty(len(points), dtype=np.intp)
         local = np.empty(points.T.shape)
         corners = self.basis.mesh.p[:, self.basis.mesh.t[0]]
-        for first in range(0, len(points), _POINTS_AT_ONCE):
-            some = slice(first, first + _POINTS_AT_ONCE)
+        together = 256
+        for first in range(0, len(points), together):
+            some = slice(first, first + together)
             # where the points lie on the reference element, seen from each element
             away = points[some].T[:, None] - corners[:, :, None]
             here = np.einsum("era,aen->ern", self.inverse, away)
             depth = np.minimum(here.min(axis=1), 1.0 - here.sum(axis=1))
             nearest = depth.argmax(axis=0)
             number = np.arange(nearest.size)
-            outside = np.flatnonzero(depth[nearest, number] < -_BY_ROUNDING)
+            # a point a little outside an element is taken to lie on its edge: that is rounding
+            outside = np.flatnonzero(depth[nearest, number] < -1e-3)
             if outside.size:
                 where = ", ".join(f"{value:g}" for value in points[some][outside[0]])
                 raise InputError(f"the point ({where}) µm lies outside the lever")

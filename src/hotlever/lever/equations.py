@@ -68,13 +68,6 @@ BALANCES = (
     "into_tip_mW",
 )
 
-#: Parameters by which heat leaves the surface or the leg ends, whatever radiates or touches.
-_OF_SURFACE = {GAS, GAP, BASE, CHIP}
-#: Error (relative) to which derivatives are solved.
-_EXACT = 1e-6
-#: A lever voltage (V) at which a lever is nearly cold.
-_NEAR_V = 1e-3
-
 
 class LeverEquations:
     """Residual, Jacobian and derivatives of one lever of some materials, in its circuit.
@@ -361,7 +354,8 @@ class LeverEquations:
                 tested[..., column] += np.einsum("pn,pnm->nm", getattr(by[name], law), weight)
             if name in moved:
                 tested[..., column] += moved[name].tested(at_points, weights)
-        surface = [name for name in names if name in _OF_SURFACE or self._has_losses]
+        # by these parameters heat leaves the surface or the leg ends, whatever radiates or touches
+        surface = [name for name in names if name in {GAS, GAP, BASE, CHIP} or self._has_losses]
         if surface:
             columns = [names.index(name) for name in surface]
             on_surface = self._on_surface(x, surface)
@@ -440,7 +434,7 @@ class LeverEquations:
 
         scale = self.scale.reshape(-1, *(1,) * (right_hand_side.ndim - 1))
         return refined(
-            lambda right: factors.solve(right, states), missing, right_hand_side, scale, _EXACT
+            lambda right: factors.solve(right, states), missing, right_hand_side, scale, 1e-6
         )
 
     def along(self, x: Array, factors: Factors, constraint: Constraint = TIP) -> Array:
@@ -465,10 +459,12 @@ class LeverEquations:
         unit[-1] = 1.0
         factors = self.factorised(nothing, LEVER)
         first = self.solve_linear(nothing, factors, unit, LEVER)
-        # how the equations bend along it, by their derivatives on either side
-        bent = self.balance_change(_NEAR_V * first, first)
-        bent -= self.balance_change(-_NEAR_V * first, first)
-        bent *= -0.25 / _NEAR_V
+        # how the equations bend along it, by their derivatives on either side, where a lever is
+        # nearly cold
+        near_V = 1e-3
+        bent = self.balance_change(near_V * first, first)
+        bent -= self.balance_change(-near_V * first, first)
+        bent *= -0.25 / near_V
         bent[-1] = 0.0
         second = self.solve_linear(nothing, factors, bent, LEVER)
         per_square_volt = self.space.tip_rise(second)

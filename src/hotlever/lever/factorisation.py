@@ -22,8 +22,6 @@ from scipy.sparse.linalg import splu
 from hotlever.errors import NewtonError
 from hotlever.types import Array, Index, LinearSolver
 
-_SINGULAR = "the Jacobian of a state is singular"
-
 
 @dataclass(frozen=True)
 class FactorisationOptions:
@@ -108,7 +106,7 @@ class SuperLU(Factorisation):
                 options={"SymmetricMode": True},
             )
         except RuntimeError as error:  # nothing else does SciPy say by it
-            raise NewtonError(_SINGULAR) from error
+            raise NewtonError("the Jacobian of a state is singular") from error
         return _SuperLUFactors(factors)
 
 
@@ -191,7 +189,7 @@ class _KLUSolver:
         except KLUSingularException as error:
             # KLU has freed it
             self.klu.numeric = None
-            raise NewtonError(_SINGULAR) from error
+            raise NewtonError("the Jacobian of a state is singular") from error
 
     def free(self) -> None:
         """Give back what nbklu leaves to its callers: what is outside of Python's memory."""

@@ -33,9 +33,6 @@ from hotlever.materials.kinds import HighDopedSilicon
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
-#: Parts that each side of a triangle is cut into for a drawing, unless told otherwise.
-_CUTS = 3
-
 
 @dataclass(frozen=True)
 class FieldMap:
@@ -90,7 +87,7 @@ class Surface:
 
 
 @singledispatch
-def seen_from_above(lever: Lever, cuts: int = _CUTS) -> Surface:
+def seen_from_above(lever: Lever, cuts: int = 3) -> Surface:
     """Return a lever as it is drawn: every triangle of its mesh is cut into ``cuts²`` of them."""
     reference = _cut_triangle(cuts)
     rule = reference.p, np.full(reference.p.shape[1], 1.0)
@@ -110,14 +107,14 @@ class FieldMapper:
         If it is one of tetrahedra.
     """
 
-    def __init__(self, lever: Lever) -> None:
+    def __init__(self, lever: Lever, cuts: int = 3) -> None:
         if lever.space.mesh.elements.dim() != 2:
             raise InputError("found a lever of tetrahedra, expected a flat one")
-        reference = _cut_triangle(_CUTS)
-        self._surface = seen_from_above(lever)
+        reference = _cut_triangle(cuts)
+        self._surface = seen_from_above(lever, cuts)
         mesh, element = lever.space.mesh, lever.space.elements.basis.elem
         centres = reference.p[:, reference.t].mean(axis=1)
-        middle = centres, np.full(centres.shape[1], 0.5 / _CUTS**2)
+        middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
         elements = FiniteElements(mesh.elements, element, middle)
         space = FullSpace(mesh, elements, lever.space.wiring)
         self._centres = LeverEquations.of_probe(space, lever.probe)
@@ -192,13 +189,12 @@ def write_vtu(fields: FieldMap, path: str | os.PathLike[str]) -> None:
         mesh.write(temporary, file_format="vtu")
 
 
-# Draws a dataset of temperatures on slices to a file.
-DrawSlices = Callable[[xr.Dataset, Path], None]
-
-
 @singledispatch
 def write_fields(
-    lever: Lever, states: Sequence[State], folder: Path, draw_slices: DrawSlices
+    lever: Lever,
+    states: Sequence[State],
+    folder: Path,
+    draw_slices: Callable[[xr.Dataset, Path], None],
 ) -> None:
     """Write the fields of states to a folder as VTU, with those of the air where there is some.
 

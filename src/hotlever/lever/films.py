@@ -20,11 +20,6 @@ from hotlever.probe.layout import Film, Layout
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.types import Array, Index
 
-#: As good as infinitely far from a border (µm).
-FAR = 1e6
-#: Rings of points in the circle under a cone, and points in a ring.
-_RINGS, _AROUND = 4, 12
-
 
 @dataclass(frozen=True)
 class PlacedFilm:
@@ -46,7 +41,7 @@ class PlacedFilm:
         How many of its faces are on the outside: of a stack the lowest film has one, the uppermost
         the other; none in a solid, whose faces are its rim.
     distances : ndarray, shape (borders, k, 1)
-        From the borders of each point's region with that material (µm); `FAR` where it has fewer
+        From the borders of each point's region with that material (µm); 1e6 where it has fewer
         than others. No borders where the doping is even.
     """
 
@@ -149,7 +144,8 @@ def _from_borders(layout: Layout, region: Index, positions: Array) -> Array:
         for number in np.unique(region)
         if (taper := tapers[number]) is not None
     }
-    distances = np.full((max(map(len, by_region.values()), default=0), region.size, 1), FAR)
+    # as good as infinitely far from a border (µm)
+    distances = np.full((max(map(len, by_region.values()), default=0), region.size, 1), 1e6)
     for number, away in by_region.items():
         distances[: len(away), region == number, 0] = away
     return distances
@@ -218,8 +214,10 @@ class Rim:
         """Return the circle on which a layout's tip stands; weights are shares of its area."""
         cone = layout.cone
         assert cone is not None
-        nodes, weights = np.polynomial.legendre.leggauss(_RINGS)
-        angle = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
+        # four rings in the circle, with so many points in each
+        nodes, weights = np.polynomial.legendre.leggauss(4)
+        around = 12
+        angle = 2.0 * np.pi * np.arange(around) / around
         # Gauss's points in the square of the radius, which the area goes with
         radius = cone.base_radius_um * np.sqrt((1.0 + nodes) / 2.0)
         at = np.multiply.outer(radius, [np.cos(angle), np.sin(angle)]).swapaxes(1, 2)
@@ -227,7 +225,7 @@ class Rim:
         bottom = np.full((len(flat), len(elements.positions) - 2), -layout.thickness_um / 2.0)
         positions = np.hstack([flat, bottom])
         element, shares, _ = elements.at_points(positions)
-        share = np.repeat(weights / (2.0 * _AROUND), _AROUND)
+        share = np.repeat(weights / (2.0 * around), around)
         facet_points = FacetPoints(np.empty(0, dtype=np.intp), element, shares, share, positions.T)
         return cls(_values(facet_points, elements, selection), share[:, None], (), {}, facet_points)
 

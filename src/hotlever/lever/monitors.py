@@ -18,9 +18,6 @@ from hotlever.probe import Probe
 from hotlever.probe.monitor_sections import Monitor, on_lever
 from hotlever.types import Array, Mask
 
-#: What monitors show, by its unit.
-_QUANTITIES = {"K": "temperature", "V": "potential"}
-
 
 class _Weights(NamedTuple):
     """Weights of the nodes for one column (k, nodes), and where there is something to show."""
@@ -53,7 +50,7 @@ class MonitorMap:
             mean = csr_matrix(row, shape=(1, full.elements.size))
             every[f"{name}_V"] = _Weights(mean, np.ones(1, dtype=bool))
         for name, monitor in probe.monitors.items():
-            every |= {f"{name}_{unit}": _weights(full, monitor, unit) for unit in _QUANTITIES}
+            every |= {f"{name}_{unit}": _weights(full, monitor, unit) for unit in ("K", "V")}
         self._sizes = {name: weights.there.size for name, weights in every.items()}
         self.size = sum(self._sizes.values())
         none = _Weights(csr_matrix((0, full.elements.size)), np.empty(0, dtype=bool))
@@ -104,7 +101,7 @@ def with_meanings(
             dimensions, (first, *_) = (along, name), monitor.positions
             meaning = {"units": "µm", "long_name": f"distance from the start of {name}"}
             coordinates[name] = name, np.linalg.norm(monitor.positions - first, axis=1), meaning
-        for unit, what in _QUANTITIES.items():
+        for unit, what in (("K", "temperature"), ("V", "potential")):
             meaning = {"units": unit, "long_name": f"{what} {monitor}"}
             variables[f"{name}_{unit}"] = dimensions, columns[f"{name}_{unit}"], meaning
     return variables, coordinates

@@ -12,9 +12,6 @@ from hotlever.errors import NewtonError
 from hotlever.lever.space import Factors
 from hotlever.types import Array, Index
 
-#: Rounds of iterative refinement, at most.
-_MOST_ROUNDS = 12
-
 
 @dataclass(frozen=True)
 class NewtonOptions:
@@ -141,7 +138,7 @@ def refined(
         Relative, of the largest entry of each column.
     """
     solution = solve(right_hand_side)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(12):
         correction = solve(missing(solution))
         solution = solution + correction
         sizes = (np.abs(some / scale).max(axis=0) for some in (correction, solution))

@@ -40,14 +40,8 @@ SOURCES = (
     *("Johnson noise of the lever", "Johnson noise of resistors", "temperature fluctuations"),
     *("1/f noise", "amplifier", "vibration of the lever"),
 )
-#: Temperature of the circuit's resistors (K).
-_ROOM_K = 293.0
 #: 4 k_B in the units of kK, kΩ and mW, for V²/Hz.
 _FOUR_K = 4e3 * Boltzmann
-#: µm⁻³ per cm⁻³.
-_PER_UM3 = 1e-12
-#: What options may be at most.
-_MOST = {"low_Hz": 1e12, "high_Hz": 1e12, "amplifier_V": 1.0, "hooge": 1.0, "vibration_nm": 1e3}
 
 
 @dataclass(frozen=True)
@@ -78,8 +72,9 @@ class NoiseOptions:
     vibration_nm: float = 0.0
 
     def __post_init__(self) -> None:
+        highest = {"amplifier_V": 1.0, "hooge": 1.0, "vibration_nm": 1e3}
         for each in fields(self):
-            value, most = getattr(self, each.name), _MOST[each.name]
+            value, most = getattr(self, each.name), highest.get(each.name, 1e12)
             if not 0.0 <= value <= most:
                 raise InputError(
                     f"{each.name}: found {value:g}, expected a number from 0 to {most:g}"
@@ -211,7 +206,8 @@ def of_resistors(response: Response) -> float:
     terminals, circuit = response.equations.terminals, response.equations.circuit
     by_held = response.adjoint[list(response.equations.space.held.values()), 0]
     held = terminals.conductance @ by_held**2
-    return _FOUR_K * _ROOM_K * float(held + circuit.series_kohm * response.by_bias**2)
+    # the resistors are in a room of 293 K
+    return _FOUR_K * 293.0 * float(held + circuit.series_kohm * response.by_bias**2)
 
 
 def of_temperature(response: Response) -> float:
@@ -246,7 +242,8 @@ def per_hooge(response: Response) -> float:
             continue
         sigma, _ = kind.electrical_conductivity(fields_.T[film.points], laws.doping)
         sheet = PER_CM_TO_MILLI_PER_UM * film.counted_um * sigma
-        by_carrier[film.points] += sheet**2 / (_PER_UM3 * doping * film.thickness_um)
+        # the doping is stated per cm³, of which 1 µm³ is 1e-12
+        by_carrier[film.points] += sheet**2 / (1e-12 * doping * film.thickness_um)
     power = dot(fields_.grad_V, _by_current(response))
     return _integral(equations, by_carrier * power**2)
 

@@ -24,10 +24,6 @@ from hotlever.probe.circuit import Circuit
 from hotlever.quantities import OBSERVABLES
 from hotlever.types import Array
 
-_BRIDGE = OBSERVABLES["bridge"].name
-#: States whose Jacobians are factorised at once.
-_AT_ONCE = 20
-
 
 def observed(circuit: Circuit, outputs: Array) -> Array:
     """Return `hotlever.quantities.OBSERVABLES` in the order of that table, (observables, n).
@@ -57,7 +53,8 @@ def with_bridge(circuit: Circuit, columns: Mapping[str, Array]) -> dict[str, Arr
     """Return the columns of a sweep or a history with the bridge voltage, if there is a bridge."""
     if not circuit.has_bridge:
         return dict(columns)
-    return {**columns, _BRIDGE: circuit.bridge_voltage(columns["lever_V"], columns["bias_V"])}
+    bridge_V = circuit.bridge_voltage(columns["lever_V"], columns["bias_V"])
+    return {**columns, OBSERVABLES["bridge"].name: bridge_V}
 
 
 def observed_by(circuit: Circuit, outputs: Array, slopes: Array, names: Sequence[str]) -> Array:
@@ -202,8 +199,10 @@ def sensitivities_of(branch: Branch, u: Array, circuit: Circuit, names: Sequence
     output_slopes = np.zeros((u.size, TIP_RISE + 1, len(names)))
     # without power nothing depends on the material
     powered = np.flatnonzero(branch.has_power(u))
-    for start in range(0, powered.size, _AT_ONCE):
-        some = powered[start : start + _AT_ONCE]
+    # few Jacobians at once: each has a factorised matrix
+    together = 20
+    for start in range(0, powered.size, together):
+        some = powered[start : start + together]
         constraint = branch.parametrisation.constraint(u[some])
         x = branch.states(u[some])
         output_slopes[some] = by_parameter(branch.equations, x, names, constraint=constraint)

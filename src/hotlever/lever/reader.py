@@ -34,10 +34,6 @@ READER_COLUMNS = (
     *("surface_gap_um", "bias_V", "reader_ohm", "reader_V", "dV_dz_V_per_um", "dlnR_dz_per_um"),
     *("noise_V_per_rtHz", "resolution_nm_per_rtHz"),
 )
-#: Biases that are tried for the best one, and on either side of the best of these.
-_TRIED, _REFINED = 11, 4
-#: Share of the heat by which one jump length for the whole lever may be off without a note.
-_HEAT_OFF = 0.03
 
 
 class Signal(NamedTuple):
@@ -54,9 +50,6 @@ class Signal(NamedTuple):
     crosstalk_V_per_mW: float
     delay_us: float
     tip_K: float
-
-
-_NOTHING = Signal._make([*[np.nan] * 6, np.full(len(SOURCES), np.nan), *[np.nan] * 4])
 
 
 class Reader:
@@ -176,6 +169,7 @@ def over_surface(
     reader = Reader(lever.probe, noise)
     values, distances = _checked(lever.probe, bias), np.atleast_1d(np.asarray(distance_um, float))
     check_distances(lever.probe, distances)
+    nothing = Signal._make([*[np.nan] * 6, np.full(len(SOURCES), np.nan), *[np.nan] * 4])
     rows, notes = [], list[str]()
     for distance in each(distances.tolist(), progress):
         near = at_distance(lever, distance)
@@ -184,7 +178,7 @@ def over_surface(
             notes.append(f"at {distance:.4g} µm: {failure}")
         rows.append(
             [
-                _NOTHING if np.isnan(u) else reader.signal(near, branch, u, value)
+                nothing if np.isnan(u) else reader.signal(near, branch, u, value)
                 for u, value in zip(reading.u, values.tolist(), strict=True)
             ]
         )
@@ -256,7 +250,8 @@ def _jump_of_others(probe: Probe, distances: Array, biases: Array, tip_K: Array)
     own = np.vectorize(around.jump_length_um, otypes=[float])(tip_K)
     # between plates heat goes with the inverse of the gap and both jump lengths
     off = (own - stated) / (distances[:, None] + stated + cold)
-    if not (np.abs(off) > _HEAT_OFF).any():
+    # a jump length that is off by this share of the heat is worth a note
+    if not (np.abs(off) > 0.03).any():
         return []
     at, which = np.unravel_index(np.nanargmax(np.abs(off)), off.shape)
     return [
@@ -325,7 +320,7 @@ def best_bias(
         As `over_surface`.
     """
     reader = Reader(lever.probe, noise)
-    tried = highest_V * np.arange(1, _TRIED + 1) / _TRIED
+    tried = highest_V * np.arange(1, 12) / 11
     levers = [at_distance(lever, distance) for distance in np.unique(distance_um).tolist()]
 
     def resolution(bias_V: float) -> float:
@@ -343,8 +338,8 @@ def best_bias(
     if not np.isfinite(resolutions).any():
         raise ComputationError(f"no bias up to {highest_V:g} V resolves all distances")
     best = int(resolutions.argmin())
-    low, high = tried[max(best - 1, 0)], tried[min(best + 1, _TRIED - 1)]
-    around = np.linspace(low, high, 2 * _REFINED + 1)
+    low, high = tried[max(best - 1, 0)], tried[min(best + 1, tried.size - 1)]
+    around = np.linspace(low, high, 9)
     finer = [resolution(value) for value in each(around.tolist(), progress)]
     return float(around[int(np.argmin(finer))])
 

@@ -14,9 +14,6 @@ import numpy as np
 from hotlever.piecewise import Piecewise, crossing
 from hotlever.types import Array
 
-#: A bias (V) that is none.
-_NO_BIAS = 1e-9
-
 
 @dataclass(frozen=True)
 class Reading:
@@ -105,7 +102,8 @@ def slow_ramp(
     u = np.full(bias.shape, np.nan)
     if start is None:
         start = 0.0
-        if abs(float(curve(start))) >= _NO_BIAS:
+        # so little is no bias
+        if abs(float(curve(start))) >= 1e-9:
             # a similar lever has no bias elsewhere, near where its branch was followed from
             roots = curve.roots()
             start = float(roots[np.argmin(np.abs(roots))]) if roots.size else float(curve.x[0])

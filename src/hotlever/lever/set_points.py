@@ -29,18 +29,6 @@ from hotlever.types import Array, Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Nearer to the state without power (K^½) there is none.
-_NOTHING = 1e-3
-#: States that are solved together.
-_AT_ONCE = 16
-#: Corrections of a root at most, and how near (relative) the set point is met.
-_CORRECTIONS, _MET = 6, 1e-10
-#: Points of the whole branch, as a figure has it.
-_POINTS = 200
-#: An error of a set point (relative), and the share of the tip's rise by which it may move the tip
-#: without a note.
-SET_POINT_ERROR, _TIP_SHARE = 1e-3, 0.02
-
 
 @dataclass(frozen=True)
 class Quantity:
@@ -166,6 +154,8 @@ class _Along:
         self._curves, self._level = (lever_V, current), quantity.level(lever_V, current)
         reversals = np.concatenate([[0.0], lever_V.roots(), current.roots()])
         self._start = float(reversals[reversals < branch.end_u].max())
+        # nearer to the state without power (K^½) there is none
+        self._lowest = self._start + 1e-3
         self._turns = self._within(self._level)
 
     def held_at(self, targets: Array) -> HeldStates:
@@ -178,7 +168,8 @@ class _Along:
         number = np.concatenate([np.arange(1, u.size + 1) for u in roots])
         u = np.concatenate(roots)
         # few at once: each has a factorised matrix
-        some = [slice(k, k + _AT_ONCE) for k in range(0, u.size, _AT_ONCE)]
+        together = 16
+        some = [slice(k, k + together) for k in range(0, u.size, together)]
         solved = [self._solved(u[part], values[part]) for part in some]
         u, x = (np.concatenate(parts, axis=-1) for parts in zip(*solved, strict=True))
         branch, quantity = self._branch, self._quantity
@@ -196,13 +187,13 @@ class _Along:
     def _within(self, curve: Piecewise) -> Array:
         """Return where a curve is zero while the supply heats the lever."""
         u = curve.roots()
-        return np.asarray(u[(u > self._start + _NOTHING) & (u <= self._branch.end_u)])
+        return np.asarray(u[(u > self._lowest) & (u <= self._branch.end_u)])
 
     def _solved(self, u: Array, values: Array) -> tuple[Array, Array]:
         """Return where the equations have the values near some places, and the states there."""
         branch = self._branch
         x, factors = branch.states(u), None
-        for _ in range(_CORRECTIONS):
+        for _ in range(6):
             root = solve_at(
                 branch.equations, u, x, NewtonOptions(), factors, branch.parametrisation
             )
@@ -212,7 +203,7 @@ class _Along:
                 self._quantity.missed(lever_V, current, value) for value in (values, 0.0)
             )
             off = np.abs(missed / whole)
-            if off.max() < _MET:
+            if off.max() < 1e-10:
                 return u, x
             corrected_u = self._corrected_u(u, missed, values)
             x, u = x + (branch.states(corrected_u) - branch.states(u)), corrected_u
@@ -244,7 +235,7 @@ class _Along:
     def _extremes(self) -> tuple[Array, Array]:
         """Return the quantity and the tip temperature at both ends, and where it turns."""
         branch = self._branch
-        u = np.concatenate([[self._start + _NOTHING], self._turns, [branch.end_u]])
+        u = np.concatenate([[self._lowest], self._turns, [branch.end_u]])
         return self._quantity.of(*(curve(u) for curve in self._curves)), branch.tip_K(u)
 
     def _never(self, value: float) -> InputError:
@@ -259,16 +250,19 @@ class _Along:
 
     def _whole(self) -> xr.Dataset:
         """Return the branch as a sweep, from its start to its end."""
-        u = np.linspace(self._start + _NOTHING, self._branch.end_u, _POINTS)
+        # as many points as a figure has
+        u = np.linspace(self._lowest, self._branch.end_u, 200)
         return dataset_of_branch(self._lever.probe, self._branch, u)
 
     def _notes(self, values: Array, number: Array, slope: Array, tip_K: Array) -> list[str]:
         """Say where a set point tells little of the tip, and why."""
         at, tips = self._extremes()
-        tip_errors = SET_POINT_ERROR * values / np.maximum(np.abs(slope), 1e-300)
+        error = 1e-3  # of a set point
+        tip_errors = error * values / np.maximum(np.abs(slope), 1e-300)
         rise = tip_K - self._branch.base_temperature_K
         unit, notes = self._quantity.unit, []
-        for k in np.flatnonzero(tip_errors > _TIP_SHARE * rise).tolist():
+        # a note is due where it moves the tip by more than this share of its rise
+        for k in np.flatnonzero(tip_errors > 0.02 * rise).tolist():
             near = int(np.abs(tips - tip_K[k]).argmin())
             why = (
                 "the swept supply hardly heats it"
@@ -277,6 +271,6 @@ class _Along:
             )
             notes.append(
                 f"{values[k]:.5g} {unit} tells little of the tip in state {number[k]} "
-                f"({tip_K[k]:.0f} K): {why}; {SET_POINT_ERROR:.1%} of it is {tip_errors[k]:.2g} K"
+                f"({tip_K[k]:.0f} K): {why}; {error:.1%} of it is {tip_errors[k]:.2g} K"
             )
         return notes

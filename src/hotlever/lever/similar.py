@@ -26,9 +26,6 @@ from hotlever.probe.probe_parameters import dimensions_of, usual_parameters
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
-#: A small change of a dimension (µm), by which the thickness of a cone is differenced.
-_SMALL_UM = 1e-4
-
 
 class SimilarLevers:
     """A lever, and what it would be with other parameters.
@@ -227,7 +224,9 @@ def _thickening(layout: Layout, movement: Movement, at: Array, velocity: Array) 
         displaced_layout = replace(layout, tip=there, thickness_um=thick, cone=movement.cone(way))
         return thickness_at(displaced_layout, at + way * velocity)
 
-    thicker = (thickness(_SMALL_UM) - thickness(-_SMALL_UM)) / (2 * _SMALL_UM)
+    # a small change of a dimension (µm), by which the thickness of a cone is differenced
+    small_um = 1e-4
+    thicker = (thickness(small_um) - thickness(-small_um)) / (2 * small_um)
     return np.broadcast_to(thicker, (at.shape[1], 1))
 
 

@@ -19,13 +19,13 @@ from hotlever.piecewise import Piecewise
 from hotlever.probe.circuit import Circuit
 from hotlever.types import Array, Index
 
-#: Units in which changes of the tip (K) and of the lever voltage (V) compare.
-UNIT_K, UNIT_V = 60.0, 1.0
+#: A change of the tip (K) that compares with one of the lever voltage by 1 V.
+UNIT_K = 60.0
 
 
 def in_plane(space: Space, x: Array) -> Array:
     """Return tip and lever voltage of states, or of changes of them, in their units, (n, 2)."""
-    return np.stack([space.tip_rise(x) / UNIT_K, x[-1] / UNIT_V], axis=-1)
+    return np.stack([space.tip_rise(x) / UNIT_K, x[-1]], axis=-1)
 
 
 class Parametrisation:
@@ -73,7 +73,7 @@ class PseudoArclength(Parametrisation):
     def constraint(self, u: Array) -> Constraint:
         """See `Parametrisation`."""
         tip, lever = self._curve(u, 1).T
-        return Constraint(tip / UNIT_K, lever / UNIT_V)
+        return Constraint(tip / UNIT_K, lever)
 
     def values(self, u: Array) -> Array:
         """See `Parametrisation`."""

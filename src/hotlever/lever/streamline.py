@@ -10,10 +10,6 @@ from hotlever.errors import InputError
 from hotlever.lever.full_space import FullSpace
 from hotlever.types import Array
 
-#: Steps along the path, as a share of the longer side of the lever, and their greatest number; to
-#: end at the edge they are halved so often.
-_STEP, _MOST_STEPS, _HALVINGS = 1 / 150, 2000, 6
-
 
 def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
     """Return the path of the current that leads through the tip, or next to it.
@@ -37,7 +33,8 @@ def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
         Length of the path up to each (µm).
     """
     elements, layout = space.elements, space.mesh.layout
-    longest = _STEP * float(np.ptp(layout.box, axis=0).max())
+    # steps along the path are this share of the longer side of the lever
+    longest = 1 / 150 * float(np.ptp(layout.box, axis=0).max())
 
     def direction(at: Array) -> Array:
         (element,), _, slopes = elements.at_points(at[None])
@@ -48,7 +45,8 @@ def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
 
     def streamline(at: Array, sign: float) -> Iterator[Array]:
         size, steps = sign * longest, 0
-        while abs(size) > longest / 2**_HALVINGS and steps < _MOST_STEPS:
+        # to end at the edge steps are halved six times
+        while abs(size) > longest / 2**6 and steps < 2000:
             try:
                 middle = at + 0.5 * size * direction(at)
                 after = at + size * direction(middle)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import meshio
@@ -15,7 +15,7 @@ from hotlever.air.bodies import lever_axes
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file
-from hotlever.lever.fields import DrawSlices, Surface, fields_file, seen_from_above, write_fields
+from hotlever.lever.fields import Surface, fields_file, seen_from_above, write_fields
 from hotlever.lever.lever import State
 from hotlever.lever3d.lever import SolidLever, surface_nodes
 from hotlever.lever3d.still_air import ngsolve
@@ -24,12 +24,14 @@ from hotlever.probe.solid import AIR, material_names
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
-#: Points along each side of a slice.
-_SLICE_POINTS = 161
-
 
 @write_fields.register
-def _(lever: SolidLever, states: Sequence[State], folder: Path, draw_slices: DrawSlices) -> None:
+def _(
+    lever: SolidLever,
+    states: Sequence[State],
+    folder: Path,
+    draw_slices: Callable[[xr.Dataset, Path], None],
+) -> None:
     """Write lever and air in one file for each state, and in air slices through both."""
     for state in states:
         write_solid_vtu(state, fields_file(folder, state, ".vtu"))
@@ -155,10 +157,11 @@ def temperature_slices(state: State) -> xr.Dataset:
         "across, near the heater": (1, tip, near),
     }
     axis, centre, reach = (np.array(column) for column in zip(*slices.values(), strict=True))
-    z = reach[:, None] * np.linspace(-1.0, 1.0, _SLICE_POINTS)
+    count = 161
+    z = reach[:, None] * np.linspace(-1.0, 1.0, count)
     along = np.einsum("sd,sd->s", centre, directions[axis])[:, None] + z
     level = centre[:, None] + z[..., None] * directions[axis][:, None]
-    points = np.empty((4, _SLICE_POINTS, _SLICE_POINTS, 3))
+    points = np.empty((4, count, count, 3))
     points[..., :2] = level[:, None]
     points[..., 2] = z[..., None]
     temperature = temperature_at(state, points.reshape(-1, 3)).reshape(points.shape[:-1])

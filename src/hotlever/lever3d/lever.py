@@ -26,12 +26,6 @@ from hotlever.probe import Layout, Probe, Wiring
 from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid, middle_and_reach
 from hotlever.types import Array, Index, Progress
 
-#: Radius of the sphere of air: that of the paper (µm), or so many times as far as a lever reaches
-#: from its middle.
-SPHERE_RADIUS, _ROOM = 60.0, 2.0
-#: Nodes nearer than this (µm) are the same.
-_SAME_UM = 1e-6
-
 
 @lru_cache(maxsize=2)
 def _in_vacuum(layout: Layout, mesh: SolidMeshOptions | None, wiring: Wiring) -> FullSpace:
@@ -103,7 +97,8 @@ class SolidLever(Lever):
                 "[layers]: the full 3-D simulation knows one material across the thickness, "
                 "expected a lever without films"
             )
-        radius = sphere_radius_um or max(SPHERE_RADIUS, _ROOM * middle_and_reach(layout)[1])
+        # the radius of the paper (µm), or twice as far as a lever reaches from its middle
+        radius = sphere_radius_um or max(60.0, 2.0 * middle_and_reach(layout)[1])
         wiring = self.probe.wiring
         if not in_air:
             return _in_vacuum(layout, mesh, wiring)
@@ -233,6 +228,6 @@ def surface_nodes(of_silicon: FiniteElements, air: OpenAir) -> Index:
         If the two meshes do not match.
     """
     away, nodes = KDTree(of_silicon.nodes.T).query(air.sites)
-    if away.max() > _SAME_UM:
+    if away.max() > 1e-6:
         raise ComputationError("the air does not touch the silicon node by node")
     return np.asarray(nodes)

@@ -106,7 +106,6 @@ def touch(
     """Touch a sample with the tip: apex, heat into the sample, change of the current."""
     from hotlever.lever.contact import (
         CONTACT_COLUMNS,
-        HISTORY_COLUMNS,
         history_in_contact,
         sweep_in_contact,
     )
@@ -125,7 +124,10 @@ def touch(
             columns, solve = CONTACT_COLUMNS, partial(sweep_in_contact, lever, biases)
         else:
             times = parse_times(until, at)
-            columns, solve = HISTORY_COLUMNS, partial(history_in_contact, lever, drive, *times)
+            columns, solve = (
+                ("time_us", *CONTACT_COLUMNS),
+                partial(history_in_contact, lever, drive, *times),
+            )
         data, failure = as_far_as_possible(lambda: solve(progress=update))
     if failure is not None and not data.tip_K.size:
         raise failure

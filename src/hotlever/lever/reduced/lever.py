@@ -31,20 +31,8 @@ from hotlever.probe import Circuit, Probe
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
-#: Error left (1 K or 10 mV) on the few points, and at the end; and the ratio of two steps with
-#: one Jacobian from which a new one is cheaper.
-_NEARLY = NewtonOptions(tolerance=1e-2, keep_while=0.2, max_iterations=12)
-_DONE = NewtonOptions(tolerance=1e-3, keep_while=0.5, max_iterations=12)
-#: States at which the full lever is solved too, and at which the error is estimated.
-_COMPARED_AT, _ESTIMATED_AT = 10, 4
-#: The estimate is this share larger than the steps say, and larger by the second of them; ...
-_SAFETY = 1.1
-#: ... and never below what the states are solved to (mA, V, K).
-_FLOOR = np.array([2e-8, 2e-8, 5e-5])
 #: What is stored of a response surface.
 _OF_SURFACE = ("u", "coefficients", "grows", "scale")
-# Equations on the few points, and what Newton's method found.
-Solved = tuple[LeverEquations, NewtonResult]
 
 
 @dataclass(frozen=True)
@@ -81,7 +69,9 @@ class ReducedLever:
         return LeverEquations(space, probe.kinds, circuit, probe.physics)
 
     @one_blas_thread
-    def solved(self, probe: Probe, u: Array, guess: Array, factors: Any = None) -> Solved:
+    def solved(
+        self, probe: Probe, u: Array, guess: Array, factors: Any = None
+    ) -> tuple[LeverEquations, NewtonResult]:
         """Solve states of a probe's materials, (size + 1, k), on the few points.
 
         They are given by u = √(T_tip − T_base) above zero; the factors may be of states nearby.
@@ -92,7 +82,9 @@ class ReducedLever:
             If a state was not found.
         """
         few = self._equations(probe, self.hyper_reduced)
-        return few, solve_at(few, u, guess, _NEARLY, factors)
+        # an error of 1 K or 10 mV is small enough to start from on all points
+        options = NewtonOptions(tolerance=1e-2, keep_while=0.2, max_iterations=12)
+        return few, solve_at(few, u, guess, options, factors)
 
     @one_blas_thread
     def branch(self, probe: Probe, reach: Reach) -> Branch:
@@ -134,7 +126,8 @@ class ReducedLever:
             u, guess, factors = near.branch.u[1:], near.states(probe)[:, 1:], near.factors
         few, roots = self.solved(probe, u, guess, factors)
         every = self._equations(probe, self.space)
-        roots = solve_at(every, u, roots.x, _DONE, roots.factors)
+        options = NewtonOptions(tolerance=1e-3, keep_while=0.5, max_iterations=12)
+        roots = solve_at(every, u, roots.x, options, roots.factors)
         # derivatives by the material are taken at the few points: exact ones cost too much here
         branch = Branch.whole(every, u, roots)
         return Linearised.of(probe, names, branch, reach, few, roots.factors)
@@ -145,13 +138,13 @@ class ReducedLever:
 
     def full_states(self, branch: Branch, equations: LeverEquations) -> tuple[Array, Array]:
         """See `SimilarLevers.full_states`: few, since the errors are small and smooth."""
-        some = np.unique(np.linspace(1, branch.u.size - 1, _COMPARED_AT).astype(int))
+        some = np.unique(np.linspace(1, branch.u.size - 1, 10).astype(int))
         u, guess = branch.u[some], self.space.expanded(branch.x[:, some])
         return u, solve_at(equations, u, guess, NewtonOptions(tolerance=1e-5)).x
 
     def tip_error_K(self, probe: Probe, branch: Branch) -> float:
         """See `SimilarLevers.tip_error_K`: what the full lever's residual says."""
-        u = branch.u[np.linspace(1, branch.u.size - 1, _ESTIMATED_AT).astype(int)]
+        u = branch.u[np.linspace(1, branch.u.size - 1, 4).astype(int)]
         *_, tip = estimated_error(Lever(probe), branch, u)
         return float(tip.max())
 
@@ -230,4 +223,7 @@ def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
     # without that of V_l, which follows at a bias
     errors = np.abs(at_fixed_bias(branch.curve(u, 1), lever.circuit, away))[1:]
     both, second_alone = np.moveaxis(errors, 2, 0)
-    return np.maximum(_SAFETY * both + second_alone, _FLOOR[:, None])
+    # the estimate is a tenth larger than the steps say, and larger by the second of them; and never
+    # below what the states are solved to (mA, V, K)
+    floor = np.array([2e-8, 2e-8, 5e-5])
+    return np.maximum(1.1 * both + second_alone, floor[:, None])

@@ -26,14 +26,6 @@ PAPER: dict[str, tuple[float, float]] = {
     "a0": (7.5e-4, 1.15e-3),
     "a1": (0.85e-6, 1.5e-6),
 }
-#: What scales all thermal conductivities of the paper's silicon.
-C_KAPPA = "c_kappa"
-#: So many standard deviations of what is known beforehand another material's ranges reach.
-_SPREADS = 2.5
-#: A domain serves probes so far from its middle, in its widths.
-_SERVES = 0.7
-#: Width of a range, as a share of the scale, where nothing is known beforehand.
-_UNKNOWN = 0.3
 
 
 @dataclass(frozen=True)
@@ -67,7 +59,7 @@ class ParameterDomain:
         if is_papers(probe, names):
             low, high = np.array(list(PAPER.values())).T
             even = np.array([name == "n_d" for name in PAPER])
-            return cls(tuple(PAPER), low, high, even, C_KAPPA)
+            return cls(tuple(PAPER), low, high, even, "c_kappa")
         declared, priors = of_materials(probe), default_priors(probe)
         # the order must not depend on that of the names
         chosen = [name for name in declared if name in {*usual_parameters(probe), *names}]
@@ -76,10 +68,12 @@ class ParameterDomain:
         for name, value in zip(chosen, probe.values(chosen).tolist(), strict=True):
             prior, parameter = priors.get(name), declared[name]
             if prior is None:
-                away = _UNKNOWN * (abs(value) or parameter.scale)
+                # where nothing is known beforehand the range is a share of the scale
+                away = 0.3 * (abs(value) or parameter.scale)
                 ends = value - away, value + away
             else:
-                ends = prior.at(-_SPREADS), prior.at(_SPREADS)
+                # in standard deviations of what is known beforehand
+                ends = prior.at(-2.5), prior.at(2.5)
             ranges.append((max(ends[0], parameter.lower), min(ends[1], parameter.upper)))
             by_logarithm.append(prior is not None and prior.relative)
         low, high = np.array(ranges).T
@@ -107,7 +101,8 @@ class ParameterDomain:
 
     def covers(self, probe: Probe) -> bool:
         """Whether a reduced lever of this domain serves a probe: the paper's serves any."""
-        return self.scale is not None or bool((np.abs(self.shares(probe) - 0.5) < _SERVES).all())
+        # so far from its middle, in its widths, a domain serves
+        return self.scale is not None or bool((np.abs(self.shares(probe) - 0.5) < 0.7).all())
 
     def shares(self, probe: Probe) -> Array:
         """Invert `probe`, beyond the domain too."""
@@ -132,7 +127,7 @@ def is_papers(probe: Probe, names: Collection[str] = ()) -> bool:
     """Whether a probe is of the paper's silicon, and some names are of its six parameters."""
     plain = probe.has_plain_silicon and not probe.materials
     scaled = isinstance(probe.material.c_kappa, float)
-    return set(names) <= {C_KAPPA, *PAPER} and plain and scaled
+    return set(names) <= {"c_kappa", *PAPER} and plain and scaled
 
 
 @dataclass(frozen=True)

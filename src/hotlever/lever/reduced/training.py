@@ -13,7 +13,7 @@ from hotlever.lever.equations import ELECTRICAL_OUTPUTS
 from hotlever.lever.lever import Lever
 from hotlever.lever.observables import Linearised
 from hotlever.lever.reduced.lever import ReducedLever
-from hotlever.lever.reduced.response_surface import C_KAPPA, ParameterDomain, ResponseSurface
+from hotlever.lever.reduced.response_surface import ParameterDomain, ResponseSurface
 from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.materials import full_name
 from hotlever.probe import Probe
@@ -21,13 +21,6 @@ from hotlever.probe.probe_parameters import of_materials
 from hotlever.steps import each
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
-
-#: Range of c_κ, whose derivative joins the snapshots in air: silicon competes with air there.
-_C_KAPPA_IN_AIR = 0.25
-#: Tip temperature (K) up to which states are collected.
-HOTTEST = 1350.0
-#: Size of the changes of a state that join the snapshots: share of the domain, and K.
-_PARAMETER_STEP, _BRANCH_STEP = 0.25, 50.0
 
 
 @dataclass(frozen=True)
@@ -40,11 +33,19 @@ class ReductionOptions:
         Parameter sets whose whole branch is solved.
     modes_T, modes_V : int
         Modes of each field. The reader voltage, a small potential, asks for more of the latter.
+    hottest_K : float
+        Tip temperature up to which states are collected.
+    parameter_step, branch_step_K : float
+        Size of the changes of a state that join the snapshots: as a share of the domain, and in the
+        tip temperature.
     """
 
     parameter_sets: int = 8
     modes_T: int = 36
     modes_V: int = 48
+    hottest_K: float = 1350.0
+    parameter_step: float = 0.25
+    branch_step_K: float = 50.0
 
 
 def can_be_reduced(probe: Probe, names: Collection[str]) -> bool:
@@ -94,7 +95,7 @@ def reduce(
     options, domain = options or ReductionOptions(), ParameterDomain.of(lever.probe, names)
     shares = qmc.Sobol(len(domain.names), seed=0).random(options.parameter_sets)
     training = [
-        _trained(lever.with_probe(domain.probe(lever.probe, row)), domain)
+        _trained(lever.with_probe(domain.probe(lever.probe, row)), domain, options.hottest_K)
         for row in each(list(shares), progress)
     ]
     space = _space(lever, training, domain, options)
@@ -159,9 +160,9 @@ def _file(lever: Lever, domain: ParameterDomain) -> Path | None:
 # --- training ---------------------------------------------------------------------------------
 
 
-def _trained(lever: Lever, domain: ParameterDomain) -> Linearised:
+def _trained(lever: Lever, domain: ParameterDomain, hottest_K: float) -> Linearised:
     """Return a branch and its derivatives, without the factors: those of all branches are large."""
-    branch = lever.branch(HOTTEST)
+    branch = lever.branch(hottest_K)
     linearised = Linearised.of(
         lever.probe, domain.parameters, branch, lambda _: True, lever.equations
     )
@@ -177,15 +178,16 @@ def _space(
     lift = np.where(full.is_temperature[:-1], 0.0, cold[:-1] / cold[-1])
     widths = domain.widths
     if full.air.medium == "air" and domain.scale:
-        widths[C_KAPPA] = _C_KAPPA_IN_AIR
+        # silicon competes with air there, so the derivative by c_κ joins the snapshots
+        widths["c_kappa"] = 0.25
     snapshots = []
     for linearised in training:
         branch = linearised.branch
         snapshots.append(branch.x[:, 1:])
-        snapshots.append(branch.slopes[:, 1:] * (_BRANCH_STEP / (2.0 * branch.u[1:])))
+        snapshots.append(branch.slopes[:, 1:] * (options.branch_step_K / (2.0 * branch.u[1:])))
         for name, width in widths.items():
             change = linearised.changes[:, 1:, domain.parameters.index(name)]
-            snapshots.append(change * (_PARAMETER_STEP * width))
+            snapshots.append(change * (options.parameter_step * width))
     together = np.concatenate(snapshots, axis=1)
     return ReducedSpace.of_snapshots(full, lift, together, most=(options.modes_T, options.modes_V))
 

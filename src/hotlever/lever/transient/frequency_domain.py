@@ -40,10 +40,6 @@ if TYPE_CHECKING:
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-#: Frequencies (Hz) that are answered; and the real ones (1/µs) that the answers are expanded in,
-#: from slower than the slowest mode to faster than all frequencies asked for.
-LOWEST, HIGHEST = 1e-3, 1e8
-_RATES = np.append(0.0, np.geomspace(3e-3, 3e3, 22))
 #: Columns of a file.
 SPECTRUM_COLUMNS = (
     *("frequency_Hz", "impedance_real_ohm", "impedance_imag_ohm"),
@@ -92,7 +88,9 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
     unknowns, weights = equations.space.tip
     tip[unknowns, 0] = weights
     answers, tests, single = [], [], np.arange(1)
-    for rate in _RATES:
+    # real rates (1/µs) from slower than the slowest mode to faster than all frequencies that are
+    # answered, and at rest
+    for rate in np.append(0.0, np.geomspace(3e-3, 3e3, 22)):
         factors = equations.factorised(x, LEVER, float(rate))
         answers.append(factors.solve(unit, single))
         answers.append(factors.solve(equations.storage_change(x, answers[-1]), single))
@@ -152,8 +150,8 @@ def checked_frequencies(frequency_Hz: ArrayLike) -> Array:
         If one is out of bounds, or there is none.
     """
     frequency = np.atleast_1d(np.asarray(frequency_Hz, dtype=float))
-    if not frequency.size or not ((frequency >= LOWEST) & (frequency <= HIGHEST)).all():
-        raise InputError(f"expected frequencies from {LOWEST:g} to {HIGHEST:g} Hz")
+    if not frequency.size or not ((frequency >= 1e-3) & (frequency <= 1e8)).all():
+        raise InputError("expected frequencies from 0.001 to 1e+08 Hz")
     return frequency
 
 
@@ -164,10 +162,6 @@ HARMONIC_COLUMNS = (
     *(f"{name}{kind}" for name in HARMONICS for kind in ("_harmonic_V", "_harmonic_deg")),
     "mean_tip_K",
 )
-#: Times of a period; corrections at most, and how small (relative) the last one is.
-_TIMES, _MOST, _ACCURATE = 16, 200, 1e-9
-#: Slowest time constants that steps are simulated for.
-_TIME_CONSTANTS = 12.0
 
 
 @one_blas_thread
@@ -247,6 +241,8 @@ class HarmonicBalance:
         The state at rest at the offset.
     offset, amplitude : float
         Of the bias (V).
+    times : int
+        Of a period; even.
     """
 
     def __init__(
@@ -256,9 +252,11 @@ class HarmonicBalance:
         start: Array,
         offset: float,
         amplitude: float,
+        times: int = 16,
     ) -> None:
         self._equations, self._circuit, self._start = equations, circuit, start
-        angles = 2.0 * np.pi * np.arange(_TIMES) / _TIMES
+        self._times = times
+        angles = 2.0 * np.pi * np.arange(times) / times
         self._bias = offset + amplitude * np.cos(angles)
 
     def solved(self, frequency_Hz: float) -> tuple[Complex, float]:
@@ -271,12 +269,12 @@ class HarmonicBalance:
         """
         per_us = 2e-6 * np.pi * frequency_Hz
         # of the highest, which there is but half of, no slope is known
-        turns = 1j * per_us * np.arange(_TIMES // 2 + 1)
+        turns = 1j * per_us * np.arange(self._times // 2 + 1)
         turns[-1] = 0.0
-        x = np.repeat(self._start, _TIMES, axis=1)
+        x = np.repeat(self._start, self._times, axis=1)
         of_air = self._taken_up(turns)
         inverses = None
-        for done in range(_MOST):
+        for done in range(200):
             if inverses is None or done in (2, 8):
                 inverses = self._inverses(x.mean(axis=1, keepdims=True), turns, of_air)
             stored = self._equations.storage(x)
@@ -284,11 +282,11 @@ class HarmonicBalance:
             residual = np.fft.rfft(rest, axis=1) + turns * np.fft.rfft(stored, axis=1)
             residual += np.einsum("kij,jk->ik", of_air, np.fft.rfft(x, axis=1))
             change = -np.einsum("kij,jk->ik", inverses, residual)
-            x = x + np.fft.irfft(change, _TIMES, axis=1)
+            x = x + np.fft.irfft(change, self._times, axis=1)
             if not np.isfinite(x).all():
                 break
             if self._small(change, np.fft.rfft(x, axis=1)):
-                lever_V = 2.0 * np.fft.rfft(x[-1])[1 : len(HARMONICS) + 1] / _TIMES
+                lever_V = 2.0 * np.fft.rfft(x[-1])[1 : len(HARMONICS) + 1] / self._times
                 rise = self._equations.space.tip_rise(x)
                 return lever_V, self._equations.base_temperature_K + float(rise.mean())
         raise ComputationError(
@@ -300,7 +298,7 @@ class HarmonicBalance:
         heat = self._equations.space.is_temperature
         for rows in (heat, ~heat):
             size = np.abs(coefficients[rows][:, 1:]).max(axis=1, keepdims=True)
-            if np.abs(change[rows]).max() > _ACCURATE * size.max():
+            if np.abs(change[rows]).max() > 1e-9 * size.max():
                 return False
         return True
 
@@ -321,7 +319,7 @@ class HarmonicBalance:
 
 def _steps(lever: Lever, start: State, amplitude: float) -> Array:
     """Return states of a lever at rest whose bias is stepped up, and down."""
-    until = _TIME_CONSTANTS * abs(float(slowest_modes(start)[0][0]))
+    until = 12.0 * abs(float(slowest_modes(start)[0][0]))
     states = [start.x]
     for bias in (start.bias_V + amplitude, start.bias_V - amplitude):
         integrate(

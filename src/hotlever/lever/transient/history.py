@@ -35,25 +35,6 @@ _REPORTED = (
     *("lever_V", "current_mA", "reader_V", "tip_K", "max_K"),
     *("supplied_nJ", "stored_nJ", "air_stored_nJ", "lost_nJ"),
 )
-#: Where among `MONITORED` begin flows, heats, and what is at the leg ends.
-_PARTS_MONITORED = [MONITORED.index(name) for name in ("power_mW", "stored_nJ", "at_ends_nJ")]
-_FLOWS = slice(*_PARTS_MONITORED[:2])
-#: What is added up since the start.
-ENERGIES = ("supplied_nJ", "lost_nJ")
-#: Errors are at most this share of the rise that a lever would end with, so that a response is
-#: resolved however weak it is; but never less than this (K), which is near rounding errors.
-_SHARE_OF_RISE, _LEAST_TOLERANCE = 2e-3, 1e-6
-#: Share of the highest current or voltage below which one is a rounding error.
-_ROUNDING = 1e-12
-#: Parts of the time that progress is told in.
-_PARTS = 1000
-_AIR_NOTE = (
-    "the air of this lever answers at once, as if it were at rest at every moment: what it takes "
-    "up itself is left out (heat goes 15 µm into air in 10 µs)"
-)
-
-# Called with a time (µs) and the state there.
-Callback = Callable[[float, State], None]
 
 
 def time_steps(
@@ -70,8 +51,10 @@ def time_steps(
     """
     begin = initial_state(lever, waveform) if start is None else start
     if lever.circuit.starts_cold:
-        rise = _SHARE_OF_RISE * _expected_rise(lever, waveform.highest_V)
-        tolerance_K = max(min(tolerance_K, rise), _LEAST_TOLERANCE)
+        # a share of the rise that the lever would end with, so that a response is resolved however
+        # weak it is; but never less than 1e-6 K, which is near rounding errors
+        rise = 2e-3 * _expected_rise(lever, waveform.highest_V)
+        tolerance_K = max(min(tolerance_K, rise), 1e-6)
     length: float | None = None
     x: Array | None = None
     for piece in waveform.pieces(until):
@@ -113,7 +96,7 @@ def integrate(
     tolerance_K: float = 0.1,
     per_step: int = 1,
     start: State | None = None,
-    callback: Callback | None = None,
+    callback: Callable[[float, State], None] | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Integrate a lever in time under a bias that changes.
@@ -174,7 +157,7 @@ def integrate(
                 failure = f"{lever.equations.laws.limit[1]} after {end:.6g} µs"
                 break
             if progress is not None:
-                progress(int(_PARTS * reached / until), _PARTS)
+                progress(int(1000 * reached / until), 1000)
     except ComputationError as error:
         failure = f"the lever could be simulated up to {reached:.6g} µs only: {error}"
     data = _dataset(lever, waveform, recorder)
@@ -187,7 +170,11 @@ class _Recorder:
     """Rows of a history: at the times asked for, or where the solver stepped."""
 
     def __init__(
-        self, lever: Lever, report_times: Array | None, per_step: int, callback: Callback | None
+        self,
+        lever: Lever,
+        report_times: Array | None,
+        per_step: int,
+        callback: Callable[[float, State], None] | None,
     ) -> None:
         self._lever, self._report_times, self._per_step, self._callback = (
             lever,
@@ -198,6 +185,8 @@ class _Recorder:
         self.monitors = MonitorMap(lever.probe, lever.equations)
         base = lever.equations.base_temperature_K
         self._zero = np.array([0.0, 0.0, 0.0, base, base])[:, None]
+        # where flows, heats, and what is at the leg ends begin
+        self._parts = [MONITORED.index(name) for name in ("power_mW", "stored_nJ", "at_ends_nJ")]
         self._at_ends: float | None = None
         self._added = np.zeros((2, 1))
         self.time: list[float] = []
@@ -236,11 +225,11 @@ class _Recorder:
 
         Behind what is `_REPORTED` come the rows of the monitors.
         """
-        outputs, flows, held, at_ends = np.split(step.monitored, _PARTS_MONITORED)
-        moving, _, held_by, at_ends_by = np.split(step.monitored_slopes, _PARTS_MONITORED)
+        outputs, flows, held, at_ends = np.split(step.monitored, self._parts)
+        moving, _, held_by, at_ends_by = np.split(step.monitored_slopes, self._parts)
         if self._at_ends is None:
             self._at_ends = float(at_ends[0, 0])
-        added = self._added + np.outer(step.added[_FLOWS], [0.0, 1.0])
+        added = self._added + np.outer(step.added[self._parts[0] : self._parts[1]], [0.0, 1.0])
         self._added = added[:, 1:]
         # what is held at the leg ends leaves without a flux at rest
         left, left_by = added[1:] - (at_ends - self._at_ends), flows[1:] - at_ends_by
@@ -289,7 +278,8 @@ def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Datase
     values = np.array(recorder.values).reshape(len(recorder.time), count + monitors.size)
     columns = dict(zip(_REPORTED, values[:, :count].T, strict=True))
     for name, of in (("reader_V", "lever_V"), ("lever_V", "lever_V"), ("current_mA", "current_mA")):
-        noise = _ROUNDING * np.abs(columns[of]).max()
+        # smaller ones are rounding errors
+        noise = 1e-12 * np.abs(columns[of]).max()
         columns[name] = np.where(np.abs(columns[name]) < noise, 0.0, columns[name])
     columns["power_mW"] = columns["lever_V"] * columns["current_mA"]
     # the reader, where there is none, is NaN throughout
@@ -304,7 +294,11 @@ def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Arra
     """Return the dataset of a history of its columns, with notes on what it leaves out."""
     time, columns = columns["time_us"], with_bridge(lever.circuit, columns)
     at_rest = lever.medium == "air" and not lever.equations.heat_in_air.size
-    notes = [_AIR_NOTE] if at_rest else []
+    air_note = (
+        "the air of this lever answers at once, as if it were at rest at every moment: what it "
+        "takes up itself is left out (heat goes 15 µm into air in 10 µs)"
+    )
+    notes = [air_note] if at_rest else []
     notes += range_notes(lever.equations.laws.made_of, "{} µs on", time, columns["max_K"])
     variables, coordinates = with_meanings(lever.probe, columns, "time")
     return labelled(

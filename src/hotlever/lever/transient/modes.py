@@ -37,14 +37,6 @@ if TYPE_CHECKING:
 
 #: What the source holds: the bias behind the series resistor, or at the lever itself.
 Source = Literal["bias", "voltage", "current", "power"]
-#: Time constants are found to this relative accuracy.
-_ACCURATE = 1e-9
-#: In air they are found again with what goes along, until they change by less; rounds at most.
-_STEADY, _MOST_ROUNDS = 1e-4, 6
-#: Points of a history for each step of the solver.
-_PER_STEP = 8
-#: A rise (K) of which less is no heating: beside it count errors of steps and of a state at rest.
-_LEAST_RISE = 1e-4
 
 
 @one_blas_thread
@@ -91,12 +83,12 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
         return constants, changes
     for mode in range(count):
         # what goes along with the lever depends on how fast it goes
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(6):
             rate, last = 1.0 / abs(constants[mode]), constants[mode]
             bound = air.bound(rate) if last > 0.0 else air.taken_up(rate) / rate
             times, modes = _modes(equations, x, factors, count, air.coordinates, bound)
             constants[mode], changes[:, mode] = times[mode], modes[:, mode]
-            if abs(constants[mode] / last - 1.0) < _STEADY:
+            if abs(constants[mode] / last - 1.0) < 1e-4:
                 break
     return constants, changes
 
@@ -121,7 +113,7 @@ def _modes(
     operator: Any = LinearOperator((size, size), matvec=relaxed, dtype=float)
     begin = np.where(equations.space.is_temperature, 1.0, 0.0)
     try:
-        constants, changes = eigs(operator, count, v0=begin, tol=_ACCURATE)
+        constants, changes = eigs(operator, count, v0=begin, tol=1e-9)
     except RuntimeError as error:
         raise ComputationError(f"no time constants were found: {error}") from error
     order = np.argsort(-np.abs(constants))
@@ -190,7 +182,8 @@ def with_times(
     if resolved and history.time.size > 1:
         time, tip = history.time.values, history.tip_K.values
         low, high = min(tip[0], tip[-1]), tip.max()
-        heats = high - low > _LEAST_RISE
+        # less than this is no heating: beside it count errors of steps and of a state at rest
+        heats = high - low > 1e-4
         attributes["tip_highest_K"], attributes["tip_highest_at_us"] = high, time[tip.argmax()]
         attributes["tip_mean_K"] = np.trapezoid(tip, time) / (time[-1] - time[0])
         attributes["heating_us"], attributes["cooling_us"] = (
@@ -244,7 +237,7 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
         rise = state.tip_K - base
 
         def shares(waveform: Waveform, until: float = until, rise: float = rise) -> Any:
-            history = integrate(lever, waveform, until, per_step=_PER_STEP)
+            history = integrate(lever, waveform, until, per_step=8)
             return history.time.values, (history.tip_K.values - base) / rise
 
         heating, _ = _swing(*shares(step(state.bias_V)))

@@ -21,7 +21,7 @@ from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations, heat_he
 from hotlever.lever.laws import GAS
 from hotlever.lever.space import LEVER, Factors
 from hotlever.probe import Circuit
-from hotlever.types import Array, Index
+from hotlever.types import Array
 
 if TYPE_CHECKING:
     from hotlever.lever.lever import State
@@ -33,9 +33,6 @@ MONITORED = (
     *(*ELECTRICAL_OUTPUTS, "tip_rise_K"),
     *("power_mW", "left_mW", "stored_nJ", "air_stored_nJ", "at_ends_nJ"),
 )
-
-
-_ONE: Index = np.arange(1)
 
 
 class InCircuit:
@@ -57,11 +54,12 @@ class InCircuit:
         last = np.zeros_like(bias_by)
         last[-1] = 1.0
         self._row = bias_by - last
-        self._unit_response = factors.solve(last, _ONE)
+        self._one = np.arange(1)
+        self._unit_response = factors.solve(last, self._one)
 
     def solve(self, right_hand_side: Array) -> Array:
         """Solve for right-hand sides (size + 1, 1) or (size + 1, 1, k)."""
-        solution = self._factors.solve(right_hand_side, _ONE)
+        solution = self._factors.solve(right_hand_side, self._one)
         columns = solution.reshape(len(solution), -1)
         share = (self._row.T @ columns) / (1.0 + self._row.T @ self._unit_response)
         return np.asarray((columns - self._unit_response * share).reshape(solution.shape))

@@ -22,14 +22,6 @@ from hotlever.types import Array
 if TYPE_CHECKING:
     from hotlever.lever.lever import Lever
 
-#: Modes whose part of the snapshots is less, relative, are left out; and the accuracy of the
-#: cubature.
-_LEAST_MODE, _CUBATURE = 1e-5, 1e-5
-#: Places of each snapshot that are looked at for the highest temperature.
-_HOT = 20
-#: Laws are tabulated on pieces of so many kelvins between two temperatures (K).
-_PIECE, _COLDEST, _HOTTEST = 2.0, 250.0, 1750.0
-
 
 @one_blas_thread
 def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
@@ -49,7 +41,7 @@ def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
     """
     every = space_of_modes(lever, snapshots)
     weights = lever.space.weights[:, 0]
-    points, few = empirical_cubature(_integrands(lever, every, snapshots), weights, _CUBATURE)
+    points, few = empirical_cubature(_integrands(lever, every, snapshots), weights, 1e-5)
     other = copy(lever)
     space = every.at_points(points, few)
     other.space = cast("Any", space)
@@ -75,8 +67,9 @@ def space_of_modes(lever: Lever, snapshots: Array, origin: Array | None = None) 
             vectors[rows, :-1] /= np.linalg.norm(away[rows], axis=0).max()
     # a lever that cools is hottest elsewhere
     hottest = np.where(hot[:-1, None], snapshots[:-1], 0.0)
-    hottest = np.unique(np.argsort(-hottest, axis=0)[:_HOT])
-    return ReducedSpace.of_snapshots(full, lift[:-1, 0], vectors, least=_LEAST_MODE, hot=hottest)
+    # so many places of each snapshot are looked at for the highest temperature
+    hottest = np.unique(np.argsort(-hottest, axis=0)[:20])
+    return ReducedSpace.of_snapshots(full, lift[:-1, 0], vectors, least=1e-5, hot=hottest)
 
 
 def on_all_nodes(lever: Lever, state: State) -> State:
@@ -103,7 +96,9 @@ class TabulatedLaws(LawsAtPoints):
     ) -> None:
         super().__init__(space, materials, base_temperature_K, physics, motions)
         self._looked_up: tuple[Array, Array, Array] | None = None
-        T = np.arange(_COLDEST, _HOTTEST + 1.0, 0.5 * _PIECE)
+        # on pieces of so many kelvins from the coldest temperature (K) on
+        self._piece, self._coldest = 2.0, 250.0
+        T = np.arange(self._coldest, 1751.0, 0.5 * self._piece)
         T = np.broadcast_to(T, (space.weights.size, T.size))
         laws = super().properties(T, ())[0].named
         self._laws = tuple(laws)
@@ -122,7 +117,7 @@ class TabulatedLaws(LawsAtPoints):
     def _look_up(self, T: Array) -> tuple[Array, Array]:
         """Return the properties and the heat (laws, points, n), and their slopes."""
         if self._looked_up is None or self._looked_up[0] is not T:
-            position = (T - _COLDEST) * (1.0 / _PIECE)
+            position = (T - self._coldest) * (1.0 / self._piece)
             piece = position.clip(0.0, self._last).astype(np.intp)
             off = position - piece
             rows = self._table.take(self._first + piece, axis=0)
@@ -132,7 +127,7 @@ class TabulatedLaws(LawsAtPoints):
             slope += bent
             value += off * slope
             slope += bent
-            slope *= 1.0 / _PIECE
+            slope *= 1.0 / self._piece
             self._looked_up = T, value, slope
         return self._looked_up[1:]
 

@@ -20,8 +20,6 @@ from hotlever.types import Array
 
 #: Within this time (1/rate) nothing that is stored changes.
 INSTANT_RATE = 1e9
-#: Modes are looked at that decay so often within a step, and how much more the steady ones count.
-_FASTEST, _EXACTLY = 12.0, 1e4
 
 
 @dataclass(frozen=True)
@@ -124,13 +122,15 @@ class Tableau:
         polynomial through them would be a hundred times as far off.
         """
         count, ones = len(self.times), np.ones((len(self.times), 1))
-        z = -np.linspace(0.0, _FASTEST, 200)
+        # modes are looked at that decay so often within a step
+        z = -np.linspace(0.0, 12.0, 200)
         values = np.linalg.solve(np.eye(count) - z[:, None, None] * self.stages, ones)[..., 0]
         # what decays fast has mostly done so when steps become long
         counted = np.exp(z) / (0.1 - z)
         constant, straight = np.append(np.ones(count), 0.0), np.append(self.times, 1.0)
         modes = np.column_stack([values, z]) * counted[:, None]
-        rows = np.vstack([modes, _EXACTLY * constant, _EXACTLY * straight])
+        # these are met exactly: they count so much more
+        rows = np.vstack([modes, 1e4 * constant, 1e4 * straight])
         weights = np.zeros((count, count + 1))
         for stage in range(1, count):
             earlier = [*range(stage), count]

@@ -32,12 +32,6 @@ from hotlever.types import Array
 if TYPE_CHECKING:
     from hotlever.lever.lever import Lever
 
-#: Parameters that move a mesh, an air operator or all temperatures: their derivatives in time are
-#: not known.
-_UNKNOWN = ("base_temperature_K", "surface_gap_um")
-#: Error (relative) to which derivatives are solved.
-_EXACT = 1e-8
-
 
 def derivable(probe: Probe, name: str) -> bool:
     """Whether there are derivatives in time by a parameter of a probe.
@@ -48,7 +42,8 @@ def derivable(probe: Probe, name: str) -> bool:
     >>> derivable(Probe.reference(), "n_d"), derivable(Probe.reference(), "thickness_um")
     (True, False)
     """
-    return name not in _UNKNOWN and name not in dimensions_of(probe)
+    # these move all temperatures or an air operator, and dimensions a mesh
+    return name not in ("base_temperature_K", "surface_gap_um") and name not in dimensions_of(probe)
 
 
 @one_blas_thread
@@ -190,7 +185,7 @@ class _Along:
             lambda changes: right - problem.change(x, changes, rate),
             right,
             problem.scale[..., None],
-            _EXACT,
+            1e-8,
         )
 
     # --- what is seen -----------------------------------------------------------------------------

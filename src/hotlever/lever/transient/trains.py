@@ -12,6 +12,7 @@ far, what the full lever did there joins the snapshots, and the train is simulat
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -23,8 +24,6 @@ from numpy.typing import ArrayLike
 from hotlever.errors import ComputationError
 from hotlever.lever.lever import State
 from hotlever.lever.transient.history import (
-    ENERGIES,
-    Callback,
     checked_times,
     history_dataset,
     initial_state,
@@ -37,9 +36,6 @@ from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
     from hotlever.lever.lever import Lever
-
-#: Parts of the time that progress is told in.
-_PARTS = 1000
 
 
 @dataclass(frozen=True)
@@ -85,7 +81,7 @@ def simulate(
     *,
     tolerance_K: float = 0.1,
     start: State | None = None,
-    callback: Callback | None = None,
+    callback: Callable[[float, State], None] | None = None,
     trains: TrainOptions | None = None,
     **options: Any,
 ) -> xr.Dataset:
@@ -127,7 +123,7 @@ def _on_modes(
     end: float,
     at: ArrayLike | None,
     tolerance_K: float,
-    callback: Callback | None,
+    callback: Callable[[float, State], None] | None,
     trains: TrainOptions,
     **options: Any,
 ) -> xr.Dataset:
@@ -246,7 +242,7 @@ class Train:
         self.states: list[tuple[float, State]] = []
         self._starts: list[State] = []
         self._columns: list[dict[str, Array]] = []
-        self._added = dict.fromkeys(ENERGIES, 0.0)
+        self._added = dict.fromkeys(("supplied_nJ", "lost_nJ"), 0.0)
         self._report_times: list[Array] | None = None
         if report_times is not None:
             ends = period * np.arange(1, self.whole + (1 if self._cut_off else 0))
@@ -269,7 +265,7 @@ class Train:
             self._add(number, cycle)
             start, last_K = cycle.states[-1], cycle.change_K
             if progress is not None:
-                progress(int(_PARTS * (number + 1) * period / end), _PARTS)
+                progress(int(1000 * (number + 1) * period / end), 1000)
             if cycle.remaining_K < alike * tolerance_K:
                 self._starts.append(start)
                 self.cyclic_from = number + 1

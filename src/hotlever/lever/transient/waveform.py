@@ -22,15 +22,12 @@ from hotlever.tables import read_table
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS, bias_setting, name_and_unit, setting
 
-#: Times (µs) and numbers of pulses that a wave form may have at most.
-LONGEST, MOST_PULSES = 1e12, 100_000
-#: What a wave form is simulated for beyond its last corner (µs), if nobody says; and periods.
-_AFTERWARDS, _PERIODS = 100.0, 10
+#: The longest time (µs) that a wave form may have.
+LONGEST = 1e12
+#: What a wave form is simulated for beyond its last corner (µs), if nobody says.
+_AFTERWARDS = 100.0
 #: After a step it takes so long (µs) until next to nothing changes.
 _SETTLING = 1000.0
-#: Steps per period of a sine, so that none is overlooked.
-_PER_PERIOD = 20
-_TIME, _BIAS = re.compile("t|time", re.I), re.compile("V|V_?b|bias|voltage", re.I)
 
 
 @dataclass(frozen=True)
@@ -152,7 +149,7 @@ class Sine(Waveform):
     @property
     def usual_end(self) -> float:  # type: ignore[override]
         """Ten periods (µs)."""
-        return _PERIODS * 1e6 / self.frequency_Hz
+        return 10 * 1e6 / self.frequency_Hz
 
     def pieces(self, until: float) -> Iterator[Piece]:
         """Give the one smooth part up to a time (µs)."""
@@ -161,7 +158,8 @@ class Sine(Waveform):
         def bias(t: float) -> float:
             return self.before_V + self.amplitude_V * math.sin(per_us * t)
 
-        yield Piece(0.0, until, bias, longest=1e6 / self.frequency_Hz / _PER_PERIOD)
+        # so many steps per period that no part of the sine is overlooked
+        yield Piece(0.0, until, bias, longest=1e6 / self.frequency_Hz / 20)
 
 
 def step(volts: float) -> Waveform:
@@ -190,8 +188,8 @@ def pulse(volts: float, length: float, period: float | None = None, count: int =
     [(0.0, 5.0, 10.0), (5.0, 20.0, 0.0)]
     """
     check_bias(volts, length)
-    if not 1 <= count <= MOST_PULSES:
-        raise InputError(f"found {count} pulses, expected from 1 to {MOST_PULSES}")
+    if not 1 <= count <= 100_000:
+        raise InputError(f"found {count} pulses, expected from 1 to 100000")
     text = f"pulse of {volts:g} V for {length:g} µs"
     if period is None:
         if count > 1:
@@ -251,8 +249,10 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
     table = read_table(path, expected)
     names = [name_and_unit(heading)[0] for heading in table.names]
     columns = []
-    for pattern, inside, what in ((_TIME, "us", "time"), (_BIAS, "V", "bias")):
-        column = next((k for k, name in enumerate(names) if pattern.fullmatch(name)), None)
+    for pattern, inside, what in (("t|time", "us", "time"), ("V|V_?b|bias|voltage", "V", "bias")):
+        column = next(
+            (k for k, name in enumerate(names) if re.fullmatch(pattern, name, re.I)), None
+        )
         if column is None:
             header = excerpt(",".join(table.names))
             raise InputError(
