@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hotlever.lever import Lever
-from hotlever.lever.streamline import current_path
+from hotlever.lever.fields import current_path
 from hotlever.probe import Probe
 from hotlever.types import Array
 

@@ -26,15 +26,6 @@ from hotlever.types import Array
 
 #: Extent of the chip in lever lengths; four times as much changes the loss by less than 2e-4.
 REACH = 8.0
-#: Panels of the chip at the lever's root, as a share of its width, and their growth with distance.
-_ROOT, _ROOT_GROWTH = 0.1, 0.5
-#: How far (µm) leg ends may be off one line: more than drawings are rounded by.
-_OFF_LINE = 0.02
-#: Panels in a ring; at the ends of the side and at the rim of the flat end, as a share of the
-#: radius there; and their growth with the distance from these.
-_AROUND, _AT_END, _GROWTH = 12, 0.5, 0.5
-#: Temperature (K) at which tip and air are taken to conduct: a hot tip's, where it matters most.
-HOT_K = 900.0
 
 
 # --- the chip -------------------------------------------------------------------------------------
@@ -81,7 +72,8 @@ class BaseLine:
             along = -along
         line = cls(origin, np.array([along, [-along[1], along[0]]]))
         off = np.abs(line.seen(points)[:, 0])
-        if off.max() > _OFF_LINE:
+        off_line = 0.02  # µm, more than drawings are rounded by
+        if off.max() > off_line:
             x, y = points[off.argmax()]
             raise InputError(
                 f"surroundings: {needed_by} takes leg ends of supply and ground on one line; "
@@ -89,7 +81,7 @@ class BaseLine:
             )
         corners = layout.corners
         behind = line.seen(corners)[:, 0]
-        if behind.min() < -_OFF_LINE:
+        if behind.min() < -off_line:
             x, y = corners[behind.argmin()]
             raise InputError(
                 f"surroundings: {needed_by} takes a lever in front of the line of its leg ends; "
@@ -128,12 +120,13 @@ def chip_panels(layout: Layout, refinement: float = 1.0) -> Panels:
     seen = line.seen(layout.corners)
     low, high = float(seen[:, 1].min()), float(seen[:, 1].max())
     half, reach = layout.thickness_um / 2, REACH * float(seen[:, 0].max())
-    smallest = _ROOT * (high - low) / refinement
+    # panels are smallest at the lever's root, as a share of its width
+    smallest = 0.1 * (high - low) / refinement
 
     def breaks(start: float, stop: float, near: tuple[float, float]) -> Array:
         at = np.linspace(start, stop, 20001)
         away = np.abs(at - at.clip(*near))
-        return divided(at, smallest + _ROOT_GROWTH / refinement * away)
+        return divided(at, smallest + 0.5 / refinement * away)
 
     across = breaks(low - reach, high + reach, (low, high))
     up = breaks(half, half + reach, (half, half))
@@ -170,11 +163,13 @@ def cone_panels(cone: Tip, refinement: float = 1.0) -> Panels:
     """
     base, apex, fine = cone.base_radius_um, cone.apex_radius_um, 1.0 / refinement
     length = math.hypot(cone.height_um, base - apex)
-    side = _breaks(length, fine * _AT_END * base, fine * _AT_END * apex, fine * _GROWTH)
-    end = _breaks(apex, fine * _AT_END * apex, apex, fine * _GROWTH)[1:]
+    # panels are half as large as the radius at the ends of the side and at the rim of the flat end,
+    # and grow with the distance from these
+    side = _breaks(length, fine * 0.5 * base, fine * 0.5 * apex, fine * 0.5)
+    end = _breaks(apex, fine * 0.5 * apex, apex, fine * 0.5)[1:]
     radius = np.append(base + side * (apex - base), apex * (1.0 - end))
     depth = np.append(side, np.ones(end.size)) * cone.height_um
-    return revolved(np.stack([radius, -depth], axis=1), round(_AROUND * refinement))
+    return revolved(np.stack([radius, -depth], axis=1), round(12 * refinement))
 
 
 def _breaks(length: float, first: float, last: float, growth: float) -> Array:
@@ -209,17 +204,19 @@ def revolved(profile: Array, around: int) -> Panels:
     return Panels(corners.reshape(-1, 4, 3))
 
 
-def conduction(cone: Tip, panels: Panels) -> Array:
+def conduction(cone: Tip, panels: Panels, at_K: float = 900.0) -> Array:
     """Return by how much θ on `panels` is below that of the lever, per heat from each.
 
     Between the base and a depth z, where the radius is r, a cone of base radius r₀ has the
-    resistance z / (π κ r₀ r). Air and cone conduct as at `HOT_K`.
+    resistance z / (π κ r₀ r).
 
     Parameters
     ----------
     cone : Tip
     panels : Panels, n
         Of `cone_panels`.
+    at_K : float
+        Temperature at which tip and air are taken to conduct: a hot tip's, where it matters most.
 
     Returns
     -------
@@ -228,6 +225,6 @@ def conduction(cone: Tip, panels: Panels) -> Array:
     """
     depth, base = -panels.centres[:, 2], cone.base_radius_um
     to_panel = depth / (np.pi * base * (base - depth * cone.slope))
-    of_air, _ = thermal_conductivity_of_air(HOT_K)
+    of_air, _ = thermal_conductivity_of_air(at_K)
     # what two panels have in common is the way to the nearer one
     return np.asarray(of_air / cone.kappa * np.minimum.outer(to_panel, to_panel))

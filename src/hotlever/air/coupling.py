@@ -21,11 +21,6 @@ from hotlever.air.stores import HeatInAir
 from hotlever.errors import ComputationError
 from hotlever.types import Array, Index, LinearSolver
 
-#: Krylov's method stops at this residual, relative to the right-hand side; what is left is small
-#: beside that of a kept Jacobian, and both are removed by the next step.
-_TOLERANCE = 1e-5
-_MOST_DIRECTIONS, _MOST_RESTARTS = 200, 5
-
 
 class LocalLosses(Protocol):
     """What losses at points, by the temperature there, add to the matrices of elements."""
@@ -245,15 +240,20 @@ class AirSolver:
 
 
 class _Directions:
-    """Generalised conjugate residuals between the sites, for one of the two systems."""
+    """Generalised conjugate residuals between the sites, for one of the two systems.
+
+    At most `most` directions are stored.
+    """
 
     def __init__(
         self,
         near: Callable[[Array], Array],
         lost: Callable[[Array], Array],
         sampled: Callable[[Array], Array],
+        most: int = 200,
     ) -> None:
         self._near, self._lost, self._sampled = near, lost, sampled
+        self._most = most
         # per direction: its image between the sites (orthonormal), and the change of x
         self._images = self._changes = np.empty((0, 0))
         self._count = 0
@@ -262,7 +262,9 @@ class _Directions:
         """Solve for one right-hand side."""
         x = self._near(right_hand_side)
         residual = self._sampled(x)
-        goal = _TOLERANCE * np.linalg.norm(residual)
+        # what is left is small beside that of a kept Jacobian, and both are removed by the next
+        # step
+        goal = 1e-5 * np.linalg.norm(residual)
         used = restarts = 0
         while True:
             if self._count:
@@ -273,13 +275,13 @@ class _Directions:
                 used = self._count
             if not np.linalg.norm(residual) > goal:
                 return x
-            if used == _MOST_DIRECTIONS:
+            if used == self._most:
                 # those of many other right-hand sides fill the memory; begin again
                 used, self._count, restarts = 0, 0, restarts + 1
-            if restarts > _MOST_RESTARTS:
+            if restarts > 5:
                 raise ComputationError(
                     f"a linear system in air was not solved with {restarts} times "
-                    f"{_MOST_DIRECTIONS} directions"
+                    f"{self._most} directions"
                 )
             self._add(residual)
 
@@ -289,8 +291,8 @@ class _Directions:
         image = direction - self._sampled(change)
         if not self._images.size:
             # only one of the two systems may ever be asked for
-            self._images = np.empty((_MOST_DIRECTIONS, image.size))
-            self._changes = np.empty((_MOST_DIRECTIONS, change.size))
+            self._images = np.empty((self._most, image.size))
+            self._changes = np.empty((self._most, change.size))
         shares = self._images[:count] @ image
         image = image - shares @ self._images[:count]
         change = change - shares @ self._changes[:count]

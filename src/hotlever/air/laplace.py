@@ -27,12 +27,8 @@ from hotlever.types import Array, Index
 _TINY = 1e-150
 #: Pairs whose centroids are this many times the sum of their radii apart are far.
 FAR = 3.0
-#: For near pairs that have no closed form, see ``Orders`` of `hotlever.air.single_layer`.
+#: For near pairs that have no closed form, see `hotlever.air.single_layer.pairs_by_points`.
 ORDERS = ((8, 0.5), (6, 1.0), (4, 1.5), (3, 2.0), (2, np.inf))
-#: Rectangles turned by less (rad) against each other are parallel.
-_SAME_ANGLE = 2e-6
-#: Points at which potentials are found at once.
-_ROWS = 128
 #: Signs of the limits: where both panels extend, and where one does.
 _TWICE, _ONCE = np.array([1.0, -1.0, -1.0, 1.0]), np.array([1.0, -1.0])
 
@@ -113,7 +109,7 @@ def _in_one_frame(first: Panels, second: Panels, i: Index, j: Index) -> NDArray[
     """Return which pairs of panels are rectangles turned by the same angle, see `frame`."""
     (axis, angle), (other_axis, other_angle) = first.frame, second.frame
     between = np.abs(angle[i] - other_angle[j])
-    parallel = np.minimum(between, np.pi / 2 - between) < _SAME_ANGLE
+    parallel = np.minimum(between, np.pi / 2 - between) < 2e-6
     return np.asarray((axis[i] >= 0) & (other_axis[j] >= 0) & parallel)
 
 
@@ -360,8 +356,9 @@ def layer_potential(points: Array, panels: Panels, density: Array) -> Array:
     """
     result = np.empty(len(points))
     traces = np.trace(panels.moments, axis1=1, axis2=2)
-    for start in range(0, len(points), _ROWS):
-        some = points[start : start + _ROWS]
+    rows = 128
+    for start in range(0, len(points), rows):
+        some = points[start : start + rows]
         offsets = some[:, None] - panels.centres
         square = np.einsum("nmd,nmd->nm", offsets, offsets)
         near = square < (FAR * panels.radii) ** 2

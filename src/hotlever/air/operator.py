@@ -33,9 +33,6 @@ from hotlever.types import Array, Progress
 if TYPE_CHECKING:
     from hotlever.air.surface import LeverSurface
 
-#: Panels of a lever that takes no finer ones than the default: its matrix has half a gigabyte.
-_MOST_PANELS = 8000
-
 
 @dataclass(frozen=True)
 class AirOperator:
@@ -167,7 +164,9 @@ class PanelledAir:
         symmetric = surroundings.symmetric and layout.cone_in_air is None
         bodies = _bodies(layout, refinement, symmetric, surroundings.chip)
         self.surface, self.panels = bodies.surface, bodies.panels
-        most = int(_MOST_PANELS * refinement**2)
+        # the matrix of so many panels, the most without finer ones than the default, has half a
+        # gigabyte
+        most = int(8000 * refinement**2)
         if len(self.panels) > most:
             raise ComputationError(
                 f"air: this lever takes {len(self.panels)} panels, more than {most}; are its "

@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hotlever.types import Array, Index
 
-#: Share of its radius by which a rectangle's corners may be off.
-_RECTANGLE = 1e-6
 #: Square of the distance (µm²) for that of panels in one place, which are never expanded.
 COINCIDENT = 1e-12
 
@@ -142,7 +140,7 @@ class Panels:
             From 0 to π/2; next to both it means the same.
         """
         sides = np.roll(self.corners, -1, axis=1) - self.corners
-        tolerance = _RECTANGLE * self.radii
+        tolerance = 1e-6 * self.radii
         level = np.abs(sides[:, :, 2]) < tolerance[:, None]
         upright = np.linalg.norm(sides[:, :, :2], axis=2) < tolerance[:, None]
         # the first side, or the second where the first is upright

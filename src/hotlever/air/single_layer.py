@@ -34,14 +34,6 @@ from hotlever.types import Array, Index, Progress
 
 # Real or complex, as the kernel is.
 Numbers = NDArray[Any]
-# Gauss points per direction, and up to how many times the sum of their radii the centroids of two
-# panels are apart for which they suffice.
-Orders = Sequence[tuple[int, float]]
-
-#: Panels expanded, pairs integrated and Gauss points taken at once: arrays that stay in the cache.
-_ROWS, _PAIRS, _POINTS = 32, 8192, 8192
-#: Of the screened kernel: far pairs, near pairs, and points along each half of an edge.
-_FAR, _ORDERS, _ALONG = 2.0, ((4, 0.5), (3, 1.0), (2, np.inf)), 4
 
 
 class Kernel(Protocol):
@@ -102,9 +94,10 @@ def single_layer_matrix(
             _ = body.radii, body.moments
         image = np.empty_like(matrix)
         near = []
-        for start in range(0, count, _ROWS):
+        rows_at_once = 32  # whose arrays stay in the cache
+        for start in range(0, count, rows_at_once):
             # each pair once: the matrix is symmetric
-            rows, others = slice(start, start + _ROWS), slice(start, count)
+            rows, others = slice(start, start + rows_at_once), slice(start, count)
             some, rest = panels.chosen(rows), images.chosen(others)
             square = square_distances(some, rest)
             values = kernel.far_pairs(some, rest, square)
@@ -115,13 +108,14 @@ def single_layer_matrix(
             half = i <= j
             near.append(start + np.stack([i[half], j[half]]))
         pairs = np.concatenate(near, axis=1)
-        for start in range(0, pairs.shape[1], _PAIRS):
-            i, j = pairs[:, start : start + _PAIRS]
+        pairs_at_once = 8192
+        for start in range(0, pairs.shape[1], pairs_at_once):
+            i, j = pairs[:, start : start + pairs_at_once]
             values = kernel.near_pairs(panels, images, i, j)
             image[..., i, j] = values
             image[..., j, i] = values
             if progress is not None:
-                share = int(100 * min(start + _PAIRS, pairs.shape[1]) / pairs.shape[1])
+                share = int(100 * min(start + pairs_at_once, pairs.shape[1]) / pairs.shape[1])
                 progress(100 * done + share, 100 * len(mirrors))
         image *= mirror.sign / (4.0 * np.pi)
         matrix += image
@@ -132,7 +126,7 @@ def pairs_by_points(
     first: Panels,
     second: Panels,
     over_panel: Callable[[Array, Array], Numbers],
-    orders: Orders,
+    orders: Sequence[tuple[int, float]],
     *,
     odd: bool = False,
 ) -> Numbers:
@@ -144,6 +138,8 @@ def pairs_by_points(
     over_panel : callable
         Returns the integral over panels (..., 4, 3), as seen from points (..., 3).
     orders : sequence of (int, float)
+        Gauss points per direction, and up to how many times the sum of their radii the centroids of
+        two panels are apart for which they suffice.
     odd : bool
         Whether the kernel changes its sign where the two panels change places.
 
@@ -159,7 +155,7 @@ def pairs_by_points(
     integrals, numbers = [], []
     for number, (order, _) in enumerate(orders):
         here = np.flatnonzero(which == number)
-        for pairs in np.array_split(here, 1 + here.size * order**2 // _POINTS):
+        for pairs in np.array_split(here, 1 + here.size * order**2 // 8192):
             points, weights = under.chosen(pairs).points(order)
             values = over_panel(points, source[pairs, None])
             integrals.append(np.einsum("nq,...nq->...n", weights, values))
@@ -181,7 +177,7 @@ class Screened:
         it oscillates.
     """
 
-    far = _FAR
+    far = 2.0
 
     def __init__(self, q: Numbers) -> None:
         self._q, self.shape, self.dtype = q, q.shape, q.dtype
@@ -205,7 +201,9 @@ class Screened:
         def over_panel(points: Array, corners: Array) -> Numbers:
             return screened_potential(points, corners, self._q)
 
-        return pairs_by_points(first.chosen(i), second.chosen(j), over_panel, _ORDERS)
+        return pairs_by_points(
+            first.chosen(i), second.chosen(j), over_panel, ((4, 0.5), (3, 1.0), (2, np.inf))
+        )
 
 
 def screened_potential(points: Array, corners: Array, q: Numbers) -> Numbers:
@@ -231,7 +229,8 @@ def screened_potential(points: Array, corners: Array, q: Numbers) -> Numbers:
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     to_corner = corners - points[..., None, :]
     height = np.abs(np.einsum("...d,...d->...", to_corner[..., 0, :], normal))
-    nodes, weights = np.polynomial.legendre.leggauss(_ALONG)
+    # points along each half of an edge
+    nodes, weights = np.polynomial.legendre.leggauss(4)
     total = np.zeros((len(q), *to_corner.shape[:-2]), dtype=q.dtype)
     last = corners.shape[-2] - 1
     for corner in range(last + 1):

@@ -31,13 +31,6 @@ from numpy.typing import NDArray
 from hotlever.air.operator import PanelledAir
 from hotlever.types import Array
 
-#: Of the wave numbers of the stores, times the length of the lever: the lowest, and how many times
-#: it is doubled. Shorter waves than the highest would need finer panels, and matter to nothing:
-#: the lever itself holds a thousand times as much heat as air that is so near.
-_LOWEST, _DOUBLED = 0.1, 9
-#: Where the heat capacity is read off, as a share of the highest wave number.
-_READ_OFF = 0.25
-
 
 @dataclass(frozen=True)
 class AirStores:
@@ -74,14 +67,18 @@ def stores_of(panelled: PanelledAir, shapes: Array, inside: Array, length_um: fl
     length_um : float
         Of the lever.
     """
-    waves: Array = _LOWEST / length_um * np.power(2.0, np.arange(_DOUBLED + 1))
-    still, some = panelled.admittances(np.array([1e-9, _READ_OFF]) * waves[-1], shapes)
+    # shorter waves than the highest would need finer panels, and matter to nothing: the lever
+    # itself holds a thousand times as much heat as air that is so near
+    waves: Array = 0.1 / length_um * np.power(2.0, np.arange(9 + 1))
+    # where the heat capacity is read off, as a share of the highest wave number
+    read_off = 0.25
+    still, some = panelled.admittances(np.array([1e-9, read_off]) * waves[-1], shapes)
     on_cut = panelled.admittances(1j * waves, shapes)
     rates = np.square(waves)
     conductances = np.log(4.0) / np.pi * np.array([_positive(matrix) for matrix in on_cut.imag])
     # all that is slower goes as √p, and adds up as a geometric series
     conductances[0] *= 2.0
-    at = (_READ_OFF * waves[-1]) ** 2
+    at = (read_off * waves[-1]) ** 2
     slower = np.tensordot(at / (at + rates), conductances, axes=1)
     bound = (still - on_cut.real) / rates[:, None, None]
     return AirStores(
