@@ -12,8 +12,7 @@ from documents import EXAMPLES
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, calibrate, estimator
 from hotlever.estimate.calibration import what_data_lack
-from hotlever.estimate.diagnosis import Diagnosis, _Curve
-from hotlever.estimate.hypotheses import MeasuredRows, hypotheses_of
+from hotlever.estimate.diagnosis import Diagnosis, MeasuredRows, _Curve, hypotheses_of
 from hotlever.estimate.knee import IVCurve
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.problem import Problem

@@ -35,16 +35,6 @@ from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
-#: Rows with a current that are not few for a lever.
-_FEW = 6
-#: Currents are coarse in steps of this share of the largest, each a multiple within so much.
-_COARSE, _EVEN = 0.01, 0.02
-#: A lever is cold that was never hotter (K).
-_COLD_K = 400.0
-#: Observables that are temperatures of the tip or of what it touches, and spectra that are offered
-#: where there are none.
-_OF_A_TIP, _SPECTRA = {"tip", *OF_A_CONTACT}, 5
-
 
 def calibrated(
     solution: Solution,
@@ -143,11 +133,12 @@ def what_spectra_would_do(solution: Solution, table: xr.Dataset) -> list[str]:
     They are spectra at even tip temperatures, with the errors that those of the paper have. There
     is nothing to say where nothing was known beforehand.
     """
-    if not solution.objective.informed or set(solution.residuals.observables) & _OF_A_TIP:
+    of_a_tip = {"tip", *OF_A_CONTACT}
+    if not solution.objective.informed or of_a_tip & set(solution.residuals.observables):
         return []
-    tip = table.tip_K.values
+    tip, spectra = table.tip_K.values, 5
     rise = tip - solution.probe.circuit.base_temperature_K
-    even = np.linspace(tip.min(), tip.max(), _SPECTRA + 1)[1:]
+    even = np.linspace(tip.min(), tip.max(), spectra + 1)[1:]
     spots = np.unique([int(np.argmin(np.abs(tip - each))) for each in even])
     predicted = solution.predicted(table.bias_V.values[spots])
     slopes = predicted.slopes[TIP][:, solution.objective.columns]
@@ -163,7 +154,7 @@ def what_spectra_would_do(solution: Solution, table: xr.Dataset) -> list[str]:
     )
     seen = " and ".join(FITTED[name].symbol for name in solution.residuals.observables)
     return [
-        f"from {seen} alone the rise of its hottest tip is known to ± {now:.2g} %; {_SPECTRA} "
+        f"from {seen} alone the rise of its hottest tip is known to ± {now:.2g} %; {spectra} "
         f"Raman spectra of ± {RAMAN_ERROR_K:g} K and {100.0 * THERMOMETER:g} % of the rise would "
         f"make it ± {then:.2g} %"
     ]
@@ -191,21 +182,23 @@ def _of_exact_edges(probe: Probe, priors: Container[str]) -> list[str]:
 def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -> list[str]:
     """Say what the data lack, to tell more of a lever."""
     remarks, count = [], np.isfinite(measured.current(circuit)).sum()
-    if count < _FEW:
+    few = 6
+    if count < few:
         remarks.append(
             f"{counted(count, 'row')} with a current: few for a lever, so that the answer leans on "
-            f"what was known beforehand; {_FEW} or more would tell"
+            f"what was known beforehand; {few} or more would tell"
         )
     levels = np.unique(measured.current_mA[np.isfinite(measured.current_mA)])
     step = float(np.diff(levels).min()) if levels.size > 1 else 0.0
     share = step / float(levels[-1]) if step else 0.0
-    if share > _COARSE and np.allclose(levels / step, np.round(levels / step), atol=_EVEN):
+    # each of them is a multiple of the resolution
+    if share > 0.01 and np.allclose(levels / step, np.round(levels / step), atol=0.02):
         remarks.append(
             f"I_h has a resolution of {step:.2g} mA only, {share:.1%} of its largest value, in "
             f"{counted(levels.size, 'step')}"
         )
     hottest = float(np.nanmax(tip_K))
-    if hottest < _COLD_K:
+    if hottest < 400.0:
         remarks.append(
             f"the lever was measured only up to a tip of {hottest:.0f} K; what it does beyond is "
             "not known"

@@ -1,98 +1,140 @@
 """Whether a lever shows what was measured; if none does, the likeliest of some hypotheses.
 
-With each hypothesis (`hotlever.estimate.hypotheses`) the lever is estimated again, on a coarse
-mesh; the likeliest leaves the least unexplained. Only data that contradict a probe are examined so.
+Each hypothesis changes the rows that were measured, or the probe, by one unknown, and asks one
+question. With each the lever is estimated again, on a coarse mesh; the likeliest leaves the least
+unexplained. Only data that contradict a probe are examined so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
-from operator import attrgetter
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
 from hotlever.errors import ComputationError, InputError
-from hotlever.estimate.hypotheses import (
-    Hypothesis,
-    MeasuredRows,
-    hypotheses_of,
-    of_another_lever,
-)
 from hotlever.estimate.residuals import Residuals
 from hotlever.estimate.surrogate import CurveSurrogate, Rows
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
+from hotlever.materials.parameters import parameter_named
 from hotlever.measurement import Measurement
+from hotlever.measurement.compliance import is_level
 from hotlever.measurement.data import noise_about_neighbours
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, known_beforehand
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import FITTED, OF_A_CONTACT
-from hotlever.types import Array
-
-#: Data are not described where they differ from the model by more than this share of the largest
-#: (rms), and neighbours together: the product of two is this share of the square, of white noise 0.
-#: Neither are they where so many neighbours differ by three times as much in their median.
-USUAL_SCATTER, _TOGETHER, _RUN = 0.004, 0.4, 4
-#: Of noisier data so many neighbours differ by chance by up to so many times their scatter.
-_NOISY_RUN = 2.5
-#: The share for fits whose weights are no errors, which hold dimensions and whatever else is fixed.
-_HELD_SCATTER = 0.01
-#: Outliers stand alone: so many neighbours that are off by more than so many standard deviations
-#: are none; nor are one fewer at the end, with nothing beyond.
-_NEIGHBOURS, _FAR = 3, 8.0
-#: Temperatures of a contact are off where by chance one lever in so many is.
-_UNLIKELY = 2e-4
-#: Fewer rows tell nothing of their neighbours.
-_ROWS = 7
-#: A datum is named as an outlier beyond this many standard deviations, and so many of those
-#: furthest off.
-_OUTLYING, _OUTLIERS_NAMED = 8.0, 10
-#: What a coarse lever may differ by from what was measured: of each current and of the largest.
-_OWN, _LARGEST = 3e-3, 1e-3
-#: Differences beyond this many of those count less and less, so that no single datum decides.
-_SOFT = 3.0
-#: Each row that a hypothesis leaves out counts as much as this, each unknown that it finds as that.
-_LEFT_OUT, _UNKNOWN = 1.2, 2.0
-#: A hypothesis has to lower the sum of squares to this share of what it is without, and to no more
-#: than so much for each row and altogether.
-_BETTER, _EACH, _ALTOGETHER = 0.5, 2.0, 10.0
-#: Data that leave so many times that, with all that is known of a lever, are those of another: of
-#: right levers of which little is known the farthest left twice.
-_ANOTHER = 4.0
-_ANOTHER_LEVER = (
-    "is it another lever, or in another medium, or known less well than its priors say?"
-)
-#: Hypotheses within a factor or a difference of the best are as likely; so many are named.
-_AS_LIKELY, _AS_LIKELY_BY, _CAUSES_NAMED = 1.3, 4.0, 2
-#: The most promising are solved anew where they lead.
-_AGAIN = 4
-#: Points along a branch, and steps of a search.
-_POINTS, _STEPS = 240, 40
-#: A parameter of which nothing is known is within this factor of what was stated.
-_WIDEST = 30.0
+from hotlever.text import with_unit
+from hotlever.types import Array, Mask
 
 
-def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
+@dataclass(frozen=True)
+class DiagnosisOptions:
+    """When data are not described, and when a hypothesis explains them.
+
+    Attributes
+    ----------
+    usual_scatter, held_scatter : float
+        The largest difference of data that are described (rms), as a share of the largest value of
+        an observable; the second where weights are no errors: such fits hold dimensions and
+        whatever else is fixed.
+    correlation : float
+        Data beyond it are not described if neighbours differ together: if the product of two is
+        this share of the square, which of white noise is 0.
+    run : int
+        Neither are data of which so many neighbours differ by three times the usual scatter in
+        their median.
+    run_of_noise : float
+        Of noisier data they differ by chance by up to so many times their scatter.
+    fewest_rows : int
+        Fewer tell nothing of their neighbours.
+    outlier : float
+        Standard deviations beyond which a datum is an outlier.
+    run_of_outliers : int
+        Outliers stand alone: so many neighbours are none; nor are one fewer at the end, with
+        nothing beyond.
+    contact_probability : float
+        Temperatures of a contact are off where by chance this share of levers is.
+    cold_factor : float
+        The resistance of a cold lever is within this factor of its model's.
+    fewest_biases : int
+        Different ones that a calibration needs.
+    shift : float
+        Data are not described where they, with all other priors, are so many standard deviations
+        from one prior: of the nearly twenty of a lever one is, by chance, in one lever of 500.
+    shift_probability : float
+        The same of all parameters together.
+    error, error_of_largest : float
+        What a coarse lever may differ by from what was measured: of each current and of the
+        largest.
+    robust_beyond : float
+        Differences beyond this many of those count less and less, so that no single datum decides.
+    excluded_row, unknown : float
+        Sum of squares as which each row that a hypothesis leaves out counts, and each unknown that
+        it finds.
+    improvement, squares_per_row, squares : float
+        A hypothesis has to lower the sum of squares to this share of what it is without, and to no
+        more than so much for each row and altogether.
+    another_lever : float
+        Data that leave so many times that, with all that is known of a lever, are those of another:
+        of right levers of which little is known the farthest left twice.
+    as_likely_factor, as_likely_difference : float
+        Hypotheses within a factor or a difference of the best are as likely.
+    """
+
+    usual_scatter: float = 0.004
+    held_scatter: float = 0.01
+    correlation: float = 0.4
+    run: int = 4
+    run_of_noise: float = 2.5
+    fewest_rows: int = 7
+    outlier: float = 8.0
+    run_of_outliers: int = 3
+    contact_probability: float = 2e-4
+    cold_factor: float = 2.5
+    fewest_biases: int = 3
+    shift: float = 3.85
+    shift_probability: float = 2e-3
+    error: float = 3e-3
+    error_of_largest: float = 1e-3
+    robust_beyond: float = 3.0
+    excluded_row: float = 1.2
+    unknown: float = 2.0
+    improvement: float = 0.5
+    squares_per_row: float = 2.0
+    squares: float = 10.0
+    another_lever: float = 4.0
+    as_likely_factor: float = 1.3
+    as_likely_difference: float = 4.0
+
+
+# --- whether data are described -----------------------------------------------------------------
+
+
+def lack_of_fit_text(
+    residuals: Residuals, values: Array, options: DiagnosisOptions | None = None
+) -> str:
     """Return where data are not described by predicted values (m, n); empty if they are.
 
     Temperatures are left out: a thermometer's scale may be off by more than its readings
     scatter.
     """
-    scatter = USUAL_SCATTER if residuals.errors.measured else _HELD_SCATTER
+    options = options or DiagnosisOptions()
+    usual, run = options.usual_scatter, options.run
+    scatter = usual if residuals.errors.measured else options.held_scatter
     difference = residuals.difference(values) / residuals.largest
     in_order = np.argsort(residuals.along, kind="stable")
     for name, whole, down in zip(
         residuals.observables, difference, residuals.errors.down, strict=True
     ):
         present = np.isfinite(whole)
-        if FITTED[name].unit == "K" or present.sum() < _ROWS:
+        if FITTED[name].unit == "K" or present.sum() < options.fewest_rows:
             continue
         # what a robust fit has forgotten stands alone, or is seen as a run
         squares = float(np.sum((down * whole)[present] ** 2))
@@ -101,9 +143,9 @@ def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
         # a drift shows in the order of the rows, another lever in that of the bias
         rows = [(down * whole)[order] for order in (present, ordered)]
         together = max(float(row[1:] @ row[:-1]) for row in rows)
-        windows = np.lib.stride_tricks.sliding_window_view(whole[ordered], _RUN)
+        windows = np.lib.stride_tricks.sliding_window_view(whole[ordered], run)
         runs = np.abs(np.median(windows, axis=1))
-        if rms > scatter and together > _TOGETHER * squares:
+        if rms > scatter and together > options.correlation * squares:
             worst = int(np.nanargmax(np.abs(whole)))
             return (
                 f"{name} differs by {rms:.1%} of its largest value (rms), and not at "
@@ -111,16 +153,16 @@ def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
             )
         # noise alone has runs too
         noise = noise_about_neighbours(whole[ordered])
-        if runs.max() > max(3.0 * USUAL_SCATTER, _NOISY_RUN * noise):
-            run = residuals.along[ordered[np.argmax(runs) + np.arange(_RUN)]]
+        if runs.max() > max(3.0 * usual, options.run_of_noise * noise):
+            along = residuals.along[ordered[np.argmax(runs) + np.arange(run)]]
             return (
                 f"{name} differs by {runs.max():.1%} of its largest value in neighbouring rows, "
-                f"from {run[0]:.3g} to {run[-1]:.3g} {residuals.unit}"
+                f"from {along[0]:.3g} to {along[-1]:.3g} {residuals.unit}"
             )
-    return _contradiction(residuals, values)
+    return _contradiction(residuals, values, options.contact_probability)
 
 
-def _contradiction(residuals: Residuals, values: Array) -> str:
+def _contradiction(residuals: Residuals, values: Array, probability: float) -> str:
     """Return where temperatures of a contact are off by more than their errors; empty if none are.
 
     Their errors are stated, or else their own scatter. Few as they are, each has its weight.
@@ -128,7 +170,7 @@ def _contradiction(residuals: Residuals, values: Array) -> str:
     away = residuals.difference(values) / residuals.errors.scale
     for name, row in zip(residuals.observables, away, strict=True):
         present = np.isfinite(row)
-        if name in OF_A_CONTACT and chdtrc(present.sum(), np.sum(row[present] ** 2)) < _UNLIKELY:
+        if name in OF_A_CONTACT and chdtrc(present.sum(), np.sum(row[present] ** 2)) < probability:
             worst = int(np.nanargmax(np.abs(row)))
             return (
                 f"{name} is off by {abs(row[worst]):.1f} standard errors at "
@@ -137,29 +179,40 @@ def _contradiction(residuals: Residuals, values: Array) -> str:
     return ""
 
 
-def run_of_outliers(residuals: Residuals, values: Array) -> str:
+def run_of_outliers(
+    residuals: Residuals, values: Array, options: DiagnosisOptions | None = None
+) -> str:
     """Return where neighbouring data are off together, as no outliers are; empty if none are."""
+    options = options or DiagnosisOptions()
+    run = options.run_of_outliers
     in_order = np.argsort(residuals.along, kind="stable")
     along = residuals.along[in_order]
     for name, row in zip(residuals.observables, residuals.deviations(values), strict=True):
-        if FITTED[name].unit == "K" or row.size < _ROWS:
+        if FITTED[name].unit == "K" or row.size < options.fewest_rows:
             continue
-        far = np.append(np.abs(row[in_order]) > _FAR, True)
-        together = np.lib.stride_tricks.sliding_window_view(far, _NEIGHBOURS).all(axis=1)
+        far = np.append(np.abs(row[in_order]) > options.outlier, True)
+        together = np.lib.stride_tricks.sliding_window_view(far, run).all(axis=1)
         if together.any():
             first = int(np.argmax(together))
-            last = min(first + _NEIGHBOURS, along.size) - 1
+            last = min(first + run, along.size) - 1
             ends = f"{along[first]:.3g} to {along[last]:.3g} {residuals.unit}"
             return f"{name} is off in neighbouring rows, from {ends}"
     return ""
 
 
-def outlier_notes(residuals: Residuals, values: Array, robust: bool) -> list[str]:
-    """Name the points that lie far outside the scatter of the others."""
+def outlier_notes(
+    residuals: Residuals,
+    values: Array,
+    robust: bool,
+    most: int = 10,
+    options: DiagnosisOptions | None = None,
+) -> list[str]:
+    """Name the points that lie far outside the scatter of the others, and no more than `most`."""
+    options = options or DiagnosisOptions()
     advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
     size = np.abs(residuals.deviations(values))
-    outliers = np.argwhere(size > _OUTLYING)
-    worst = np.sort(np.argsort(-size[tuple(outliers.T)], kind="stable")[:_OUTLIERS_NAMED])
+    outliers = np.argwhere(size > options.outlier)
+    worst = np.sort(np.argsort(-size[tuple(outliers.T)], kind="stable")[:most])
     named = [
         f"{residuals.observables[row]} at {residuals.along[column]:g} {residuals.unit} is "
         f"{size[row, column]:.0f} standard deviations from the fit; {advice}"
@@ -169,7 +222,243 @@ def outlier_notes(residuals: Residuals, values: Array, robust: bool) -> list[str
     return [*named, f"{more} more data are as far from the fit"] if more else named
 
 
-# --- what may be behind it -----------------------------------------------------------------------
+# --- what may be wrong with data, or with what is said of their lever ---------------------------
+
+
+@dataclass(frozen=True)
+class MeasuredRows:
+    """An I-V curve in the order of its file, which of its rows count, and their resistor."""
+
+    bias_V: Array
+    current_mA: Array
+    series_kohm: float
+    included: Mask
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One unknown, and what it would mean.
+
+    Attributes
+    ----------
+    asks : callable
+        Return a question for the value of the unknown that was found; empty if it asks nothing.
+    rows : callable, optional
+        Return the rows as they should have been, for a value of the unknown.
+    probe : callable, optional
+        Return the probe as it should have been.
+    starts : sequence of float
+        Values of the unknown to begin from. A change of the probe, which has to be solved, takes
+        no others.
+    parameter : str
+        Of which nothing is known beforehand; then its value is the unknown.
+    free : bool
+        Whether the unknown takes other values than those.
+    far_fetched : bool
+        Whether others that explain the data as well come first.
+    """
+
+    asks: Callable[[float], str]
+    rows: Callable[[MeasuredRows, float], MeasuredRows] | None = None
+    probe: Callable[[Probe, float], Probe] | None = None
+    starts: Sequence[float] = (0.0,)
+    parameter: str = ""
+    free: bool = False
+    far_fetched: bool = False
+
+
+def hypotheses_of(rows: MeasuredRows, probe: Probe, names: Sequence[str]) -> list[Hypothesis]:
+    """Return all that may be wrong; names are those of the parameters that have priors."""
+    return [
+        *_of_another_lever(rows, probe, names),
+        *_of_the_meter(rows),
+        *_of_the_rows(rows),
+        _of_the_base(probe),
+    ]
+
+
+def _of_another_lever(rows: MeasuredRows, probe: Probe, names: Sequence[str]) -> list[Hypothesis]:
+    """Return what makes resistances and powers those of another lever, from cold on."""
+    dimensions = probe.shape.dimensions()
+    return [
+        _of_another_drawing(probe),
+        _of_the_medium(probe),
+        *_of_units(),
+        _of_the_resistor(rows),
+        # of those that a user states of a lever
+        *(_of_a_parameter(probe, name) for name in names if name in ("n_d", *dimensions)),
+    ]
+
+
+def _divided_current(rows: MeasuredRows, factor: float) -> MeasuredRows:
+    return replace(rows, current_mA=rows.current_mA / factor)
+
+
+def _of_units() -> list[Hypothesis]:
+    def bias(rows: MeasuredRows, factor: float) -> MeasuredRows:
+        return replace(rows, bias_V=factor * rows.bias_V)
+
+    def swapped(rows: MeasuredRows, _: float) -> MeasuredRows:
+        return replace(rows, bias_V=rows.current_mA, current_mA=rows.bias_V)
+
+    def of_the_lever(rows: MeasuredRows, _: float) -> MeasuredRows:
+        return replace(rows, bias_V=rows.bias_V + rows.series_kohm * rows.current_mA)
+
+    small, large = (
+        f"is the unit of the current wrong, so that it is 1000 times too {size} ({example})?"
+        for size, example in (
+            ("small", "mA labelled µA, or A labelled mA"),
+            ("large", "µA labelled mA, or mA labelled A"),
+        )
+    )
+    return [
+        Hypothesis(lambda _: small, _divided_current, starts=(1e-3,)),
+        Hypothesis(lambda _: large, _divided_current, starts=(1e3,)),
+        Hypothesis(lambda _: "is the bias given in mV?", bias, starts=(1e-3,)),
+        Hypothesis(lambda _: "are bias and current swapped?", swapped),
+        Hypothesis(lambda _: "is V_b the lever's own voltage, not the bias?", of_the_lever),
+    ]
+
+
+def _of_the_meter(rows: MeasuredRows) -> list[Hypothesis]:
+    largest, along = float(rows.current_mA.max()), np.linspace(0.0, 1.0, rows.bias_V.size)
+
+    def raised(pattern: Array | float, rows: MeasuredRows, share: float) -> MeasuredRows:
+        return replace(rows, current_mA=rows.current_mA - share * largest * pattern)
+
+    def asks(question: str) -> Callable[[float], str]:
+        return lambda share: (
+            f"{question} by {share:+.1%} of its largest value?" if abs(share) < 0.5 else ""
+        )
+
+    def times(factor: float) -> str:
+        # or else it is another unit
+        of_a_range = 1.0 / 50.0 < factor < 50.0
+        return f"is the current {factor:.3g} times what it should be?" if of_a_range else ""
+
+    zero, drift = "is the zero of the current off", "does the zero of the current drift"
+    return [
+        Hypothesis(times, _divided_current, starts=(1.0,), free=True, far_fetched=True),
+        Hypothesis(asks(zero), partial(raised, 1.0), free=True),
+        Hypothesis(asks(drift), partial(raised, along), free=True),
+    ]
+
+
+def _of_the_resistor(rows: MeasuredRows) -> Hypothesis:
+    stated = rows.series_kohm
+    measured = float(np.median(rows.bias_V / np.maximum(np.abs(rows.current_mA), 1e-12)))
+
+    def other(rows: MeasuredRows, kohm: float) -> MeasuredRows:
+        return replace(rows, series_kohm=max(kohm, 0.0))
+
+    return Hypothesis(
+        lambda kohm: (
+            f"is the series resistance, with contacts, rather {kohm:.3g} than {stated:.3g} kΩ?"
+        ),
+        other,
+        starts=(stated, stated / 2, 0.8 * measured),
+        free=True,
+    )
+
+
+def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
+    bias, current, number = rows.bias_V, rows.current_mA, np.arange(rows.bias_V.size)
+    clipped = []
+    level = is_level(current)
+    # whether a current that stands at its highest value is clipped is not seen without the lever
+    if level.sum() >= 2 and (~level).sum() >= 5:
+        text = f"is the current clipped at {current.max():.3g} mA, by the range of its meter?"
+        clipped.append(Hypothesis(lambda _: text, lambda rows, _: replace(rows, included=~level)))
+
+    def part(first: bool, rows: MeasuredRows, cut: float) -> MeasuredRows:
+        return replace(rows, included=(number < cut) == first)
+
+    # one sweep is no two; but something may have changed on the way. A bias that falls by less is
+    # noise of its meter
+    back = 0.05 * float(np.ptp(bias))
+    falls, rises = (np.maximum.accumulate(way) - way > back for way in (bias, -bias))
+    monotonic = not (falls.any() and rises.any())
+
+    def asks(cut: float) -> str:
+        where = f"row {cut + 1:.0f} ({bias[int(cut)]:.3g} V) on"
+        if monotonic:
+            return f"does the current jump, by another lever or another range, from {where}?"
+        return f"are there two sweeps, a new one from {where}?"
+
+    if monotonic:
+        cuts = _jumps(bias, current)
+    else:
+        # where the bias goes back, or else at some quarter
+        turn = [int(np.argmax(bias[: np.argmax(falls)])) + 1] if falls.any() else []
+        cuts = [*turn, *(quarter * number.size // 4 for quarter in (1, 2, 3))]
+    both = [Hypothesis(asks, partial(part, first), starts=cuts) for first in (True, False) if cuts]
+    return [*clipped, *both]
+
+
+def _jumps(bias: Array, current: Array) -> list[int]:
+    """Return rows of one sweep from which on the current may be another one.
+
+    Straight lines through two rows on either side say how far it jumps there; a knee has the
+    largest of some levers.
+    """
+    used = np.flatnonzero(np.append(True, np.diff(bias) != 0.0) & (bias > 0) & (current > 0))
+    if used.size < 8:
+        return []
+    x, y = np.log(bias[used]), np.log(current[used])
+    slope = np.diff(y) / np.diff(x)
+    middle = 0.5 * (x[1:-2] + x[2:-1])
+    before = y[1:-2] + slope[:-2] * (middle - x[1:-2])
+    after = y[2:-1] + slope[2:] * (middle - x[2:-1])
+    jump = np.abs(after - before)
+    # by a share of the current, and by more than it usually changes
+    least = max(0.01, 5.0 * float(np.median(jump)))
+    largest = np.argsort(-jump, kind="stable")[:3]
+    return [int(row) for row in used[largest[jump[largest] > least] + 2]]
+
+
+def _of_another_drawing(probe: Probe) -> Hypothesis:
+    """Return that the lever has the usual shape that the probe has not."""
+    usual = Probe.reference().shape, Probe.u_shape().shape
+    shape = next(each for each in usual if each.shape != probe.shape.shape)
+    return Hypothesis(
+        lambda _: f"is the drawing that of another lever, {shape.shape}?",
+        probe=lambda probe, _: probe.model_copy(
+            update={"shape": shape, "tip": None, "contact": None}
+        ),
+    )
+
+
+def _of_the_medium(probe: Probe) -> Hypothesis:
+    medium = probe.surroundings.medium
+    other = "air" if medium == "vacuum" else "vacuum"
+    return Hypothesis(
+        lambda _: f"is the lever in {other}, not in {medium}?",
+        probe=lambda probe, _: probe.in_medium(other),
+    )
+
+
+def _of_the_base(probe: Probe) -> Hypothesis:
+    base = probe.circuit.base_temperature_K
+    return Hypothesis(
+        lambda warmer: f"is the base temperature rather about {base + warmer:.0f} K?",
+        probe=lambda probe, warmer: probe.with_(base_temperature_K=base + warmer),
+        starts=(30.0, 60.0, 100.0),
+    )
+
+
+def _of_a_parameter(probe: Probe, name: str) -> Hypothesis:
+    (stated,) = probe.values([name]).tolist()
+    parameter, whose = parameter_named(name), "doping" if name == "n_d" else "drawing"
+    return Hypothesis(
+        lambda value: (
+            f"is the {whose} another, with {parameter.symbol} rather {value:.3g} than "
+            f"{with_unit(f'{stated:.3g}', parameter.unit)}?"
+        ),
+        parameter=name,
+    )
+
+
+# --- the likeliest of it ------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -210,7 +499,7 @@ class _Curve:
         lever = SimilarLevers(Lever(probe, COARSE)).linearised(probe, whole, names=names)
         rows = Rows(np.zeros(0))
         surrogate = CurveSurrogate(probe, names, lever.branch, lever.output_slopes, rows)
-        u = np.linspace(float(lever.branch.u[1]), lever.branch.end_u, _POINTS)
+        u = np.linspace(float(lever.branch.u[1]), lever.branch.end_u, 240)
         outputs = np.maximum(lever.branch.curve(u)[:, :2], 1e-12)
         powers = surrogate.powers(u)[:, :2]
         return cls(probe, np.zeros(len(names)), names, np.array(spreads), np.log(outputs), powers)
@@ -244,7 +533,8 @@ class _Explanation:
         return self.hypothesis.asks(self.unknown)
 
 
-_squares = attrgetter("squares")
+def _likeliest_first(explanations: Iterable[_Explanation]) -> list[_Explanation]:
+    return sorted(explanations, key=lambda explained: explained.squares)
 
 
 class Diagnosis:
@@ -257,11 +547,17 @@ class Diagnosis:
         In the circuit and the medium that it is said to be in.
     priors : mapping of str to Prior or str, optional
         In place of some of the usual ones.
+    options : DiagnosisOptions, optional
     """
 
     def __init__(
-        self, measured: Measurement, probe: Probe, priors: Mapping[str, Prior | str] | None = None
+        self,
+        measured: Measurement,
+        probe: Probe,
+        priors: Mapping[str, Prior | str] | None = None,
+        options: DiagnosisOptions | None = None,
     ) -> None:
+        self.options = options or DiagnosisOptions()
         current = measured.current(probe.circuit)
         here = np.isfinite(current) & np.isfinite(measured.bias_V)
         data = measured.bias_V[here], current[here]
@@ -287,7 +583,8 @@ class Diagnosis:
             return ""
         hypotheses = hypotheses_of(self._rows, self._probe, self._curve.names)
         explanations = self._searched(hypotheses)
-        return self._questions(sorted(map(self._again, explanations[:_AGAIN]), key=_squares))
+        # the most promising are solved anew where they lead
+        return self._questions(_likeliest_first(map(self._again, explanations[:4])))
 
     def of_another_lever(self) -> str:
         """Return a question if no lever like the probe is near the data; empty otherwise.
@@ -301,13 +598,15 @@ class Diagnosis:
         # most data are near the lever as stated, and no other one is solved for them
         if self._is_near(self._as_stated) or self._is_near(self._without):
             return ""
-        drawing, *others = of_another_lever(self._rows, self._probe, self._curve.names)
+        drawing, *others = _of_another_lever(self._rows, self._probe, self._curve.names)
         explanations = self._searched([drawing])
         if explanations and self._explains(explanations[0]):
             explanations += self._searched(others)
-            if question := self._questions(sorted(explanations, key=_squares)):
+            if question := self._questions(_likeliest_first(explanations)):
                 return question
-        return self.likeliest() or _ANOTHER_LEVER
+        return self.likeliest() or (
+            "is it another lever, or in another medium, or known less well than its priors say?"
+        )
 
     def _searched(self, hypotheses: Sequence[Hypothesis]) -> list[_Explanation]:
         """Return where searches with hypotheses end, the likeliest first."""
@@ -315,19 +614,20 @@ class Diagnosis:
         for hypothesis in hypotheses:
             with suppress(ComputationError, InputError):  # there may be no such lever
                 explanations.append(self._search(hypothesis))
-        return sorted(explanations, key=_squares)
+        return _likeliest_first(explanations)
 
     def _questions(self, explanations: Sequence[_Explanation]) -> str:
         """Return what the likeliest explanations ask; empty if they explain nothing."""
         explanations = [explained for explained in explanations if explained.question]
         best = explanations[0] if explanations else self._without
-        if best.squares > _BETTER * self._without.squares or not self._explains(best):
+        options, squares = self.options, best.squares
+        if squares > options.improvement * self._without.squares or not self._explains(best):
             return ""
-        limit = max(_AS_LIKELY * best.squares, best.squares + _AS_LIKELY_BY)
+        limit = max(options.as_likely_factor * squares, squares + options.as_likely_difference)
         as_likely = [explained for explained in explanations if explained.squares <= limit]
         as_likely.sort(key=lambda explained: explained.hypothesis.far_fetched)
         questions = dict.fromkeys(explained.question for explained in as_likely)
-        return " or: ".join(list(questions)[:_CAUSES_NAMED])
+        return " or: ".join(list(questions)[:2])
 
     @cached_property
     def _without(self) -> _Explanation:
@@ -351,11 +651,12 @@ class Diagnosis:
 
     def _is_near(self, explained: _Explanation) -> bool:
         """Whether a search may explain the data that a coarse lever does not quite."""
-        return explained.squares < _ANOTHER * self._least_unexplained
+        return explained.squares < self.options.another_lever * self._least_unexplained
 
     @property
     def _least_unexplained(self) -> float:
-        return _EACH * self._rows.included.size + _ALTOGETHER
+        options = self.options
+        return options.squares_per_row * self._rows.included.size + options.squares
 
     def _search(self, hypothesis: Hypothesis) -> _Explanation:
         """Estimate the lever with a hypothesis, from each of its starts; return the best."""
@@ -366,7 +667,7 @@ class Diagnosis:
             if hypothesis.probe is not None:
                 curves = [self._solved(hypothesis.probe(self._probe, start))]
             ends += [self._estimated(hypothesis, start, curve) for curve in curves]
-        return min(ends, key=_squares)
+        return _likeliest_first(ends)[0]
 
     def _again(self, explained: _Explanation) -> _Explanation:
         """Solve the lever where a search has led, and go on from there."""
@@ -378,14 +679,15 @@ class Diagnosis:
         except (InputError, ComputationError):
             return explained
         again = self._estimated(explained.hypothesis, explained.unknown, curve)
-        return min(explained, again, key=_squares)
+        return _likeliest_first([explained, again])[0]
 
     def _estimated(self, hypothesis: Hypothesis, start: float, curve: _Curve) -> _Explanation:
         """Return the lever that priors and rows make most likely.
 
         The search is for logarithms of parameters in units of their spreads, and for the unknown.
         """
-        spreads, count = curve.spreads, curve.spreads.size
+        options, spreads, count = self.options, curve.spreads, curve.spreads.size
+        beyond = options.robust_beyond
         informed = np.array([name != hypothesis.parameter for name in curve.names])
 
         def weighted(point: Array) -> Array:
@@ -393,14 +695,15 @@ class Diagnosis:
             rows = self._rows if hypothesis.rows is None else hypothesis.rows(self._rows, value)
             size = np.abs(rows.current_mA)
             missing = curve.current(point[:count] * spreads, rows) - rows.current_mA
-            missing /= _OWN * size + _LARGEST * size.max()
-            soft = _SOFT * np.sqrt(np.log1p((missing / _SOFT) ** 2)) * np.sign(missing)
-            residuals = np.where(rows.included, soft, np.sqrt(_LEFT_OUT))
+            missing /= options.error * size + options.error_of_largest * size.max()
+            soft = beyond * np.sqrt(np.log1p((missing / beyond) ** 2)) * np.sign(missing)
+            residuals = np.where(rows.included, soft, np.sqrt(options.excluded_row))
             return np.concatenate([residuals, point[:count][informed]])
 
         begin = np.append(curve.at / spreads, [0.0] * hypothesis.free)
-        widest = np.append(np.log(_WIDEST) / spreads, [np.inf] * hypothesis.free)
-        end = least_squares(weighted, begin, bounds=(-widest, widest), max_nfev=_STEPS)
+        # a parameter of which nothing is known is within a factor of thirty of what was stated
+        widest = np.append(np.log(30.0) / spreads, [np.inf] * hypothesis.free)
+        end = least_squares(weighted, begin, bounds=(-widest, widest), max_nfev=40)
         away, value = end.x[:count] * spreads, start
         if hypothesis.free:
             value += float(end.x[-1])
@@ -408,5 +711,5 @@ class Diagnosis:
             number = curve.names.index(hypothesis.parameter)
             value = float(curve.probe.values(curve.names)[number] * np.exp(away[number]))
         unknowns = hypothesis.free + bool(hypothesis.parameter)
-        squares = 2.0 * float(end.cost) + _UNKNOWN * unknowns
+        squares = 2.0 * float(end.cost) + options.unknown * unknowns
         return _Explanation(hypothesis, curve, squares, value, away)

@@ -33,12 +33,10 @@ from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.residuals import Residuals
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import (
-    BUDGETS,
     OF_THE_CONTACT,
     STATED,
     TABLE_COLUMNS,
     TABLES_BY,
-    TOTAL_POWER,
     PulseCalibration,
     even_rows,
     interpolated,
@@ -125,7 +123,7 @@ class Estimate:
         ``TABLE_COLUMNS`` on the dimension ``bias``, evenly spaced over the measured range, with
         more rows where the tip rises by more than 10 K from one to the next; and ``budget_K``, the
         standard error by ``source``. With held supplies, what is shown is of the swept one, and
-        `TOTAL_POWER` that of all. Of a tip in contact it has `OF_THE_CONTACT` too, and
+        ``total_power_mW`` that of all. Of a tip in contact it has `OF_THE_CONTACT` too, and
         ``apex_budget_K``.
     measured_rms_K : float
         Rms of the measurement's own tip temperatures about the table; NaN if it has none.
@@ -225,7 +223,7 @@ class Estimate:
             "pulse": None,
             "gum": None,
         }
-        errors = ("tip_stderr_K", *STATED, *OF_THE_CONTACT[1::2], *BUDGETS)
+        errors = ("tip_stderr_K", *STATED, *OF_THE_CONTACT[1::2], "budget_K", "apex_budget_K")
         for name, rows in (("band", self.band), ("table", self.table)):
             unknown = {
                 error: xr.full_like(rows[error], np.nan) for error in errors if error in rows
@@ -479,7 +477,7 @@ class Estimate:
     @property
     def columns(self) -> list[str]:
         """The columns of the table in a file."""
-        names = (*TABLE_COLUMNS, TOTAL_POWER, *OF_THE_CONTACT)
+        names = (*TABLE_COLUMNS, "total_power_mW", *OF_THE_CONTACT)
         return [name for name in names if name in self.table]
 
     def table_csv(self, by: str = "temperature", step: float | None = None) -> str:

@@ -21,13 +21,13 @@ from hotlever.estimate.diagnosis import Diagnosis, outlier_notes
 from hotlever.estimate.estimate import Estimate, read_fit
 from hotlever.estimate.experiment import Experiment, Prediction
 from hotlever.estimate.knee_scaling import calibrated_by_knee
-from hotlever.estimate.options import UNKNOWN_MEDIUM, CalibrationOptions, FitOptions, chosen
+from hotlever.estimate.options import CalibrationOptions, FitOptions, chosen
 from hotlever.estimate.power_law import PowerLaw
 from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.pulses import pulse_calibration
 from hotlever.estimate.search import Solution, solve
-from hotlever.estimate.tip_table import BUDGETS, budgets_of, table_with_budgets
+from hotlever.estimate.tip_table import budgets_of, table_with_budgets
 from hotlever.estimate.tip_temperature import (
     OF_THE_MEASUREMENT,
     check_in_range,
@@ -50,13 +50,6 @@ from hotlever.probe.probe_parameters import of_materials, parameters_of, usual_p
 from hotlever.probe.surroundings import Medium
 from hotlever.text import NOT_DETERMINED, value_with_error, with_unit
 from hotlever.types import Array, Progress
-
-#: A parameter is called poorly determined from this relative standard error.
-_POOR = 0.15
-#: A parameter is at its bound within this share of it.
-_AT_THE_BOUND = 1e-3
-#: Two parameters are called hard to tell apart from this correlation.
-_ENTANGLED = 0.95
 
 
 def fit(
@@ -339,7 +332,7 @@ def in_medium(
     InputError, ComputationError
         If there is no such lever in any of them.
     """
-    if requested_medium != UNKNOWN_MEDIUM:
+    if requested_medium != "unknown":
         return answered(requested_medium)
     answers: dict[str, tuple[Solution, Estimate]] = {}
     failures: dict[str, HotleverError] = {}
@@ -398,7 +391,7 @@ def _either(estimate: Estimate, other: Estimate) -> Estimate:
         choices[name] = _error_of_choice(columns[name], others[name])
         columns[error] = np.hypot(columns[error], choices[name])
     budgets = {
-        name: parts | {"medium": choices["apex_K" if name == BUDGETS[1] else "tip_K"]}
+        name: parts | {"medium": choices["apex_K" if name == "apex_budget_K" else "tip_K"]}
         for name, parts in budgets_of(estimate.table).items()
     }
     table, gum = table_with_budgets(columns, budgets), estimate.gum
@@ -445,7 +438,7 @@ def undetermined(fit: Estimate) -> list[str]:
                 if value == NOT_DETERMINED
                 else f"{name} is only bounded by these data: {with_unit(value, fitted.unit)} (95 %)"
             )
-        elif (share := fitted.stderr / abs(fitted.value)) > _POOR:
+        elif (share := fitted.stderr / abs(fitted.value)) > 0.15:
             texts.append(
                 f"{name} is poorly determined by these data: its standard error is {share:.0%} of "
                 "its value"
@@ -456,13 +449,13 @@ def undetermined(fit: Estimate) -> list[str]:
         f"{with_unit(f'{bound:g}', declared[name].unit)}: these data would have it beyond"
         for name in of_material
         for bound in declared[name].bounds
-        if abs(fit.parameters[name].value - bound) < _AT_THE_BOUND * abs(bound)
+        if abs(fit.parameters[name].value - bound) < 1e-3 * abs(bound)
     ]
     correlation = np.tril(fit.correlation, -1)
     texts += [
         f"{fit.names[second]} and {fit.names[first]} are hardly told apart by these "
         f"data (correlation {correlation[first, second]:+.2f})"
-        for first, second in np.argwhere(np.abs(correlation) > _ENTANGLED)
+        for first, second in np.argwhere(np.abs(correlation) > 0.95)
     ]
     largest = float(np.fmax.reduce(fit.band.tip_stderr_K.values))
     if texts and np.isfinite(largest):

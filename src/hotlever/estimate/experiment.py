@@ -36,11 +36,6 @@ from hotlever.types import Array, Progress
 
 #: Where predictions have the tip temperature.
 TIP = list(FITTED).index("tip")
-#: How far beyond zero bias the branch of a lever goes that does not start cold: share of the range.
-_BEYOND_ZERO = 0.05
-#: Levers that most searches solve, for a progress bar to fill; latest predictions that are at hand
-#: and tell how values bend between them.
-_USUAL_LEVERS, _MOST_AT_HAND = 8, 5
 
 
 @dataclass(frozen=True)
@@ -150,7 +145,7 @@ class Predictor:
         if probe not in self._at_hand:
             self._at_hand[probe] = self._solved(probe)
         self._at_hand[probe] = self._at_hand.pop(probe)  # the latest
-        if len(self._at_hand) > _MOST_AT_HAND:
+        if len(self._at_hand) > 5:
             del self._at_hand[next(iter(self._at_hand))]
         return self._at_hand[probe]
 
@@ -166,7 +161,8 @@ class Predictor:
             # a step too far to be followed from there
             prediction = self.experiment.predict(probe)
         if self._progress is not None:
-            self._progress(self.evaluations, max(_USUAL_LEVERS, self.evaluations))
+            # most searches solve eight
+            self._progress(self.evaluations, max(8, self.evaluations))
         if self._seen is not None:
             self._seen(prediction)
         return prediction
@@ -285,7 +281,7 @@ class ExperimentAtRest:
         """
         lowest, highest = min(float(self.bias.min()), 0.0), max(float(self.bias.max()), 0.0)
         if not probe.circuit.starts_cold:
-            lowest -= _BEYOND_ZERO * (highest - lowest)
+            lowest -= 0.05 * (highest - lowest)
         return Reach(probe.circuit, highest, lowest or None)
 
     @one_blas_thread

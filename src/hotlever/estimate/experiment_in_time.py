@@ -27,11 +27,6 @@ from hotlever.probe.priors import Prior
 from hotlever.quantities import observables_of
 from hotlever.types import Array, Index
 
-#: Times per decade since the last corner at which a lever is followed for very many rows.
-_PER_DECADE = 12
-#: Error of a step (K): some parts in a hundred thousand of the current.
-_TOLERANCE_K = 0.05
-
 
 class _Times:
     """Times (µs) at which a lever is followed, and what is seen at the rows of a measurement.
@@ -78,7 +73,7 @@ def _few(rows: Array, piece: Piece) -> tuple[Array, float | None]:
         return rows, None
     decades = np.log10((rows[-1] - piece.start) / (first[0] - piece.start))
     few = piece.start + np.geomspace(
-        first[0] - piece.start, rows[-1] - piece.start, 4 + int(_PER_DECADE * decades)
+        first[0] - piece.start, rows[-1] - piece.start, 4 + int(12 * decades)
     )
     if few.size >= rows.size or rows[0] == piece.start:
         return rows, None
@@ -119,6 +114,8 @@ class ExperimentInTime:
         When it is followed, and how rows are read off that.
     offset : ndarray, shape (observables, m), or float
         That correction.
+    tolerance_K : float
+        Of a step: some parts in a hundred thousand of the current.
     """
 
     names: tuple[str, ...]
@@ -127,6 +124,7 @@ class ExperimentInTime:
     full: SimilarLevers | None
     times: _Times
     offset: Array | float = 0.0
+    tolerance_K: float = 0.05
 
     @classmethod
     def of(
@@ -162,7 +160,7 @@ class ExperimentInTime:
                 self.waveform,
                 self.times.at,
                 self.names,
-                tolerance_K=_TOLERANCE_K,
+                tolerance_K=self.tolerance_K,
             )
             coarse, coarse_slopes = observables_of(history), history.sensitivity.values
         corrected = coarse + self.offset
@@ -192,7 +190,7 @@ class ExperimentInTime:
         if self.full is None:
             return self
         history = integrate(
-            self.full.lever(at.probe), self.waveform, at=self.times.at, tolerance_K=_TOLERANCE_K
+            self.full.lever(at.probe), self.waveform, at=self.times.at, tolerance_K=self.tolerance_K
         )
         return replace(self, offset=observables_of(history) - at.coarse)
 

@@ -34,12 +34,9 @@ from hotlever.estimate.knee import Knee
 from hotlever.estimate.options import BudgetOf, FitOptions
 from hotlever.estimate.power_law import PowerLaw
 from hotlever.estimate.tip_table import (
-    BUDGETS,
     OF_THE_CONTACT,
     PULSE_COLUMNS,
     TABLE_COLUMNS,
-    TOTAL_POWER,
-    Budgets,
     PulseCalibration,
     PulseTiming,
     budgets_of,
@@ -64,25 +61,6 @@ from hotlever.quantities import FITTED, Observable
 from hotlever.records import Number, StandardError, explained, stored_as
 from hotlever.text import value_with_error, with_unit
 from hotlever.types import Array
-
-#: No column of a measurement has larger values, in the units inside.
-_LARGEST = 1e9
-#: What a correlation of 1 may be off by.
-_ROUNDED = 1e-6
-#: Variables of a band at rest.
-_OF_BAND = {"bias_V", "power_mW", "tip_K", "tip_stderr_K"}
-#: Which command writes what a file is to be, and the keys that it has.
-_KINDS = {
-    "fit": (
-        "hotlever fit",
-        ("parameters", "correlation", "observables", "options", "common_noise_covariance", "band"),
-    ),
-    "calibration": (
-        "hotlever calibrate",
-        ("route", "medium", "power_law", "power_law_residual_K", "k", "k_stderr", "knee", "table"),
-    ),
-}
-
 
 # --- values that stand in files in another form --------------------------------------------------
 
@@ -112,8 +90,8 @@ def _matrix(values: list[list[float]]) -> Array:
 
 def _correlations(rows: list[list[float]]) -> Array:
     """Return a matrix of correlations of its rows."""
-    matrix = _matrix(rows)
-    if np.any(abs(matrix) > 1.0 + _ROUNDED) or np.any(abs(np.diag(matrix) - 1.0) > _ROUNDED):
+    matrix, rounding = _matrix(rows), 1e-6
+    if np.any(abs(matrix) > 1.0 + rounding) or np.any(abs(np.diag(matrix) - 1.0) > rounding):
         raise ValueError("expected numbers from -1 to 1, and 1 along the diagonal")
     return matrix
 
@@ -138,8 +116,9 @@ def _law(values: dict[str, float], info: ValidationInfo) -> PowerLaw:
 
 
 def _band(columns: dict[str, Array]) -> xr.Dataset:
-    if not columns.keys() >= _OF_BAND or len({values.size for values in columns.values()}) > 1:
-        raise ValueError(f"expected {', '.join(sorted(_OF_BAND))}, as many of each")
+    expected = {"bias_V", "power_mW", "tip_K", "tip_stderr_K"}
+    if not columns.keys() >= expected or len({values.size for values in columns.values()}) > 1:
+        raise ValueError(f"expected {', '.join(sorted(expected))}, as many of each")
     return band_dataset(**columns)
 
 
@@ -156,24 +135,8 @@ def _options(values: Any, check: ValidatorFunctionWrapHandler, info: ValidationI
     return options
 
 
-# Arrays of one and of two dimensions, NaN where there is nothing.
+# A row of numbers, NaN where there is nothing.
 Vector = Annotated[Array, stored_as(list[Number])]
-Matrix = Annotated[Array, stored_as(list[list[Number]], _matrix)]
-Correlations = Annotated[Array, stored_as(list[list[Number]], _correlations)]
-# Columns of a table, of which files hold the rows.
-Columns = Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)]
-_Count = Annotated[float, Field(ge=1, multiple_of=1)]
-_Counts = Annotated[
-    Array, stored_as(list[_Count], write=lambda counts: counts.astype(int).tolist())
-]
-_Times = Annotated[Array, stored_as(list[float])]
-_Probe = Annotated[Probe, stored_as(dict[str, dict[str, Any]], _probe, Probe.sections)]
-_Law = Annotated[PowerLaw, stored_as(dict[str, float], _law, PowerLaw.values)]
-_Band = Annotated[xr.Dataset, stored_as(dict[str, Vector], _band, _columns_of)]
-_Options = Annotated[FitOptions, WrapValidator(_options), PlainSerializer(FitOptions.values)]
-_Row = Annotated[
-    InputQuantity, PlainSerializer(lambda row: asdict(row) | {"contribution_K": row.contribution})
-]
 # What is not written where there is none.
 IF_ANY: Any = Field(None, exclude_if=lambda value: value is None)
 
@@ -218,8 +181,17 @@ class MeasurementSection(Section):
     pressure_mbar: float | None = None
     raman_scale: float | None = IF_ANY
     columns: dict[str, Vector]
-    rows: _Counts | None = IF_ANY
-    time_us: _Times | None = IF_ANY
+    rows: (
+        Annotated[
+            Array,
+            stored_as(
+                list[Annotated[float, Field(ge=1, multiple_of=1)]],
+                write=lambda counts: counts.astype(int).tolist(),
+            ),
+        ]
+        | None
+    ) = IF_ANY
+    time_us: Annotated[Array, stored_as(list[float])] | None = IF_ANY
     waveform: Polyline | Sine | None = IF_ANY
 
     @classmethod
@@ -238,16 +210,17 @@ class MeasurementSection(Section):
         if "V_b" not in self.columns:
             raise InputError(f"{where}: columns: V_b is missing")
         count, waveform = self.columns["V_b"].size, self.waveform
+        largest = 1e9  # in the units inside
         for name, values in {**self.columns, "rows": self.rows, "time_us": self.time_us}.items():
             if values is None:
                 continue
             _array(values, (count,), f"{where}: {name}")
-            least = 0.0 if name.startswith("d") else -_LARGEST
-            wrong = values[(values <= least) | (values > _LARGEST)]
+            least = 0.0 if name.startswith("d") else -largest
+            wrong = values[(values <= least) | (values > largest)]
             if wrong.size:
                 raise InputError(
                     f"{where}: {name}: found {wrong[0]:g}, expected more than {least:g} and at "
-                    f"most {_LARGEST:g}"
+                    f"most {largest:g}"
                 )
         if (waveform is None) != (self.time_us is None) or (
             isinstance(waveform, Polyline) and len(waveform.times) != len(waveform.volts)
@@ -269,7 +242,7 @@ class CorrelationSection(Section):
     """The correlation of the parameters that were varied."""
 
     names: list[str]
-    matrix: Correlations
+    matrix: Annotated[Array, stored_as(list[list[Number]], _correlations)]
 
 
 @dataclass(frozen=True)
@@ -301,10 +274,12 @@ class ParameterFields(Section):
     evaluations: int = 0
     steps: int = 0
     seconds: Annotated[float, PlainSerializer(lambda seconds: round(seconds, 3))] = 0.0
-    options: _Options | None = None
-    common_noise_covariance: Matrix | None = None
+    options: (
+        Annotated[FitOptions, WrapValidator(_options), PlainSerializer(FitOptions.values)] | None
+    ) = None
+    common_noise_covariance: Annotated[Array, stored_as(list[list[Number]], _matrix)] | None = None
     sum_of_squares: Number = np.nan
-    band: _Band | None = None
+    band: Annotated[xr.Dataset, stored_as(dict[str, Vector], _band, _columns_of)] | None = None
 
 
 class PulseSection(Section):
@@ -312,7 +287,7 @@ class PulseSection(Section):
 
     length_us: float
     period_us: float | None = None
-    table: Columns
+    table: Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)]
     budget_K: dict[str, Vector]
 
     @classmethod
@@ -324,7 +299,7 @@ class PulseSection(Section):
     @model_validator(mode="after")
     def _belongs_together(self, info: ValidationInfo) -> Self:
         where = f"{info.context}: pulse"
-        _check_rows(self.table, {BUDGETS[0]: self.budget_K}, "height", "peak_K", where)
+        _check_rows(self.table, {"budget_K": self.budget_K}, "height", "peak_K", where)
         try:
             PulseTiming(self.length_us, self.period_us)
         except InputError as error:
@@ -333,7 +308,7 @@ class PulseSection(Section):
 
     def pulse(self) -> PulseCalibration:
         """Return what was written."""
-        table = _table(self.table, {BUDGETS[0]: self.budget_K}, PULSE_COLUMNS, "height")
+        table = _table(self.table, {"budget_K": self.budget_K}, PULSE_COLUMNS, "height")
         return PulseCalibration(PulseTiming(self.length_us, self.period_us), table)
 
 
@@ -355,7 +330,7 @@ class TipFields(Section):
 
     route: Literal["power law", "probe", "fit in vacuum", "fit in air"] | None = None
     medium: str = ""
-    power_law: _Law | None = None
+    power_law: Annotated[PowerLaw, stored_as(dict[str, float], _law, PowerLaw.values)] | None = None
     power_law_residual_K: Number = np.nan
     k: Number = np.nan
     k_stderr: StandardError = np.nan
@@ -364,13 +339,23 @@ class TipFields(Section):
     tip_temperature_uncertainty_K: StandardError = np.nan
     uncertainty_budget_K: dict[str, Number] = Field(default_factory=dict)
     base_temperature_K: Number = np.nan
-    table: Columns | None = None
+    table: (
+        Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)] | None
+    ) = None
     budget_K: dict[str, Vector] = Field(default_factory=dict)
     apex_budget_K: dict[str, Vector] | None = IF_ANY
     measured_rms_K: Number = np.nan
     pulse: PulseSection | None = IF_ANY
-    gum: list[_Row] | None = IF_ANY
-    gum_correlation: Correlations | None = IF_ANY
+    gum: (
+        list[
+            Annotated[
+                InputQuantity,
+                PlainSerializer(lambda row: asdict(row) | {"contribution_K": row.contribution}),
+            ]
+        ]
+        | None
+    ) = IF_ANY
+    gum_correlation: Annotated[Array, stored_as(list[list[Number]], _correlations)] | None = IF_ANY
     gum_bias_V: float | None = IF_ANY
     gum_of: BudgetOf | None = IF_ANY
     effective_dof: Number | None = IF_ANY
@@ -382,8 +367,8 @@ class TipFields(Section):
     @property
     def budgets(self) -> dict[str, dict[str, Array]]:
         """The errors of the table by source."""
-        own = zip(BUDGETS, (self.budget_K, self.apex_budget_K), strict=True)
-        return {name: budget for name, budget in own if budget is not None}
+        own = {"budget_K": self.budget_K, "apex_budget_K": self.apex_budget_K}
+        return {name: budget for name, budget in own.items() if budget is not None}
 
     @field_serializer("power_law")
     def _with_threshold(self, law: PowerLaw | None) -> dict[str, float] | None:
@@ -398,7 +383,7 @@ class TipFields(Section):
             "knee": vars(estimate.knee)
             | {"tip_K": estimate.knee_tip_K, "measured": estimate.knee_measured},
             "uncertainty_budget_K": {
-                name: part.max() for name, part in budgets[BUDGETS[0]].items()
+                name: part.max() for name, part in budgets["budget_K"].items()
             },
             "table": {name: estimate.table[name].values for name in estimate.columns},
             "pulse": None if estimate.pulse is None else PulseSection.of(estimate.pulse),
@@ -436,7 +421,7 @@ class TipFields(Section):
     def of_table(self) -> dict[str, Any]:
         """Return what an estimate has of the tip, by attribute."""
         assert self.table is not None
-        more = [name for name in (TOTAL_POWER, *OF_THE_CONTACT) if name in self.table]
+        more = [name for name in ("total_power_mW", *OF_THE_CONTACT) if name in self.table]
         table = _table(self.table, self.budgets, [*TABLE_COLUMNS, *more])
         knee = {name: self.knee[name] for name in Knee.__dataclass_fields__ if name in self.knee}
         return {
@@ -469,7 +454,7 @@ class EstimateFile(ParameterFields, TipFields):
     describes_data: bool | None = True
     reason: str = ""
     priors: dict[str, PriorUse] = Field(default_factory=dict)
-    probe: _Probe
+    probe: Annotated[Probe, stored_as(dict[str, dict[str, Any]], _probe, Probe.sections)]
     data: MeasurementSection
     weights: dict[str, Vector] | None = IF_ANY
     notes: list[str]
@@ -504,9 +489,18 @@ class EstimateFile(ParameterFields, TipFields):
         InputError
             If it cannot be read or holds something else; the text names the key.
         """
-        command, keys = _KINDS[kind]
+        command, keys = {
+            "fit": (
+                "hotlever fit",
+                "parameters correlation observables options common_noise_covariance band",
+            ),
+            "calibration": (
+                "hotlever calibrate",
+                "route medium power_law power_law_residual_K k k_stderr knee table",
+            ),
+        }[kind]
         content, where = read_json(path), f"{path}: not a {kind} file ({command} -o)"
-        for key in keys:
+        for key in keys.split():
             if key not in content or (content[key] is None and kind == "fit"):
                 raise InputError(f"{where}: {key} is missing")
         try:
@@ -616,7 +610,11 @@ def band_dataset(**columns: Array) -> xr.Dataset:
 
 
 def _check_rows(
-    columns: Mapping[str, Array], budgets: Budgets, along: str, tip: str, where: str
+    columns: Mapping[str, Array],
+    budgets: Mapping[str, Mapping[str, Array]],
+    along: str,
+    tip: str,
+    where: str,
 ) -> None:
     """Refuse what a file holds in place of a table with its budgets; `where` names the file.
 
@@ -625,7 +623,7 @@ def _check_rows(
     InputError
         If its rows do not rise or have no tip temperature, or a budget is not one of them.
     """
-    rising, sources = columns.get(f"{along}_V", np.array([])), budgets[BUDGETS[0]].keys()
+    rising, sources = columns.get(f"{along}_V", np.array([])), budgets["budget_K"].keys()
     if not rising.size or not sources or not np.all(np.diff(rising) > 0):
         raise InputError(
             f"{where}: table: expected rows of rising {along}, and a budget of their errors"
@@ -640,7 +638,10 @@ def _check_rows(
 
 
 def _table(
-    columns: Mapping[str, Array], budgets: Budgets, names: Sequence[str], along: str = "bias"
+    columns: Mapping[str, Array],
+    budgets: Mapping[str, Mapping[str, Array]],
+    names: Sequence[str],
+    along: str = "bias",
 ) -> xr.Dataset:
     """Return the table that a file holds; columns are NaN that an older file has not."""
     unknown = np.full_like(columns[f"{along}_V"], np.nan)

@@ -21,28 +21,29 @@ from hotlever.probe import Circuit
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
-#: Points whose power is within this factor of the highest lever voltage's are used.
-_NEARBY = 1.8
-#: Fewest points near the knee, and fewest on either side of it.
-_FEWEST, _FEWEST_BESIDE = 6, 2
-#: Points below this share of the highest bias may be lost in noise.
-_LOST = 0.01
-#: The knee has been passed once V_l has fallen by this share.
-_FALLEN = 0.05
-#: The knee is sought within this factor of the highest measured lever voltage's power, at so many
-#: powers, and as many smooth curves tell its error.
-_SEARCH, _GRID, _SAMPLES = 1.35, 151, 300
-#: The knee of another lever is looked for up to this factor of the highest measured power.
-_FARTHEST = 20.0
-#: Ranges of length, amplitude and noise of a smooth curve whose coordinates and values are of the
-#: order of one.
-_BOUNDS = ((0.03, 5.0), (1e-3, 20.0), (1e-6, 0.3))
-#: The likelihood may have two optima: a bent curve with little noise, a smooth one with more.
-_STARTS = ((0.25, 0.5, 2e-3), (0.5, 0.5, 2e-2))
-#: Prior variance of the mean.
-_MEAN_VARIANCE = 1.0
-#: Added to the variances of the points, so that rounding leaves their covariance positive.
-_ROUNDING = 1e-11
+
+@dataclass(frozen=True)
+class KneeOptions:
+    """How the knee is found among measured points.
+
+    Attributes
+    ----------
+    neighbourhood : float
+        Points whose power is within this factor of the highest lever voltage's are used.
+    fewest, fewest_beside : int
+        Points near the knee, and on either side of it.
+    range : float
+        The knee is sought within this factor of the highest measured lever voltage's power.
+    powers, samples : int
+        At how many powers it is sought, and how many smooth curves tell its error.
+    """
+
+    neighbourhood: float = 1.8
+    fewest: int = 6
+    fewest_beside: int = 2
+    range: float = 1.35
+    powers: int = 151
+    samples: int = 300
 
 
 class KneePoint(NamedTuple):
@@ -75,7 +76,7 @@ class IVCurve:
         present = np.isfinite(bias) & np.isfinite(current) & (bias > 0)
         curve = cls(bias[present], current[present], circuit)
         wrong = (curve.current_mA <= 0) | (curve.lever_V <= 0)
-        lost = wrong & (curve.bias_V < _LOST * curve.bias_V.max(initial=0.0))
+        lost = wrong & (curve.bias_V < 0.01 * curve.bias_V.max(initial=0.0))
         for row in np.flatnonzero(wrong & ~lost):
             raise InputError(
                 f"at a bias of {curve.bias_V[row]:g} V the current is {curve.current_mA[row]:g} mA "
@@ -83,10 +84,11 @@ class IVCurve:
                 f"{circuit.series_resistance_ohm:g} ohm, expected positive ones"
             )
         curve = curve.rows(~lost)
-        if curve.bias_V.size < _FEWEST:
+        fewest = KneeOptions.fewest
+        if curve.bias_V.size < fewest:
             raise InputError(
                 f"{counted(curve.bias_V.size, 'point')} with bias and current, expected at least "
-                f"{_FEWEST}"
+                f"{fewest}"
             )
         return curve.rows(np.argsort(curve.power_mW, kind="stable"))
 
@@ -108,7 +110,8 @@ class IVCurve:
     def peak(self) -> int:
         """Row of the first maximum of V_l: hot legs can make it rise again."""
         lever_V = self.lever_V
-        fallen = np.flatnonzero(lever_V < (1.0 - _FALLEN) * np.maximum.accumulate(lever_V))
+        # the knee has been passed once V_l has fallen by a twentieth
+        fallen = np.flatnonzero(lever_V < 0.95 * np.maximum.accumulate(lever_V))
         return int(np.argmax(lever_V[: fallen[0]] if fallen.size else lever_V))
 
     @property
@@ -161,7 +164,9 @@ class KneeOutsideError(InputError):
     """The measured range does not include the knee; the text says which way to go."""
 
 
-def find_knee(curve: IVCurve, like: Branch | None = None) -> Knee:
+def find_knee(
+    curve: IVCurve, like: Branch | None = None, options: KneeOptions | None = None
+) -> Knee:
     """Find the knee in a measured I-V curve.
 
     Parameters
@@ -173,6 +178,7 @@ def find_knee(curve: IVCurve, like: Branch | None = None) -> Knee:
         scaled to the measured knee, is used: the resistance is a smoother function of the
         temperature than of the power. Halves the bias; also says where the knee is to be
         expected when it is outside the range.
+    options : KneeOptions, optional
 
     Raises
     ------
@@ -186,40 +192,43 @@ def find_knee(curve: IVCurve, like: Branch | None = None) -> Knee:
             "without a series resistance the lever jumps at its knee, so a measured curve ends "
             "there and does not show it; measure with one of some kΩ"
         )
-    _check_sides(curve, like)
+    options = options or KneeOptions()
+    factor, beside_knee = options.neighbourhood, options.fewest_beside
+    _check_sides(curve, like, beside_knee)
     peak_mW = float(curve.power_mW[curve.peak])
-    near = curve.rows(np.abs(np.log(curve.power_mW / peak_mW)) < np.log(_NEARBY))
+    near = curve.rows(np.abs(np.log(curve.power_mW / peak_mW)) < np.log(factor))
     smooth = SmoothCurves(near, peak_mW, like)
     measured = smooth.points.power_mW
     beside = min((measured < peak_mW).sum(), (measured > peak_mW).sum())
-    if measured.size < _FEWEST or beside < _FEWEST_BESIDE:
+    if measured.size < options.fewest or beside < beside_knee:
         raise InputError(
-            f"{counted(measured.size, 'point')} with {peak_mW / _NEARBY:.2f} to "
-            f"{peak_mW * _NEARBY:.2f} mW, near the knee, expected at least {_FEWEST} with "
-            f"{_FEWEST_BESIDE} on either side; measure more finely there"
+            f"{counted(measured.size, 'point')} with {peak_mW / factor:.2f} to "
+            f"{peak_mW * factor:.2f} mW, near the knee, expected at least {options.fewest} with "
+            f"{beside_knee} on either side; measure more finely there"
         )
-    low, high = max(peak_mW / _SEARCH, measured[0]), min(peak_mW * _SEARCH, measured[-1])
-    power = np.linspace(low, high, _GRID)
+    low = max(peak_mW / options.range, measured[0])
+    high = min(peak_mW * options.range, measured[-1])
+    power = np.linspace(low, high, options.powers)
     likeliest = smooth.likeliest(power)
-    if likeliest.peak in (0, _GRID - 1):
+    if likeliest.peak in (0, options.powers - 1):
         raise KneeOutsideError(
             "the lever voltage is highest at the end of the points near the knee "
             f"({power[likeliest.peak]:.3f} mW): measure beyond it, and more finely"
         )
-    errors = np.std([sample.vertex for sample in smooth.samples(power)], axis=0)
+    errors = np.std([sample.vertex for sample in smooth.samples(power, options.samples)], axis=0)
     values = [*likeliest.vertex, *errors.tolist(), smooth.current_noise, measured.size]
     return Knee(*values)
 
 
-def _check_sides(curve: IVCurve, like: Branch | None) -> None:
+def _check_sides(curve: IVCurve, like: Branch | None, fewest: int) -> None:
     """Refuse a curve whose highest lever voltage is at one of its ends."""
     lever_V, bias_V = curve.lever_V, curve.bias_V
-    if curve.peak < _FEWEST_BESIDE:
+    if curve.peak < fewest:
         raise KneeOutsideError(
             f"the lever voltage falls from the first points on ({lever_V[0]:.3f} V at a bias of "
             f"{bias_V[0]:.3f} V): the knee is below the measured range; measure from a lower bias"
         )
-    if curve.peak < bias_V.size - _FEWEST_BESIDE:
+    if curve.peak < bias_V.size - fewest:
         return
     advice = "; measure to a higher bias"
     if like is not None and like.knee is not None:
@@ -266,9 +275,9 @@ class SmoothCurves:
         """Return the likeliest curve at some powers (mW), (n,)."""
         return self._curve(power, self._smooth.value(self._along(power)))
 
-    def samples(self, power: Array) -> list[IVCurve]:
-        """Return curves that are as likely by the points, at some powers (mW), (n,)."""
-        ln_root_R = self._smooth.samples(self._along(power), _SAMPLES)
+    def samples(self, power: Array, count: int) -> list[IVCurve]:
+        """Return so many curves that are as likely by the points, at some powers (mW), (n,)."""
+        ln_root_R = self._smooth.samples(self._along(power), count)
         return [self._curve(power, sample) for sample in ln_root_R]
 
     def _curve(self, power: Array, ln_root_R: Array) -> IVCurve:
@@ -303,10 +312,11 @@ class GaussianProcess:
                 0.5 * values @ cho_solve(factor, values) + np.log(np.diag(factor[0])).sum()
             )
 
-        optima = [
-            minimize(cost, start, method="L-BFGS-B", bounds=np.log(_BOUNDS))
-            for start in np.log(_STARTS)
-        ]
+        # of length, amplitude and noise, where coordinates and values are of the order of one
+        bounds = np.log([(0.03, 5.0), (1e-3, 20.0), (1e-6, 0.3)])
+        # there may be two optima: a bent curve with little noise, a smooth one with more
+        starts = np.log([(0.25, 0.5, 2e-3), (0.5, 0.5, 2e-2)])
+        optima = [minimize(cost, start, method="L-BFGS-B", bounds=bounds) for start in starts]
         best = min(optima, key=lambda optimum: optimum.fun)
         self._length, self._amplitude, self.noise_factor = np.exp(best.x).tolist()
         self._factor = self._factorised(*np.exp(best.x))
@@ -314,7 +324,8 @@ class GaussianProcess:
 
     def _factorised(self, length: float, amplitude: float, noise_factor: float) -> tuple:
         covariance = _covariance(self._x, self._x, length, amplitude)
-        variance = (noise_factor * self._noise) ** 2 + _ROUNDING
+        # rounding leaves the covariance of the points positive
+        variance = (noise_factor * self._noise) ** 2 + 1e-11
         return cho_factor(covariance + np.diag(variance), lower=True)
 
     def value(self, x: Array) -> Array:
@@ -339,7 +350,8 @@ def _covariance(x: Array, y: Array, length: float, amplitude: float) -> Array:
     """Return the covariance of the curve at some places, (n,), with that at others, (m,)."""
     distance = np.abs(x[:, None] - y) * np.sqrt(5.0) / length
     matern = (1.0 + distance + distance**2 / 3.0) * np.exp(-distance)
-    return np.asarray(amplitude**2 * matern + _MEAN_VARIANCE)
+    # with a mean of unit variance
+    return np.asarray(amplitude**2 * matern + 1.0)
 
 
 # --- the scale between a measured curve and a lever that resembles it -----------------------------
@@ -370,7 +382,7 @@ def scale_to(curve: IVCurve, like: Branch) -> Scale:
         If the points are so few, or so cold, that the resistance does not tell.
     """
     below = curve.rows(np.arange(curve.peak + 1))
-    if curve.peak < _FEWEST_BESIDE:
+    if curve.peak < KneeOptions.fewest_beside:
         raise InputError(
             f"the lever voltage is highest at point {curve.peak + 1}: too few are below "
             "the knee to tell how much power the lever needs; measure from a lower bias"
@@ -382,9 +394,9 @@ def scale_to(curve: IVCurve, like: Branch) -> Scale:
         lever_V = like.lever_voltage(like.tip_temperature(np.minimum(own, top)))
         return np.log(lever_V**2 / own) + ln_resistance_scale
 
-    # from where the last point is at the other lever's knee
+    # from where the last point is at the other lever's knee, up to twenty times as far
     lowest = float(np.log(below.power_mW[-1] / top))
-    highest = lowest + np.log(_FARTHEST)
+    highest = lowest + np.log(20.0)
     start, bounds = (lowest + 0.1, 0.0), ((lowest, -np.inf), (highest, np.inf))
     measured = np.log(below.lever_V / below.current_mA)
     values, covariance = curve_fit(ln_resistance, below.power_mW, measured, start, bounds=bounds)

@@ -25,7 +25,7 @@ from hotlever.estimate.knee import (
     scale_to,
 )
 from hotlever.estimate.power_law import PowerLaw, law_of_model, power_turns
-from hotlever.estimate.tip_table import BUDGETS, rms, table_by_bias
+from hotlever.estimate.tip_table import rms, table_by_bias
 from hotlever.lever import Branch, OperatingPoint
 from hotlever.lever.branch import Reach, shifted
 from hotlever.lever.lever import COARSE, Lever
@@ -38,19 +38,8 @@ from hotlever.probe.probe_parameters import RESISTANCE
 from hotlever.text import value_with_error
 from hotlever.types import Array
 
-#: A vacuum model that needs this factor is told that its lever is probably in air.
-_LOOKS_LIKE_AIR = 1.08
-#: Knees are within this factor of the power of each other: large levers have 20 mW where small ones
-#: have 2, and a wrong unit is a thousand.
-_ALIKE = 100.0
-#: Largest relative error of a knee estimated from the points below it, to go on with.
-_WORST_ESTIMATE = 0.3
-#: How far (standard deviations) a parameter is moved for a derivative.
-_ASIDE = 0.1
-#: Rows of a smooth table, and powers that they are read from.
-_ROWS, _POWERS = 101, 2000
-#: Highest bias (V) to which a lever is followed.
-_HIGHEST_V = 1e3
+#: How far a parameter is moved for a derivative, in standard deviations of its prior.
+_STEP = 0.1
 
 
 @dataclass(frozen=True)
@@ -147,10 +136,11 @@ def calibrated_by_knee(
             f"as {value_with_error(knee.power_mW, knee.power_mW_stderr)} mW"
         )
     knee_mW, like_mW = knee.power_mW, reference.knee_mW
-    if not 1.0 / _ALIKE < knee_mW / like_mW < _ALIKE:
+    # large levers have 20 mW where small ones have 2, and a wrong unit is a thousand
+    if not 1.0 / 100.0 < knee_mW / like_mW < 100.0:
         raise InputError(
             f"the knee is at {knee_mW:.3g} mW, that of the lever it is compared with at "
-            f"{like_mW:.3g} mW, expected within a factor of {_ALIKE:g}; are bias and current in "
+            f"{like_mW:.3g} mW, expected within a factor of 100; are bias and current in "
             "their units?"
         )
     rows = smooth_rows(curve, knee_mW, vacuum)
@@ -163,12 +153,13 @@ def calibrated_by_knee(
     }
     if law is not None:
         parts["power law"] = np.abs(of_model - tip)
-    if law is None or knee_mW > _LOOKS_LIKE_AIR * like_mW:
+    like_air = 1.08  # a lever that needs so many times the power is probably in air
+    if law is None or knee_mW > like_air * like_mW:
         in_air = curve_of_model(lever.in_medium("air").branch())
         parts["constant k"] = np.abs(in_air.at(power, knee_mW) - of_model)
     used, residual = (law, 0.0) if law is not None else law_of_model(vacuum, model.knee_mW)
     k = knee_mW / used.threshold_mW
-    if k > _LOOKS_LIKE_AIR and measured.medium != "vacuum":
+    if k > like_air and measured.medium != "vacuum":
         better = "--medium air is" if law is None else "a probe with --medium air would be"
         notes.append(
             f"the lever needs {k:.2f} times the power of the model in vacuum: it seems to be "
@@ -180,7 +171,7 @@ def calibrated_by_knee(
         )
     own = reference.at(circuit.power(measured.bias_V, current), knee_mW)
     return Estimate(
-        table=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, {BUDGETS[0]: parts}),
+        table=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, {"budget_K": parts}),
         route=route,
         power_law=used,
         law_residual_K=residual,
@@ -195,8 +186,10 @@ def calibrated_by_knee(
     )
 
 
-def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> IVCurve:
-    """Return points over the measured range, evenly spaced in bias and also in power, smoothed.
+def smooth_rows(
+    curve: IVCurve, knee_mW: float, like: Branch | None = None, count: int = 101
+) -> IVCurve:
+    """Return points over the measured range, `count` even ones in bias and in power, smoothed.
 
     At the knee, where the bias hardly tells temperatures apart, the power does.
 
@@ -204,12 +197,12 @@ def smooth_rows(curve: IVCurve, knee_mW: float, like: Branch | None = None) -> I
     """
     smooth = SmoothCurves(curve, knee_mW, like)
     measured = smooth.points
-    power = np.linspace(measured.power_mW[0], measured.power_mW[-1], _POWERS)
+    power = np.linspace(measured.power_mW[0], measured.power_mW[-1], 2000)
     fine = smooth.likeliest(power)
     bias = np.maximum.accumulate(fine.bias_V)
     low, high = max(measured.bias_V[0], bias[0]), min(measured.bias_V.max(), bias[-1])
-    by_power = np.interp(np.linspace(power[0], power[-1], _ROWS), power, bias)
-    rows = np.unique(np.concatenate([np.linspace(low, high, _ROWS), np.clip(by_power, low, high)]))
+    by_power = np.interp(np.linspace(power[0], power[-1], count), power, bias)
+    rows = np.unique(np.concatenate([np.linspace(low, high, count), np.clip(by_power, low, high)]))
     return IVCurve(rows, np.interp(rows, bias, fine.current_mA), curve.circuit)
 
 
@@ -222,9 +215,9 @@ def _estimated_knee(
     """
     scale = scale_to(curve, like)
     model, *others = (knee_of(branch).power_mW for branch in similar)
-    spread = np.linalg.norm(np.array(others) / model - 1.0) / _ASIDE
+    spread = np.linalg.norm(np.array(others) / model - 1.0) / _STEP
     error = float(np.hypot(scale.power_stderr, spread))
-    if error > _WORST_ESTIMATE:
+    if error > 0.3:
         raise InputError(
             f"{text}. The points below it give its power to ± {error:.0%} only, which is too "
             "little to calibrate with"
@@ -261,10 +254,10 @@ def _similar_branches(probe: Probe, like: Branch) -> list[Branch]:
     # the circuit is the measured one, whatever the lever
     names = tuple(name for name in priors if name != "series_resistance_ohm")
     past = float(like.bias(like.hottest_K, probe.circuit))
-    reach = Reach(probe.circuit, min(past, _HIGHEST_V))
+    reach = Reach(probe.circuit, min(past, 1e3))
     solved = SimilarLevers(Lever(probe, COARSE)).linearised(probe, reach, None, names)
     model = solved.branch
-    changes = solved.output_slopes * np.array([_ASIDE * priors[name].absolute for name in names])
+    changes = solved.output_slopes * np.array([_STEP * priors[name].absolute for name in names])
     slopes = spline_through(model.u, changes)(model.u, 1)
     perturbations = zip(np.moveaxis(changes, 2, 0), np.moveaxis(slopes, 2, 0), strict=True)
     return [model, *(shifted(model, *change) for change in perturbations)]
@@ -279,4 +272,4 @@ def _error_of_other_levers(similar: list[Branch], ratio: Array) -> Array:
     tip, *perturbed_tips = (
         branch.tip_temperature(row) for branch, row in zip(similar, power, strict=True)
     )
-    return np.linalg.norm(np.array(perturbed_tips) - tip, axis=0) / _ASIDE
+    return np.linalg.norm(np.array(perturbed_tips) - tip, axis=0) / _STEP

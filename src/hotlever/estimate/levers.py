@@ -12,18 +12,11 @@ from scipy.special import chdtri
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimate.estimate import Estimate
+from hotlever.estimate.power_law import PowerLaw
 from hotlever.estimate.tip_table import STATED, interpolated
 from hotlever.materials.parameters import INVERSION, heading, is_of_material, parameter_named
 from hotlever.quantities import QUANTITIES
 from hotlever.text import aligned, listed, value_with_error
-
-#: Rows of a table for people that are of all levers: mean, scatter twice, Birge ratio.
-_OF_ALL = 4
-#: Levers are said to differ if equal ones would scatter as much less often than this.
-_RARE = 0.01
-#: A lever stands apart beyond this many standard deviations (median-based) of the others, which
-#: takes this many levers to tell.
-_APART, _FEWEST = 5.0, 6
 
 
 class Compared(NamedTuple):
@@ -38,24 +31,19 @@ class Compared(NamedTuple):
     upper: float = np.inf
 
 
-#: What levers are compared by beside the tip temperature somewhere: of a knee,
-_KNEE = {
+#: What calibrated levers are compared by beside the tip temperature somewhere.
+OF_A_CALIBRATION = {
     "knee_lever_V": Compared("knee V_l (V)", "V", "knee_lever_V{}", "lever voltage of the knee"),
     "knee_current_mA": Compared("knee I_h (mA)", "mA", "knee_current_mA{}", "current of the knee"),
     "knee_power_mW": Compared("knee P_l (mW)", "mW", "knee_power_mW{}", "power of the knee"),
     "knee_tip_K": Compared("knee T_tip (K)", "K", "knee_tip_K", "tip temperature of the knee"),
-}
-_K = Compared("k", "1", "k{}", "k")
-#: Of a power law.
-LAW = {
+    "k": Compared("k", "1", "k{}", "k"),
     "linear_K_per_mW": Compared("a (K/mW)", "K/mW", "linear_K_per_mW", "a"),
     "nonlinear_K": Compared("b (K)", "K", "nonlinear_K", "b"),
     "exponent": Compared("m", "1", "exponent", "m"),
     "hot_K_per_mW": Compared("c (K/mW)", "K/mW", "hot_K_per_mW", "c"),
     "threshold_mW": Compared("threshold (mW)", "mW", "threshold_mW", "threshold"),
 }
-#: Points of a curve without visible corners.
-_POINTS = 200
 
 
 class Setting(NamedTuple):
@@ -93,7 +81,7 @@ def compare_levers(estimates: Mapping[str, Estimate], at: Setting | None = None)
     xarray.Dataset
         See `compared`. Fits are compared by the parameters of the materials, and
         ``inversion_temperature`` if there is one; calibrations by ``tip_K``; ``knee_lever_V``,
-        ``knee_current_mA``, ``knee_power_mW``, ``knee_tip_K``; ``k``; and those of `LAW`. On
+        ``knee_current_mA``, ``knee_power_mW``, ``knee_tip_K``; ``k``; and those of `PowerLaw`. On
         ``lever`` too: ``file``, ``describes_data``, and ``reason``: why there are no numbers; of
         calibrations ``tip_low_K`` and ``tip_high_K``, between which 95 % lie.
 
@@ -127,8 +115,9 @@ def _by_the_tip(
 ) -> xr.Dataset:
     """Compare calibrations at a setting; see `compare_levers`."""
     tip = Compared(f"T_tip at {at.text} (K)", "K", "tip{}_K", f"tip temperature at {at.text}")
+    named = {"tip_K": tip, **OF_A_CALIBRATION}
     tips = {lever: _tip_at(each, at) for lever, each in calibrations.items()}
-    quantities = {}
+    quantities, coefficients = {}, list(PowerLaw.model_fields)
     for lever, each in calibrations.items():
         knee = each.knee
         quantities[lever] = {
@@ -138,7 +127,7 @@ def _by_the_tip(
             "knee_power_mW": (knee.power_mW, knee.power_mW_stderr),
             "knee_tip_K": (each.knee_tip_K, None),
             "k": (each.k, each.k_stderr),
-            **{name: (getattr(each.power_law, name, np.nan), None) for name in LAW},
+            **{name: (getattr(each.power_law, name, np.nan), None) for name in coefficients},
         }
     reasons = [
         each.doubt or _why_none(each, at, tips[lever]) for lever, each in calibrations.items()
@@ -147,7 +136,7 @@ def _by_the_tip(
         name: [values[name] for values in tips.values()] for name in ("tip_low_K", "tip_high_K")
     }
     more = {at.along: [at.value] * len(tips), **limits, **more, "reason": reasons}
-    table = compared(calibrations, quantities, {"tip_K": tip, **_KNEE, "k": _K, **LAW}, more)
+    table = compared(calibrations, quantities, named, more)
     return table.assign_attrs(along=at.along)
 
 
@@ -261,11 +250,13 @@ def _parameters(fit: Estimate) -> dict[str, tuple[float, float | None]]:
 def statements(levers: xr.Dataset) -> list[str]:
     """Say in words which levers are left out, whether the others differ, and which stand apart.
 
-    And why there is no tip temperature of some whose data are described.
+    And why there is no tip temperature of some whose data are described. Levers differ if equal
+    ones would scatter as much less often than once in a hundred times; one stands apart beyond five
+    standard deviations (median-based) of the others, which takes six levers to tell.
     """
     count = levers.counts.sum("lever").values
     chi_square = np.where(count > 1, levers.chi_square.values, np.nan)
-    limit = chdtri(np.maximum(count - 1, 1), _RARE)
+    limit = chdtri(np.maximum(count - 1, 1), 0.01)
     texts = [
         f"lever {lever} is left out: its data are not described"
         for lever in levers.lever.values[~levers.described.values]
@@ -288,14 +279,14 @@ def statements(levers: xr.Dataset) -> list[str]:
             f"the scatter of {listed(alike)} between the levers is no larger than the standard "
             "errors explain"
         )
-    many = levers.isel(quantity=np.isfinite(chi_square) & (count >= _FEWEST))
+    many = levers.isel(quantity=np.isfinite(chi_square) & (count >= 6))
     value = many.value.where(many.counts)
     away = np.abs(value - value.median("lever"))
     # the standard deviation of a normal distribution that has this median
     spread = 1.4826 * away.median("lever")
     texts += [
         f"lever {lever} stands apart from the other levers in {quantities}"
-        for lever, quantities in _by_lever(away > _APART * np.hypot(spread, many.stderr))
+        for lever, quantities in _by_lever(away > 5.0 * np.hypot(spread, many.stderr))
     ]
     answers = zip(levers.lever.values, levers.described.values, levers.reason.values, strict=True)
     return texts + [
@@ -322,7 +313,7 @@ def lever_rows(levers: xr.Dataset) -> list[list[str]]:
         quantities = [
             name
             for name in levers.quantity.values[finite.values]
-            if name not in LAW and (name != "k" or in_air)
+            if name not in PowerLaw.model_fields and (name != "k" or in_air)
         ]
         levers = levers.sel(quantity=quantities)
     rows = [["lever", *levers.heading.values]]
@@ -399,7 +390,7 @@ def tips_along(calibrations: Mapping[str, Estimate], along: str) -> xr.Dataset:
         if (rows := _rows_along(each, along)) is not None
     }
     edges = [float(table[along].values[end]) for table in tables.values() for end in (0, -1)]
-    at = np.linspace(min(edges, default=0.0), max(edges, default=1.0), _POINTS)
+    at = np.linspace(min(edges, default=0.0), max(edges, default=1.0), 200)
     columns = {
         name: np.array([interpolated(table, at, along, name) for table in tables.values()])
         for name in ("tip_K", "tip_stderr_K")
@@ -414,7 +405,7 @@ def tips_along(calibrations: Mapping[str, Estimate], along: str) -> xr.Dataset:
 
 def law_rows(levers: xr.Dataset) -> list[list[str]]:
     """Return the coefficients of the power laws in vacuum, a column each, below a head."""
-    laws = levers.sel(quantity=list(LAW))
+    laws = levers.sel(quantity=list(PowerLaw.model_fields))
     rows = [["lever", *laws.heading.values.tolist()]]
     for lever in laws.lever:
         values = laws.value.sel(lever=lever).values.tolist()
@@ -426,7 +417,8 @@ def law_rows(levers: xr.Dataset) -> list[list[str]]:
 def levers_text(levers: xr.Dataset) -> str:
     """Return `lever_rows` as text, mean and scatter below a line; then `statements`."""
     lines = aligned(lever_rows(levers))
-    lines.insert(-_OF_ALL, "-" * max(map(len, lines)))
+    # above the rows that are of all levers: mean, scatter twice, Birge ratio
+    lines.insert(-4, "-" * max(map(len, lines)))
     return "\n".join(lines + statements(levers))
 
 

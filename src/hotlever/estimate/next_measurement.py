@@ -24,12 +24,12 @@ from hotlever.datasets import frame_text, labelled
 from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP
-from hotlever.estimate.optimiser import DISCREPANCY
+from hotlever.estimate.optimiser import SearchOptions
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.posterior import standard_errors
 from hotlever.estimate.prior_density import Coordinates, PriorDensity
 from hotlever.estimate.surrogate import CurveSurrogate, Rows
-from hotlever.estimate.tip_table import BUDGETS, budgets_of
+from hotlever.estimate.tip_table import budgets_of
 from hotlever.estimate.tip_temperature import error_of_model
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
@@ -182,18 +182,12 @@ class NoiseLaw:
 
 # --- a lever as far as it is known ----------------------------------------------------------------
 
-#: Observables whose scale is an unknown, in order.
-_SCALED = {observable: scale for scale, observable in SCALES.items()}
-#: Noise of a thermometer and of meters that nobody has stated.
-_USUAL_NOISE = {"tip": NoiseLaw(RAMAN_ERROR_K, 0.0)}
-_USUAL_OF_METERS = NoiseLaw(0.0, 1e-3)
-
 
 def _usual_scales(measured: Iterable[str]) -> dict[str, Prior]:
     """Return the priors of scales of what was not measured yet, by their names."""
     return {
         scale: Prior(1.0, THERMOMETER if observable == "tip" else METERS)
-        for observable, scale in _SCALED.items()
+        for scale, observable in SCALES.items()
         if observable not in measured
     }
 
@@ -345,15 +339,15 @@ class LinearisedLever:
         slopes = knee_by_parameter(surrogate.branch, surrogate.by_parameter, self.names)
         of_parameters = slopes * self._coordinates.rates(self._point)
         bias = circuit.bias(knee.lever_V, knee.current_mA)
-        return bias, knee.tip_K, np.append(of_parameters, np.zeros(len(_SCALED)))
+        return bias, knee.tip_K, np.append(of_parameters, np.zeros(len(SCALES)))
 
     def predict(self, rows: Rows) -> tuple[Array, Array]:
         """Return what rows show (observables, n), and derivatives by the unknowns (…, n, q)."""
         surrogate = self.surrogate.reading(rows)
         values, slopes = surrogate.predict(self.probe.values(self.names))
         of_parameters = slopes * self._coordinates.rates(self._point)
-        of_scales = np.zeros((*values.shape, len(_SCALED)))
-        for number, (observable, scale) in enumerate(_SCALED.items()):
+        of_scales = np.zeros((*values.shape, len(SCALES)))
+        for number, (scale, observable) in enumerate(SCALES.items()):
             row = list(FITTED).index(observable)
             share = self.priors[scale].spread if scale in self.priors else 0.0
             of_scales[row, :, number] = share * self._size(observable, values)
@@ -423,15 +417,13 @@ class LinearisedLever:
         """That of priors and data."""
         prior = PriorDensity.of_priors(self.priors)
         numbers, count = [self.names.index(name) for name in prior.names], len(self.names)
-        rows = np.zeros((len(numbers), count + len(_SCALED)))
+        rows = np.zeros((len(numbers), count + len(SCALES)))
         slopes = prior.slopes(self.probe.values(prior.names))
         rows[:, numbers] = slopes * self._coordinates.rates(self._point)[numbers]
         low, high = self._coordinates.bounds
         # uniform within its bounds where there is no prior
         uniform = np.where(rows[:, :count].any(axis=0), 0.0, 12.0 / (high - low) ** 2)
-        information = Information(np.diag(np.append(uniform, np.ones(len(_SCALED))))).with_rows(
-            rows
-        )
+        information = Information(np.diag(np.append(uniform, np.ones(len(SCALES))))).with_rows(rows)
         if self.measurement is None:
             return information
         _, slopes = self.predict(Rows(self.measurement.bias_V, self._measured))
@@ -447,13 +439,14 @@ class LinearisedLever:
         They are a share that is stated, or follow those of the data at hand, or else what is usual,
         and no smaller than what models are off by.
         """
-        law, size = _USUAL_NOISE.get(observable, _USUAL_OF_METERS), self._size(observable, values)
+        size = self._size(observable, values)
+        law = NoiseLaw(RAMAN_ERROR_K, 0.0) if observable == "tip" else NoiseLaw(0.0, 1e-3)
         if share is not None:
             law = NoiseLaw(0.0, share)
         elif (counts := self.weights.get(observable, np.empty(0)) > 0).any():
             errors = 1.0 / self.weights[observable][counts]
             return NoiseLaw.of(errors, self._size(observable, self._measured)[counts]).at(size)
-        return np.hypot(law.at(size), DISCREPANCY * size)
+        return np.hypot(law.at(size), SearchOptions.discrepancy * size)
 
     @property
     def _measured(self) -> Array:
@@ -468,16 +461,8 @@ class LinearisedLever:
 Aim = Literal["tip", "knee"]
 #: What can be measured, and what that shows beside the current.
 KINDS = {"bias": (), "reader": ("reader",), "spectra": ("tip",)}
-#: Of these several at one bias are proposed; a sweep does not return to one.
-REPEATED = ("spectra",)
 #: With this probability the tip is no hotter than is said.
 SURE = 0.99
-#: Measurements after which the error is shown.
-SHOWN_AFTER = (0, 1, 2, 5)
-#: Of biases that are compared unless some are stated: how far beyond the measured ones they go,
-#: from which share of the highest on, how many of them are even, and by how many the others are
-#: found. So often what lies between the last that is safe and the next one is halved.
-_BEYOND, _LOWEST, _EVEN, _FINE, _HALVED = 1.5, 0.02, 21, 1001, 4
 
 
 @dataclass(frozen=True)
@@ -683,7 +668,7 @@ def plan_next(
         "stderr_now_K": np.full(rows.size, stderr[0]),
         "stderr_then_K": stderr[1:],
     }
-    counts = sorted({n for n in (*SHOWN_AFTER, len(chosen)) if n <= len(chosen)})
+    counts = sorted({n for n in (0, 1, 2, 5, len(chosen)) if n <= len(chosen)})
     along = np.array([np.hypot(after[n].stderr(by_unknowns), stays[:-1]) for n in counts])
     errors = {"tip_K": tip_K, "tip_limit_K": highest_K}
     return Plan(
@@ -742,7 +727,7 @@ def _safe_biases(
     if stated is not None or safe == bias.size:
         return bias, highest, safe
     low, high = bias[safe - 1 : safe + 1]
-    for _ in range(_HALVED):
+    for _ in range(4):
         middle = np.array([(low + high) / 2.0])
         tip = hottest_tips(lever, middle, information)
         if tip[0] >= limit_K:
@@ -767,7 +752,7 @@ def hottest_tips(lever: LinearisedLever, bias: Array, information: Information) 
 
 def _error_of_model(lever: LinearisedLever, bias: Array) -> Array:
     """Return what the model leaves out of the tip temperature (K) at some biases (V)."""
-    fine = np.linspace(_LOWEST, 1.0, _FINE) * bias.max()
+    fine = np.linspace(0.02, 1.0, 1001) * bias.max()
     rise = lever.tip(fine)[0] - lever.probe.circuit.base_temperature_K
     error = error_of_model(lever.probe.surroundings, fine, rise)
     return np.interp(bias, fine, error)
@@ -810,7 +795,8 @@ def _candidates(
         errors = np.array([lever.noise(name, values, noise.get(name)) for name in names])
         rows = slopes[numbers] / errors[..., None]
         cost = costs.get(kind, 1.0)
-        again = kind in REPEATED
+        # several spectra at one bias are proposed; a sweep does not return to one
+        again = kind == "spectra"
         candidates += [Candidate(kind, rows[:, row], cost, again) for row in range(bias.size)]
     return candidates
 
@@ -819,13 +805,14 @@ def _usual_biases(lever: LinearisedLever) -> Array:
     """Return the biases (V) that are compared unless some are stated.
 
     Half of them are even, and half at even temperatures of the tip, which is steep near a knee.
+    They go to half as much again as the measured ones.
     """
     highest = lever.highest_V
     if lever.measurement is not None:
-        highest = min(highest, _BEYOND * float(lever.measurement.bias_V.max()))
-    even, fine = (np.linspace(_LOWEST * highest, highest, count) for count in (_EVEN, _FINE))
+        highest = min(highest, 1.5 * float(lever.measurement.bias_V.max()))
+    even, fine = (np.linspace(0.02 * highest, highest, count) for count in (21, 1001))
     tip_K = np.maximum.accumulate(lever.tip(fine)[0])
-    by_tip = np.interp(np.linspace(tip_K[0], tip_K[-1], _EVEN)[1:-1], tip_K, fine)
+    by_tip = np.interp(np.linspace(tip_K[0], tip_K[-1], even.size)[1:-1], tip_K, fine)
     return np.union1d(even, by_tip)
 
 
@@ -842,7 +829,7 @@ def _errors_that_stay(
     table, notes = calibration.table, []
     budget = {
         source: np.interp(bias, table.bias_V, error)
-        for source, error in budgets_of(table)[BUDGETS[0]].items()
+        for source, error in budgets_of(table)["budget_K"].items()
     }
     if "jump" in budget and budget["jump"][-1] > 0.0:
         notes.append(

@@ -21,25 +21,57 @@ from hotlever.measurement.data import noise_about_neighbours
 from hotlever.probe.priors import METERS, SCALES, THERMOMETER, Prior, PriorShift
 from hotlever.types import Array
 
-#: Shares of the variance that are in proportion to the square of what is shown; of all of it, data
-#: near zero would count infinitely.
-_SHARES = np.array([0.0, 0.5, 0.8, 0.95, 0.99])
-#: Degrees of freedom of the t distribution by which residuals tell the shares: with few of them it
-#: does not matter how far off outliers are (Lange, Little and Taylor, J. Am. Stat. Assoc. 84, 881
-#: (1989), who take 4). Rounds in which the scale of it is found.
-_TAILS, _ROUNDS = 4.0, 20
-#: A datum that alone decides a parameter says nothing of its noise.
-_LEAST_FREE = 0.05
-#: Huber's weights lessen from here on; the others are full up to, and nothing beyond, so many
-#: standard deviations: data without outliers keep nearly all of theirs, and their scatter.
-_HUBER, _FULL, _NONE = 1.345, 3.5, 6.0
-#: What is smooth is no noise: data scatter by so many times as much as about their neighbours, or
-#: as a model is off, at most, or a search would be content with a wrong lever and noisy data. So
-#: many data tell.
-_OF_NOISE, _OF_DISCREPANCY, _TELLING = 4.0, 2.0, 7
+
+@dataclass(frozen=True)
+class NoiseOptions:
+    """How data tell their noise, and when they are outliers.
+
+    Attributes
+    ----------
+    shares : sequence of float
+        Of the variance that may be in proportion to the square of what is shown; of all of it, data
+        near zero would count infinitely.
+    freedom : float
+        Degrees of freedom of the t distribution by which residuals tell the shares: with few of
+        them it does not matter how far off outliers are (Lange, Little and Taylor, J. Am. Stat.
+        Assoc. 84, 881 (1989), who take 4).
+    rounds : int
+        In which the scale of it is found.
+    least_free : float
+        A datum that alone decides a parameter says nothing of its noise: at least this share of its
+        square is taken for free.
+    huber : float
+        Huber's weights lessen from so many standard deviations on.
+    full_weight, no_weight : float
+        Other weights are full up to, and nothing beyond, so many: data without outliers keep nearly
+        all of theirs, and their scatter.
+    most_of_noise, most_of_discrepancy : float
+        What is smooth is no noise: data scatter by so many times as much as about their neighbours,
+        or as a model is off, at most, or a search would be content with a wrong lever and noisy
+        data.
+    fewest_neighbours : int
+        So many data tell how they scatter about their neighbours.
+    """
+
+    shares: Sequence[float] = (0.0, 0.5, 0.8, 0.95, 0.99)
+    freedom: float = 4.0
+    rounds: int = 20
+    least_free: float = 0.05
+    huber: float = 1.345
+    full_weight: float = 3.5
+    no_weight: float = 6.0
+    most_of_noise: float = 4.0
+    most_of_discrepancy: float = 2.0
+    fewest_neighbours: int = 7
 
 
-def relative_noise(difference: Array, predicted: Array, leverage: Array, least: float) -> Array:
+def relative_noise(
+    difference: Array,
+    predicted: Array,
+    leverage: Array,
+    least: float,
+    options: NoiseOptions | None = None,
+) -> Array:
     """Return the noise of data relative to its root mean square, (n,); one where there is none.
 
     Parameters
@@ -52,6 +84,7 @@ def relative_noise(difference: Array, predicted: Array, leverage: Array, least: 
         The share of each datum's noise that the fit has taken up.
     least : float
         Counts as one datum more, in the unit of the data.
+    options : NoiseOptions, optional
 
     Notes
     -----
@@ -59,16 +92,18 @@ def relative_noise(difference: Array, predicted: Array, leverage: Array, least: 
     that of greatest likelihood; precisions are averaged with the likelihoods of the shares, so
     that data that cannot tell them apart are not forced to.
     """
+    options = options or NoiseOptions()
+    shares, freedom = np.array(options.shares), options.freedom
     here = np.isfinite(difference)
-    squares = difference[here] ** 2 / np.maximum(1.0 - leverage[here], _LEAST_FREE)
+    squares = difference[here] ** 2 / np.maximum(1.0 - leverage[here], options.least_free)
     size = predicted[here] ** 2
-    shape = 1.0 - _SHARES[:, None] + _SHARES[:, None] * size / np.mean(size)
-    by_shape = np.append(squares / shape, np.full((_SHARES.size, 1), least**2), axis=1)
+    shape = 1.0 - shares[:, None] + shares[:, None] * size / np.mean(size)
+    by_shape = np.append(squares / shape, np.full((shares.size, 1), least**2), axis=1)
     scale = np.median(by_shape, axis=1, keepdims=True) + np.mean(by_shape, axis=1, keepdims=True)
-    for _ in range(_ROUNDS):
-        counting = (_TAILS + 1.0) / (_TAILS + by_shape / scale)
+    for _ in range(options.rounds):
+        counting = (freedom + 1.0) / (freedom + by_shape / scale)
         scale = np.mean(counting * by_shape, axis=1, keepdims=True)
-    tails = 0.5 * (_TAILS + 1.0) * np.log1p(by_shape / (_TAILS * scale))
+    tails = 0.5 * (freedom + 1.0) * np.log1p(by_shape / (freedom * scale))
     likelihood = -tails.sum(axis=1) - 0.5 * np.log(shape * scale).sum(axis=1)
     chance = np.exp(likelihood - likelihood.max())
     precision = np.average(1.0 / (shape * scale), axis=0, weights=chance)
@@ -94,6 +129,7 @@ class DataErrors:
         Of how many rows of a file each is the mean, as a root: by it errors are smaller.
     measured : ndarray, shape (observables, n), optional
         Standard errors. An observable without them begins with a hundredth of its largest value.
+    options : NoiseOptions, optional
 
     Attributes
     ----------
@@ -114,7 +150,9 @@ class DataErrors:
         along: Array,
         root: Array,
         measured: Array | None = None,
+        options: NoiseOptions | None = None,
     ) -> None:
+        self._options = options or NoiseOptions()
         self.present, self.largest, self._root = present, largest, root
         self._order = np.argsort(along, kind="stable")
         self.measured, self.without = measured is not None, np.zeros(len(present), dtype=bool)
@@ -159,7 +197,7 @@ class DataErrors:
 
     def has_outliers(self, difference: Array) -> bool:
         """Whether weights that forget outliers would lessen that of any datum."""
-        return bool((np.abs(self.deviations(difference)) > _FULL).any())
+        return bool((np.abs(self.deviations(difference)) > self._options.full_weight).any())
 
     def lessen(self, difference: Array, gently: bool) -> None:
         """Lessen the weight of data far from a prediction.
@@ -167,9 +205,12 @@ class DataErrors:
         Gently, by Huber's weights, with which a fit has one optimum; or by some that forget
         outliers.
         """
-        size = np.abs(self.deviations(difference))
-        forgetful = np.clip((_NONE - size) / (_NONE - _FULL), 0.0, 1.0)
-        self.down = np.sqrt(_HUBER / np.maximum(size, _HUBER)) if gently else forgetful
+        size, options = np.abs(self.deviations(difference)), self._options
+        if gently:
+            self.down = np.sqrt(options.huber / np.maximum(size, options.huber))
+        else:
+            full, none = options.full_weight, options.no_weight
+            self.down = np.clip((none - size) / (none - full), 0.0, 1.0)
 
     def take_scatter(
         self,
@@ -191,16 +232,18 @@ class DataErrors:
         difference = difference * self._root
         leverage = np.broadcast_to(leverage, difference.shape)
         self._discrepancy = least = discrepancy * self.largest
+        options = self._options
         if discrepancy:
             for row in np.flatnonzero(self.without):
                 self._relative[row] = relative_noise(
-                    difference[row], predicted[row], leverage[row], float(least[row, 0])
+                    difference[row], predicted[row], leverage[row], float(least[row, 0]), options
                 )
         squares = np.nansum(weight * (difference / self._relative) ** 2, axis=1, keepdims=True)
         free = np.maximum(np.sum(weight - leverage, axis=1, keepdims=True), 1.0)
         scatter = np.maximum(np.sqrt(squares / free), 1e-6 * self.largest)
         if discrepancy:
-            most = np.maximum(_OF_NOISE * self._noise(difference), _OF_DISCREPANCY * least)
+            of_noise = options.most_of_noise * self._noise(difference)
+            most = np.maximum(of_noise, options.most_of_discrepancy * least)
             scatter = np.minimum(scatter, most)
         # the mean of many rows of a file has less noise, but no better model
         own = self._relative * np.hypot(scatter / self._root, least)
@@ -239,7 +282,8 @@ class DataErrors:
         """
         ordered = (difference / self._relative)[:, self._order]
         present = [row[np.isfinite(row)] for row in ordered]
-        noise = [noise_about_neighbours(row) if row.size >= _TELLING else np.inf for row in present]
+        fewest = self._options.fewest_neighbours
+        noise = [noise_about_neighbours(row) if row.size >= fewest else np.inf for row in present]
         return np.array(noise)[:, None]
 
     @property
@@ -248,7 +292,7 @@ class DataErrors:
 
         An outlier counts as one that is just so far off that it is left out.
         """
-        each = 2.0 * np.log(self.scale) + _NONE**2 * (1.0 - self.down**2)
+        each = 2.0 * np.log(self.scale) + self._options.no_weight**2 * (1.0 - self.down**2)
         return float(np.sum(each[self.present]))
 
     @property

@@ -21,19 +21,6 @@ from hotlever.estimate.residuals import Residuals
 from hotlever.probe import Probe
 from hotlever.types import Array
 
-#: Relative change of the sum of squares at which a minimum is found; without priors squares count
-#: no standard deviations, so that next to nothing may be left.
-_GAIN, _PRECISE_GAIN = 1e-5, 1e-10
-#: Share of the range between its bounds by which a search must begin inside of them.
-_INSIDE = 1e-6
-#: Share of the range between its bounds within which a parameter is at one of them.
-_AT_BOUND = 1e-5
-#: Scaled residual given to trial parameters for which the lever has no state, so that a search
-#: turns back.
-_UNSOLVED = 10.0
-#: A symmetric matrix of unit diagonal with a smaller eigenvalue is singular but for rounding.
-_SINGULAR = 1e-12
-
 
 @dataclass(frozen=True)
 class Quantity:
@@ -167,8 +154,9 @@ class Objective:
 
     def unsolved(self, point: Array) -> Array:
         """Return residuals of a lever that has no states: far beyond any real ones."""
-        data = np.full(self.residuals.size, _UNSOLVED)
-        penalty = [] if self._penalty is None else [_UNSOLVED]
+        scaled = 10.0  # so that a search turns back
+        data = np.full(self.residuals.size, scaled)
+        penalty = [] if self._penalty is None else [scaled]
         return np.concatenate([data, self.from_priors(point), penalty])
 
     def jacobian(self, slopes: Array, point: Array) -> Array:
@@ -212,7 +200,7 @@ class Objective:
         """
         point, residual, jacobian = self.linearised(at)
         low, high = self.bounds
-        margin = _AT_BOUND * (high - low)
+        margin = 1e-5 * (high - low)
         free = np.ones(point.size, dtype=bool)
         for _ in range(point.size):
             step = np.zeros(point.size)
@@ -375,14 +363,16 @@ class Subproblem:
             with suppress(ComputationError):  # where there are no states, none begins
                 self.predict(start)
                 begin = start
-        margin = _INSIDE * (high - low)
+        # a search must begin inside
+        margin = 1e-6 * (high - low)
         solution = optimize.least_squares(
             self.residual,
             np.clip(begin, low + margin, high - margin),
             self.jacobian,
             (low, high),
             x_scale="jac",
-            ftol=_GAIN if self.objective.informed else _PRECISE_GAIN,
+            # without priors squares count no standard deviations: next to nothing may be left
+            ftol=1e-5 if self.objective.informed else 1e-10,
             xtol=1e-10,
             gtol=None,
             max_nfev=100,
@@ -395,6 +385,7 @@ def inverse_or_nan(matrix: Array) -> Array:
     scale = np.sqrt(np.diag(matrix))
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = matrix / np.outer(scale, scale)
-    if not np.isfinite(unit).all() or np.linalg.eigvalsh(unit)[0] < _SINGULAR:
+    # singular but for rounding
+    if not np.isfinite(unit).all() or np.linalg.eigvalsh(unit)[0] < 1e-12:
         return np.full_like(matrix, np.nan)
     return np.asarray(np.linalg.inv(matrix), dtype=float)

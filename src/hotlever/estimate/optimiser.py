@@ -21,36 +21,6 @@ from hotlever.probe import Probe
 from hotlever.text import with_unit
 from hotlever.types import Array
 
-#: A region beyond which only rounding errors are left, in units of `Coordinates.room`.
-_SMALLEST_REGION = 1e-6
-#: The share of the predicted gain from which on the region grows, and below which it shrinks.
-_TRUSTED, _DOUBTED = 0.7, 0.25
-#: Sum of squares, in units of the noise, that may still be taken away at an optimum where steps
-#: gain next to nothing: a third of a standard error. With priors that is where no longer step than
-#: the region gains anything, since values are not smooth there, as near a fold that moves past a
-#: row.
-_DECREMENT_OF_SMALL_STEPS, _ROUGH_REGION = 0.1, 1e-3
-#: The same in units of the noise, where weights count no standard deviations: a thirtieth of a
-#: standard error.
-_RELATIVE_DECREMENT = 1e-3
-#: The same as a share of the sum of squares; the second where that is so many times what noise
-#: explains that no such lever shows the data.
-_NEGLIGIBLE, _NEGLIGIBLE_OF_MISFIT, _MISFIT = 1e-6, 1e-3, 10.0
-#: Differences, as shares of the largest value of an observable, of which only rounding errors are
-#: left.
-_PRECISION = 1e-7
-#: Most reweightings by Huber's weights, with which there is one optimum; then by those that forget
-#: outliers.
-_GENTLE_ROUNDS, _ROBUST_ROUNDS = 6, 14
-#: A confirmation by the full lever that moves no parameter by more than these shares of its
-#: standard error and of its value ends the fit: the confirmed model is exact to first order. Most
-#: confirmations.
-_SETTLED, _SETTLED_RELATIVE, _CONFIRMATIONS = 0.5, 0.03, 5
-#: By how much a model is off that describes the data, a share of an observable's largest value,
-#: where something was known of the lever beforehand (model discrepancy: Kennedy and O'Hagan,
-#: J. R. Stat. Soc. B 63, 425 (2001)).
-DISCREPANCY = 5e-4
-
 
 @dataclass(frozen=True)
 class SearchOptions:
@@ -74,6 +44,35 @@ class SearchOptions:
     decrement : float
         Sum of squares that Gauss and Newton's step would still take away at an optimum, where
         squares count standard deviations (with priors): a tenth of a standard error.
+    relative_decrement : float
+        The same in units of the noise, where weights count no standard deviations: a thirtieth of a
+        standard error.
+    small_decrement : float
+        The same where steps gain next to nothing: a third of a standard error. With priors that is
+        where no longer step than the `rough_region` gains anything, since values are not smooth
+        there, as near a fold that moves past a row.
+    rough_region : float
+        See there; in units of `Coordinates.room`, as all regions.
+    smallest_region : float
+        One in which only rounding errors are left.
+    negligible, negligible_of_misfit, misfit : float
+        A decrement as a share of the sum of squares; the second where that is so many times what
+        noise explains that no such lever shows the data.
+    precision : float
+        Differences, as shares of the largest value of an observable, of which only rounding errors
+        are left.
+    gentle_rounds, robust_rounds : int
+        Most reweightings by Huber's weights, with which there is one optimum; then by those that
+        forget outliers.
+    settled, settled_relative : float
+        A confirmation by the full lever that moves no parameter by more than these shares of its
+        standard error and of its value ends the fit: the confirmed model is exact to first order.
+    confirmations : int
+        Most of them.
+    discrepancy : float
+        By how much a model is off that describes the data, a share of an observable's largest
+        value, where something was known of the lever beforehand (Kennedy and O'Hagan, J. R. Stat.
+        Soc. B 63, 425 (2001)).
     scatter_rounds : int
         Rounds in which an observable without measurement errors finds its scatter.
     creeping_steps : int
@@ -88,6 +87,20 @@ class SearchOptions:
     first_region: float = 0.5
     largest_region: float = 0.7
     decrement: float = 1e-2
+    relative_decrement: float = 1e-3
+    small_decrement: float = 0.1
+    rough_region: float = 1e-3
+    smallest_region: float = 1e-6
+    negligible: float = 1e-6
+    negligible_of_misfit: float = 1e-3
+    misfit: float = 10.0
+    precision: float = 1e-7
+    gentle_rounds: int = 6
+    robust_rounds: int = 14
+    settled: float = 0.5
+    settled_relative: float = 0.03
+    confirmations: int = 5
+    discrepancy: float = 5e-4
     scatter_rounds: int = 3
     creeping_steps: int = 5
 
@@ -202,7 +215,7 @@ class Optimiser:
             optimum = self.solve(optimum.probe)
         if robust:
             optimum = self._reweighted(start, optimum)
-        for _ in range(_CONFIRMATIONS):
+        for _ in range(self._options.confirmations):
             if not self.predictor.confirm(optimum.prediction):
                 return optimum
             previous, optimum = optimum, self.solve(optimum.probe)
@@ -216,11 +229,11 @@ class Optimiser:
         With priors outliers stand out at once, since these hold a fit that others would pull along;
         without any there is nothing to do.
         """
-        errors, informed = self.residuals.errors, self.objective.informed
+        errors, informed, options = self.residuals.errors, self.objective.informed, self._options
         difference = self.residuals.own_difference(optimum.prediction.values)
         if informed and not errors.has_outliers(difference):
             return optimum
-        for gently, most in ((True, _GENTLE_ROUNDS), (False, _ROBUST_ROUNDS)):
+        for gently, most in ((True, options.gentle_rounds), (False, options.robust_rounds)):
             for _ in range(most):
                 errors.lessen(self.residuals.own_difference(optimum.prediction.values), gently)
                 # outliers can drive the first fit onto a bound, where it would stay without priors
@@ -232,10 +245,10 @@ class Optimiser:
 
     def _settled(self, previous: Optimum, optimum: Optimum) -> bool:
         """Whether the parameters have moved too little for another confirmation to matter."""
-        objective = self.objective
+        objective, options = self.objective, self._options
         now = optimum.probe.values(objective.varied)
         size = np.maximum(np.abs(now), objective.coordinates.scale)
-        least = np.minimum(_SETTLED * optimum.stderr, _SETTLED_RELATIVE * size)
+        least = np.minimum(options.settled * optimum.stderr, options.settled_relative * size)
         return bool(np.all(np.abs(now - previous.probe.values(objective.varied)) <= least))
 
     def solve(self, start: Probe) -> Optimum:
@@ -269,12 +282,12 @@ class Optimiser:
             # a step within the region that gains nothing is as good as none
             if left <= enough or (inner and squares - least <= enough):
                 return self._optimum(at, left, converged=True)
-            if region < _SMALLEST_REGION or self.predictor.evaluations >= most:
+            if region < options.smallest_region or self.predictor.evaluations >= most:
                 # only rounding errors are left, if so little is promised
-                precise = left <= _NEGLIGIBLE_OF_MISFIT * squares
-                precise = precise and region < _SMALLEST_REGION
+                precise = left <= options.negligible_of_misfit * squares
+                precise = precise and region < options.smallest_region
                 return self._optimum(at, left, converged=precise or self._is_near(left))
-            if region < _ROUGH_REGION and self._is_near(left):
+            if region < options.rough_region and self._is_near(left):
                 return self._optimum(at, left, converged=True)
             creeping = creeping + 1 if self._creeps(at, squares - least) else 0
             if creeping > options.creeping_steps:
@@ -283,9 +296,10 @@ class Optimiser:
             trial = self._trial(at, target)
             better = np.inf if trial is None else objective.squares(trial)
             gain = (squares - better) / max(squares - least, 1e-300)
-            if gain < _DOUBTED:
+            # neighbours tell the less, the further away they are
+            if gain < 0.25:
                 region = 0.3 * length
-            elif gain > _TRUSTED:
+            elif gain > 0.7:
                 region = min(max(region, 2.0 * length), options.largest_region)
             if trial is not None and better < squares:
                 self.steps += 1
@@ -302,13 +316,13 @@ class Optimiser:
 
     def _is_near(self, left: float) -> bool:
         """Whether an optimum is so near that its errors hold, if values are not smooth there."""
-        return self.objective.informed and left <= _DECREMENT_OF_SMALL_STEPS
+        return self.objective.informed and left <= self._options.small_decrement
 
     def _creeps(self, at: Prediction, promised: float) -> bool:
         """Whether a step of a search without priors promises next to nothing."""
         if self.objective.informed:
             return False
-        return promised <= _DECREMENT_OF_SMALL_STEPS * self._noise(at)
+        return promised <= self._options.small_decrement * self._noise(at)
 
     def _noise(self, at: Prediction) -> float:
         """Return the sum of squares that a standard error costs."""
@@ -318,15 +332,15 @@ class Optimiser:
 
     def _tolerance(self, at: Prediction) -> float:
         """Return by how much the sum of squares may still fall where a search ends."""
-        objective, residuals = self.objective, self.residuals
+        objective, residuals, options = self.objective, self.residuals, self._options
         squares, noise = objective.squares(at), self._noise(at)
         # so far above what noise explains that no lever is near
-        hopeless = squares > _MISFIT * residuals.size * noise
-        least = (_NEGLIGIBLE_OF_MISFIT if hopeless else _NEGLIGIBLE) * squares
+        hopeless = squares > options.misfit * residuals.size * noise
+        least = (options.negligible_of_misfit if hopeless else options.negligible) * squares
         if objective.informed:
-            return float(max(self._options.decrement, least))
-        precise = residuals.size * (_PRECISION * residuals.errors.unit_weight) ** 2
-        return float(max(_RELATIVE_DECREMENT * noise, least, precise))
+            return float(max(options.decrement, least))
+        precise = residuals.size * (options.precision * residuals.errors.unit_weight) ** 2
+        return float(max(options.relative_decrement * noise, least, precise))
 
     def _optimum(self, at: Prediction, left: float, *, converged: bool) -> Optimum:
         return Optimum(self, at, left, converged, self.objective.common_noise_covariance(at))
@@ -345,6 +359,6 @@ class Optimiser:
         for _ in range(self._options.scatter_rounds):
             values, slopes = near.predict(point)
             leverage = self.objective.leverage(slopes, point)
-            self.residuals.take_scatter(values, leverage, DISCREPANCY)
+            self.residuals.take_scatter(values, leverage, self._options.discrepancy)
             point, least = near.minimum(point, region)
         return point, least

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal, TypeVar, cast, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.estimate.power_law import PowerLaw
@@ -24,8 +24,6 @@ from hotlever.quantities import FITTED
 Weights = Literal["maximum", "errors"]
 #: Of what there are uncertainty budgets: a tip, or its apex that touches a sample.
 BudgetOf = Literal["tip", "apex"]
-#: What the medium is called if nobody knows it: either is tried.
-UNKNOWN_MEDIUM = "unknown"
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ class FitOptions:
             (
                 "medium",
                 [] if self.medium is None else [self.medium],
-                (*get_args(Medium), UNKNOWN_MEDIUM),
+                (*get_args(Medium), "unknown"),
             ),
         ):
             for name in names:
@@ -132,8 +130,7 @@ class FitOptions:
     @property
     def media(self) -> tuple[Medium | None, ...]:
         """What is to be tried: None is what measurement and probe say."""
-        medium = self.medium
-        return get_args(Medium) if medium == UNKNOWN_MEDIUM else (cast("Medium | None", medium),)
+        return get_args(Medium) if self.medium == "unknown" else (self.medium,)
 
     def values(self) -> dict[str, Any]:
         """Return the options as plain values."""

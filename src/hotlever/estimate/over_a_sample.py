@@ -22,9 +22,6 @@ from hotlever.probe import Probe
 from hotlever.probe.tip import OUT_OF_CONTACT
 from hotlever.types import Array
 
-#: Distances that are solved in air where more were measured.
-_SOLVED = 7
-
 
 @dataclass(frozen=True)
 class Away:
@@ -45,17 +42,17 @@ class Away:
     places: Array
 
     @classmethod
-    def of(cls, probe: Probe, distance_um: Array) -> Away:
-        """Return those that rows at these distances of a probe's apex need, (n,)."""
+    def of(cls, probe: Probe, distance_um: Array, most: int = 7) -> Away:
+        """Return those that rows at distances of a probe's apex need, (n,), and `most` in air."""
         assert probe.tip is not None
         change, height = {INTERFACE: OUT_OF_CONTACT}, probe.tip.height_um
         out = distance_um[distance_um > 0.0]
         if probe.surroundings.medium == "vacuum" or not out.size:
             return cls((change,), height, np.empty(0))
         places = np.unique(np.log(height + out))
-        if places.size > _SOLVED:
+        if places.size > most:
             # Chebyshev's, between which a polynomial follows a smooth function closely
-            turns = np.cos(np.linspace(np.pi, 0.0, _SOLVED))
+            turns = np.cos(np.linspace(np.pi, 0.0, most))
             places = (places[-1] + places[0] + turns * np.ptp(places)) / 2.0
         gaps = np.exp(places).tolist()
         return cls(tuple({**change, GAP: gap} for gap in gaps), height, places)

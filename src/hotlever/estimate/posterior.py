@@ -21,18 +21,11 @@ from scipy import optimize
 from scipy.interpolate import PchipInterpolator
 
 from hotlever.estimate.experiment import Prediction
+from hotlever.estimate.noise import NoiseOptions
 from hotlever.estimate.objective import Objective, Quantity, Subproblem, inverse_or_nan
 from hotlever.estimate.surrogate import Surrogate
 from hotlever.probe.priors import PriorShift
 from hotlever.types import Array
-
-#: A datum that alone decides a parameter says nothing of its own noise.
-_LEAST_FREE = 0.05
-#: Standard errors on either side over which derivatives are compared.
-_STEP = 0.5
-#: Standard errors at which the most bent axis is solved, and how bent it must be: its second
-#: derivative as a share of the quantity's standard error.
-_SOLVED_AT, _BENT = (1.25, 2.5), 0.1
 
 
 def standard_errors(slopes: Array, covariance: Array) -> Array:
@@ -79,7 +72,9 @@ class Posterior:
         if residual.size <= self._point.size:
             return np.full_like(jacobian.T, np.nan)
         leverage = np.einsum("ij,jk,ik->i", jacobian, inverse, jacobian)
-        influence = inverse @ jacobian.T * (residual / np.maximum(1.0 - leverage, _LEAST_FREE))
+        influence = (
+            inverse @ jacobian.T * (residual / np.maximum(1.0 - leverage, NoiseOptions.least_free))
+        )
         return np.asarray(self._rates[:, None] * influence)
 
     @cached_property
@@ -216,7 +211,8 @@ class CurvedQuantity:
         bent, axes = np.linalg.eigh(self._curvature)
         self._bent_axis = axes[:, np.argmax(np.abs(bent))]
         self._along: PchipInterpolator | None = None
-        if np.abs(bent).max() > _BENT * np.linalg.norm(self._gradient):
+        # if its second derivative is no small share of the standard error
+        if np.abs(bent).max() > 0.1 * np.linalg.norm(self._gradient):
             self._along = self._solved_along(self._bent_axis)
 
     def axes_of(self, influences: Array) -> Array:
@@ -249,11 +245,12 @@ class CurvedQuantity:
     def _second_derivatives(self) -> Array:
         """Return those of the quantity by errors, (p, p)."""
         by_residuals, rows = self._gradient @ self._inverse, []
-        for step in _STEP * self._steps.T:
+        size = 0.5  # standard errors on either side over which derivatives are compared
+        for step in size * self._steps.T:
             (after, risen), (before, fallen) = (
                 self._derivatives(self._near.origin + way * step) for way in (1.0, -1.0)
             )
-            rows.append((risen - fallen - by_residuals @ (after - before)) / (2.0 * _STEP))
+            rows.append((risen - fallen - by_residuals @ (after - before)) / (2.0 * size))
         return 0.5 * (np.array(rows) + np.transpose(rows))
 
     def _solved_along(self, axis: Array) -> PchipInterpolator:
@@ -264,7 +261,7 @@ class CurvedQuantity:
         value = self._value(near.origin)
         for way in (-1.0, 1.0):
             point = near.origin
-            for size in _SOLVED_AT:
+            for size in (1.25, 2.5):  # standard errors
                 target = way * size * axis
                 point = optimize.least_squares(
                     lambda point, to=target: self._inverse @ (near.residual(point) - at_rest) - to,

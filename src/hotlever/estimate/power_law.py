@@ -18,16 +18,6 @@ from hotlever.records import Record
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW
 from hotlever.types import Array
 
-#: Largest coefficient of a law that is read: K/mW, K, an exponent or mW.
-_LARGEST = 1e5
-#: Range in which the exponent of the cold branch is sought. At one, it is the linear term.
-_EXPONENTS = (1.2, 12.0)
-#: Fewest points that determine a branch, one more than its coefficients.
-_FEWEST_COLD, _FEWEST_HOT = 4, 2
-#: Powers (over the knee's) at which the law is fitted to a model: even, up to here; at least so
-#: many of them above the knee.
-_TO, _POINTS, _LEAST_HOT = 1.4, 160, 8
-
 
 class PowerLaw(Record):
     """Tip temperature against the power dissipated in the lever (Eq. 12).
@@ -170,9 +160,10 @@ def read_power_law(path: str | os.PathLike[str]) -> PowerLaw:
         raise InputError(f"{path}: found no power law, expected an object with its coefficients")
     coefficients = {name: value for name, value in section.items() if name != "threshold_K"}
     law = PowerLaw.from_values(coefficients, str(path))
+    largest = 1e5  # K/mW, K, an exponent or mW
     for name, value in law:
-        if not 0 < value <= _LARGEST:
-            expected = "a positive number" if not value > 0 else f"at most {_LARGEST:g}"
+        if not 0 < value <= largest:
+            expected = "a positive number" if not value > 0 else f"at most {largest:g}"
             raise InputError(f"{path}: {name} = {value:g}, expected {expected}")
     return law
 
@@ -257,7 +248,7 @@ def fit_power_law(
     rows = np.stack(np.broadcast_arrays(*(np.asarray(column, dtype=float) for column in columns)))
     rows = rows[:, np.isfinite(rows).all(axis=0) & (rows[0] > 0) & (rows[2] > 0)]
     power, tip, error = rows[:, np.argsort(rows[0], kind="stable")]
-    if power.size < (fewest := _FEWEST_COLD + _FEWEST_HOT):
+    if power.size < (fewest := _Rises.fewest_cold + _Rises.fewest_hot):
         raise InputError(
             f"{counted(power.size, 'temperature')} with a power above zero, expected at least "
             f"{fewest} for a power law"
@@ -271,11 +262,11 @@ def law_of_model(vacuum: Branch, threshold_mW: float | None) -> tuple[PowerLaw, 
     """Fit Eq. 12 to the model in vacuum, with its threshold at the knee; return what it misses."""
     highest = vacuum.by_power.highest_mW
     if threshold_mW is not None:
-        highest = min(highest, _TO * threshold_mW)
-    power = np.linspace(0.0, highest, _POINTS + 1)[1:]
-    if threshold_mW is not None and np.sum(power > threshold_mW) < _LEAST_HOT:
+        highest = min(highest, 1.4 * threshold_mW)
+    power = np.linspace(0.0, highest, 161)[1:]
+    if threshold_mW is not None and np.sum(power > threshold_mW) < 8:
         # the lever melts right above its knee
-        power = np.union1d(power, np.linspace(threshold_mW, highest, _LEAST_HOT + 1)[1:])
+        power = np.union1d(power, np.linspace(threshold_mW, highest, 9)[1:])
     tip, base = vacuum.tip_temperature(power), vacuum.base_temperature_K
     fit = fit_power_law(power, tip, base_temperature_K=base, threshold_mW=threshold_mW)
     return fit.law, fit.largest_residual_K()
@@ -294,11 +285,18 @@ def power_turns(branch: Branch, medium: str) -> str:
 
 @dataclass(frozen=True)
 class _Rises:
-    """Rises of the tip by power, rising in power, and the inverse of their standard errors."""
+    """Rises of the tip by power, rising in power, and the inverse of their standard errors.
+
+    So many points at least, one more than its coefficients, determine a branch; and in this range
+    the exponent of the cold one is sought: at one, it is the linear term.
+    """
 
     power_mW: Array
     rise_K: Array
     weight: Array
+    fewest_cold: int = 4
+    fewest_hot: int = 2
+    exponents: tuple[float, float] = (1.2, 12.0)
 
     def solve(self, columns: Array) -> tuple[Array, float]:
         """Solve weighted linear least squares; return coefficients and the sum of squares."""
@@ -324,14 +322,14 @@ def _fitted(values: ArrayLike, errors: ArrayLike) -> tuple[PowerLaw, dict[str, f
 
 def _two_branches(data: _Rises, threshold: float | None) -> tuple[PowerLaw, dict[str, float]]:
     """Fit branches that need not meet, for every row at which the data may be divided."""
-    power, last = data.power_mW, data.power_mW.size - _FEWEST_HOT
-    splits = list(range(_FEWEST_COLD, last + 1))
+    power, last = data.power_mW, data.power_mW.size - data.fewest_hot
+    splits = list(range(data.fewest_cold, last + 1))
     if threshold is not None:
         split = int(np.searchsorted(power, threshold, side="right"))
         if split not in splits:
             raise InputError(
                 f"{split} points up to the threshold of {threshold:g} mW and {power.size - split} "
-                f"above it, expected at least {_FEWEST_COLD} and {_FEWEST_HOT}"
+                f"above it, expected at least {data.fewest_cold} and {data.fewest_hot}"
             )
         splits = [split]
 
@@ -344,7 +342,7 @@ def _two_branches(data: _Rises, threshold: float | None) -> tuple[PowerLaw, dict
         return data.solve(columns(m, split))[1]
 
     optima = [
-        minimize_scalar(squares, args=(split,), bounds=_EXPONENTS, method="bounded")
+        minimize_scalar(squares, args=(split,), bounds=data.exponents, method="bounded")
         for split in splits
     ]
     sums = np.array([optimum.fun for optimum in optima])
@@ -376,13 +374,13 @@ def _continuous(data: _Rises) -> tuple[PowerLaw, dict[str, float]]:
     def squares(shape: ArrayLike) -> float:
         return data.solve(columns(*np.asarray(shape)))[1]
 
-    low, high = power[_FEWEST_COLD - 1], power[-_FEWEST_HOT]
+    low, high = power[data.fewest_cold - 1], power[-data.fewest_hot]
     starts = [(m, p) for m in (2.0, 3.0, 5.0) for p in np.linspace(low, high, 8)]
     optimum = minimize(
         squares,
         np.array(min(starts, key=squares)),
         method="Nelder-Mead",
-        bounds=[_EXPONENTS, (low, high)],
+        bounds=[data.exponents, (low, high)],
         options={"xatol": 1e-8, "fatol": 1e-12, "maxiter": 2000, "maxfev": 4000},
     )
     m, threshold = optimum.x.tolist()

@@ -37,14 +37,6 @@ from hotlever.probe.priors import (
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.types import Array
 
-#: Why a probe does not show what was measured.
-_MISSING = {
-    "reader": "the probe has no reader",
-    "bridge": "the probe has no bridge (bridge_upper_ohm and bridge_lower_ohm in [circuit])",
-}
-#: Data that are enough to tell, with priors, which of them are outliers.
-_ENOUGH = 15
-
 
 @dataclass(frozen=True)
 class Problem:
@@ -124,7 +116,8 @@ class Problem:
         options = options.of(probe, in_time=in_time)
         priors, more = _priors(options, probe, measurement)
         informed = bool(priors or before.names)
-        enough = int(np.isfinite(measurement.current(probe.circuit)).sum()) >= _ENOUGH
+        # data that tell, with priors, which of them are outliers
+        enough = int(np.isfinite(measurement.current(probe.circuit)).sum()) >= 15
         options = replace(
             options,
             priors=priors,
@@ -230,9 +223,14 @@ def _observables(
             )
         if name in fittable:
             continue
+        reason = (
+            "the probe has no reader"
+            if name == "reader"
+            else "the probe has no bridge (bridge_upper_ohm and bridge_lower_ohm in [circuit])"
+        )
         if options.observables is None and fittable:
-            notes.append(f"{symbol}: {_MISSING[name]}, so that these values are not fitted")
+            notes.append(f"{symbol}: {reason}, so that these values are not fitted")
         else:
             expected = f"fit {', '.join(fittable)}" if fittable else "there is nothing else to fit"
-            raise InputError(f"{where}: {symbol}: {_MISSING[name]}; {expected}")
+            raise InputError(f"{where}: {symbol}: {reason}; {expected}")
     return fittable if options.observables is None else tuple(options.observables)

@@ -29,28 +29,40 @@ from hotlever.types import Array, Index
 if TYPE_CHECKING:
     from hotlever.estimate.estimate import Estimate
 
-#: Biases, in the hotter half, at which the tip temperature is moved away, and by how many
-#: standard errors.
-_ROWS, _AWAY = 3, 2.0
-#: Levers that are solved on each side at most; one is near enough if the moved estimate is no
-#: further from it than this share of the way from the optimum: where levers were solved on until
-#: the sum of squares was known within 0.4, the standard error changed by 3 % at most.
-_MOST_SOLVED, _NEAR = 3, 0.3
-#: A rise of the sum of squares below which a side is open.
-_LEAST_RISE = 0.25
-#: No side is narrower than this share of the linearised error. Near a fold the search for a moved
-#: lever may end short of the nearest one, and its sum of squares rises by too much: one of 200
-#: levers of which little is known was eleven of its errors off, on a side of a seventh.
-_NARROWEST = 0.6
-#: A linearised error that is right within this factor holds.
-_ALIKE = 1.25
 #: Confidence levels whose intervals are read off the profile of a parameter.
 LEVELS = (0.68, 0.95)
-#: Standard errors that the first points of that span on each side, and the share of a step within
-#: which a parameter is held.
-_REACH, _HELD = 2.5, 1e-3
-#: Longer and longer steps that are added on a side until the interval closes.
-_MORE_STEPS = 6
+
+
+@dataclass(frozen=True)
+class ProfileOptions:
+    """How far levers are moved for a profile of the tip temperature, and how well.
+
+    Attributes
+    ----------
+    rows : int
+        Biases, in the hotter half, at which the tip temperature is moved away.
+    distance : float
+        By how many standard errors.
+    most_solved : int
+        Levers that are solved on each side at most.
+    closeness : float
+        One is near enough if the moved estimate is no further from it than this share of the way
+        from the optimum: where levers were solved on until the sum of squares was known within 0.4,
+        the standard error changed by 3 % at most.
+    least_rise : float
+        A rise of the sum of squares below which a side is open.
+    narrowest : float
+        No side is narrower than this share of the linearised error. Near a fold the search for a
+        moved lever may end short of the nearest one, and its sum of squares rises by too much: one
+        of 200 levers of which little is known was eleven of its errors off, on a side of a seventh.
+    """
+
+    rows: int = 3
+    distance: float = 2.0
+    most_solved: int = 3
+    closeness: float = 0.3
+    least_rise: float = 0.25
+    narrowest: float = 0.6
 
 
 # --- the tip temperature ------------------------------------------------------------------------
@@ -73,8 +85,8 @@ class ErrorProfile:
 
     @property
     def linear(self) -> bool:
-        """Whether the linearised error holds everywhere."""
-        return bool(np.abs(np.log([self.below, self.above])).max() < np.log(_ALIKE))
+        """Whether the linearised error is right within a quarter everywhere."""
+        return bool(np.abs(np.log([self.below, self.above])).max() < np.log(1.25))
 
     def credible_interval(
         self, tip_K: Array, stderr_K: Array, other_K: Array
@@ -88,7 +100,9 @@ class ErrorProfile:
         return tip_K - low, tip_K + high
 
 
-def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile:
+def profile_of_tip(
+    posterior: Posterior, experiment: Experiment, options: ProfileOptions | None = None
+) -> ErrorProfile:
     """Move the tip temperature of an estimate with priors away from its optimum.
 
     On either side the lever is solved whose tip is moved away where it is hottest; what is near it
@@ -96,27 +110,29 @@ def profile_of_tip(posterior: Posterior, experiment: Experiment) -> ErrorProfile
     parameters make up for each other along a bent valley. Where no such lever is found the
     linearised error is kept, and where nothing that is unknown moves the tip there is none.
     """
-    objective, at, rows = posterior.objective, posterior.at, hotter_rows(posterior.at)
+    options, objective, at = options or ProfileOptions(), posterior.objective, posterior.at
+    rows = hotter_rows(at, options.rows)
     least = objective.squares(at)
     tips = {number: Quantity("tip", int(row)) for number, row in enumerate(rows)}
     moving = {number: tip for number, tip in tips.items() if posterior.of(tip)[1] > 0.0}
     sides = np.ones((2, rows.size))
     for side, way in enumerate((-1.0, 1.0) if moving else ()):
-        penalised = [objective.penalised(_penalty(posterior, tip, way)) for tip in moving.values()]
-        near = _solved_near(penalised[-1], posterior, experiment)
+        away = way * options.distance
+        penalised = [objective.penalised(_penalty(posterior, tip, away)) for tip in moving.values()]
+        near = _solved_near(penalised[-1], posterior, experiment, options)
         if near is None:
             continue
         for pulled, (number, tip) in zip(penalised, moving.items(), strict=True):
             there, _ = near.of(pulled).minimum()
             value, stderr = posterior.of(tip)
-            away = abs(tip.value(near.values_at(there), there) - value)
-            rise = max(near.squares(there) - least, _LEAST_RISE)
-            sides[side, number] = max(away / (stderr * np.sqrt(rise)), _NARROWEST)
+            moved = abs(tip.value(near.values_at(there), there) - value)
+            rise = max(near.squares(there) - least, options.least_rise)
+            sides[side, number] = max(moved / (stderr * np.sqrt(rise)), options.narrowest)
     return ErrorProfile(at.values[TIP, rows], *sides)
 
 
 def _solved_near(
-    penalised: Objective, posterior: Posterior, experiment: Experiment
+    penalised: Objective, posterior: Posterior, experiment: Experiment, options: ProfileOptions
 ) -> Subproblem | None:
     """Solve the lever that a pulled objective leads to, and return what is near it.
 
@@ -128,12 +144,13 @@ def _solved_near(
     # lengths in standard errors of the parameters
     errors = np.sqrt(np.diag(posterior.covariance)) / objective.coordinates.rates(optimum)
     near = Subproblem(objective, at)
-    for count in range(_MOST_SOLVED + 1):
+    for count in range(options.most_solved + 1):
         there, _ = near.of(penalised).minimum()
         step_length = np.linalg.norm((there - near.origin) / errors)
-        if count and step_length < _NEAR * np.linalg.norm((near.origin - optimum) / errors):
+        moved = np.linalg.norm((near.origin - optimum) / errors)
+        if count and step_length < options.closeness * moved:
             return near
-        if count < _MOST_SOLVED:
+        if count < options.most_solved:
             try:
                 solved = experiment.predict(objective.at(near.at.probe, there), near.at)
             except HotleverError:  # it melts below the highest bias, or cannot be drawn
@@ -142,19 +159,19 @@ def _solved_near(
     return None
 
 
-def _penalty(posterior: Posterior, tip: Quantity, way: float) -> Penalty:
-    """Return a datum that moves an estimate to `_AWAY` standard errors, if everything is linear.
+def _penalty(posterior: Posterior, tip: Quantity, away: float) -> Penalty:
+    """Return a datum that moves an estimate by so many standard errors, if everything is linear.
 
     It is twice as far away, with the error that the tip is known by: the estimate moves half way.
     """
     value, stderr = posterior.of(tip)
-    return Penalty(tip, value + 2.0 * way * _AWAY * stderr, stderr)
+    return Penalty(tip, value + 2.0 * away * stderr, stderr)
 
 
-def hotter_rows(at: Prediction) -> Index:
+def hotter_rows(at: Prediction, count: int = ProfileOptions.rows) -> Index:
     """Return the rows of the data at which limits are looked for, the hottest last."""
     order = np.argsort(at.values[TIP])
-    return order[np.linspace(order.size / 2, order.size - 1, _ROWS).astype(int)]
+    return order[np.linspace(order.size / 2, order.size - 1, count).astype(int)]
 
 
 # --- the parameters of a fit --------------------------------------------------------------------
@@ -218,22 +235,24 @@ def profile_likelihood(
     least = objective.squares(at_optimum) if objective.informed else result.sum_of_squares
     value, stderr = result.parameters[name].value, result.parameters[name].stderr
     # without a standard error, a tenth of the bounds' distance is a step as good as any
-    step = (stderr or 0.1 * (parameter.upper - parameter.lower)) * _REACH / (points // 2)
+    step = (stderr or 0.1 * (parameter.upper - parameter.lower)) * 2.5 / (points // 2)
     rows = {value: (0.0, result.probe.values(result.names))}
     reasons: dict[str, str] = {}
+    longer_steps = 6  # that are added on a side until the interval closes
     for side, sign, way, bound in (
         ("lower", -1.0, "down", parameter.lower),
         ("upper", 1.0, "up", parameter.upper),
     ):
         distance = 0.0
         near: Prediction = at_optimum
-        for count in range(1, points // 2 + _MORE_STEPS + 1):
+        for count in range(1, points // 2 + longer_steps + 1):
             distance += step * 2.0 ** max(0, count - points // 2)
             target = value + sign * distance
             if sign * (target - bound) >= 0:
                 reasons[side] = f"{way} to its bound {bound:g}"
                 break
-            penalised = objective.penalised(Penalty(quantity, target, _HELD * step))
+            # held within a thousandth of a step
+            penalised = objective.penalised(Penalty(quantity, target, 1e-3 * step))
             try:
                 start = near.probe.replace({name: target})
                 predictor = Predictor(experiment, near=near)

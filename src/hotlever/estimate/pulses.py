@@ -9,13 +9,15 @@ is that of a shorter one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from hotlever.errors import ComputationError
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import (
-    BUDGETS,
     MOMENTS,
     PULSE_COLUMNS,
     PulseCalibration,
@@ -36,25 +38,47 @@ from hotlever.probe import Probe
 from hotlever.text import BAND
 from hotlever.types import Array, Index, Progress
 
-#: Standard deviation of the heat capacity: tables of pure silicon differ by 1 to 2 %, and doping,
-#: oxides and metal on a lever are not in them.
-HEAT_CAPACITY_SPREAD = 0.03
-#: The same of what air takes up, by the properties of cold air: 7 % too much at a rise of 600 K.
-_HEAT_IN_AIR_SPREAD = 0.1
-#: Heights that are followed with the coarse mesh, and which of them with the fine one and for
-#: moved levers.
-_HEIGHTS, _SOME = 13, (12, 9, 6, 3)
-#: Points of a history for each step, and how far directions are followed (standard errors).
-_PER_STEP, _ASIDE = 8, 0.5
-#: Directions of the covariance that matter: share of the variance of a parameter that they have,
-#: and of that of the highest pulse that may be left out at others.
-_LEAST_VARIANCE, _LEFT_OUT = 1e-3, 2e-3
-#: How often a single pulse is followed for longer to find its peak.
-_LONGER = 8
+
+@dataclass(frozen=True)
+class PulseOptions:
+    """How pulses are followed, and what is uncertain in them alone.
+
+    Attributes
+    ----------
+    heat_capacity_spread : float
+        Standard deviation of the heat capacity: tables of pure silicon differ by 1 to 2 %, and
+        doping, oxides and metal on a lever are not in them.
+    heat_in_air_spread : float
+        The same of what air takes up, by the properties of cold air: 7 % too much at a rise of
+        600 K.
+    heights : int
+        That are followed with the coarse mesh.
+    chosen : sequence of int
+        Which of them are followed with the fine one and for moved levers, falling.
+    per_step : int
+        Points of a history for each step.
+    distance : float
+        How far directions of the covariance are followed, in standard errors.
+    least_variance, neglected : float
+        Directions that matter: share of the variance of a parameter that they have, and of that of
+        the highest pulse that may be left out at others.
+    """
+
+    heat_capacity_spread: float = 0.03
+    heat_in_air_spread: float = 0.1
+    heights: int = 13
+    chosen: Sequence[int] = (12, 9, 6, 3)
+    per_step: int = 8
+    distance: float = 0.5
+    least_variance: float = 1e-3
+    neglected: float = 2e-3
 
 
 def pulse_calibration(
-    solution: Solution, timing: PulseTiming, progress: Progress | None = None
+    solution: Solution,
+    timing: PulseTiming,
+    progress: Progress | None = None,
+    options: PulseOptions | None = None,
 ) -> PulseCalibration:
     """Return what an estimated lever does in a pulse, over the heights of its measured range.
 
@@ -64,38 +88,39 @@ def pulse_calibration(
     timing : PulseTiming
     progress : callable, optional
         Called with the pulses followed and how many there are, about.
+    options : PulseOptions, optional
 
     Raises
     ------
     ComputationError
         If the lever cannot be followed in time.
     """
-    bias = measured_range(solution)
-    pulses = _Pulses(solution, bias, timing, progress)
-    directions = solution.posterior.principal_steps(_LEAST_VARIANCE)
+    bias, options = measured_range(solution), options or PulseOptions()
+    pulses = _Pulses(solution, bias, timing, progress, options)
+    directions = solution.posterior.principal_steps(options.least_variance)
     axes: Index = np.arange(len(directions))
     corrections, changes = [], []
-    for row in _SOME:
+    for row in options.chosen:
         change = np.zeros((len(directions) + 1, len(MOMENTS)))
         for axis in axes:
             change[axis] = pulses.along(row, directions[axis])
-        change[-1] = pulses.change(row, pulses.coarse, slower=1.0 + HEAT_CAPACITY_SPREAD)
+        change[-1] = pulses.change(row, pulses.coarse, slower=1.0 + options.heat_capacity_spread)
         corrections.append(pulses.change(row, pulses.fine))
         changes.append(change)
-        if row == _SOME[0]:
+        if row == options.chosen[0]:
             # the directions that hold nearly all of the variance
             shares = (change[:-1] ** 2 / (change[:-1] ** 2).sum(axis=0)).max(axis=1)
             order = np.argsort(shares)
-            axes = np.sort(order[np.cumsum(shares[order]) > _LEFT_OUT])
-    heights = pulses.heights
+            axes = np.sort(order[np.cumsum(shares[order]) > options.neglected])
+    heights, some = pulses.heights, pulses.heights[list(options.chosen)]
     # over V² they hardly change when cold
     by_square = CubicSpline(heights, np.log(pulses.rises / heights[:, None] ** 2))
     rise = bias[:, None] ** 2 * np.exp(by_square(bias))
-    rise *= 1.0 + _through(heights[list(_SOME)], corrections, bias)
-    slopes = rise[:, None] * _through(heights[list(_SOME)], changes, bias)
+    rise *= 1.0 + _through(some, corrections, bias)
+    slopes = rise[:, None] * _through(some, changes, bias)
     # with the base the whole lever gets warmer
     slopes[:, :-1] += np.array([[direction.get(BASE, 0.0)] for direction in directions])
-    return _with_errors(solution, bias, timing, rise, slopes, directions)
+    return _with_errors(solution, bias, timing, rise, slopes, directions, options)
 
 
 class _Pulses:
@@ -105,11 +130,17 @@ class _Pulses:
     """
 
     def __init__(
-        self, solution: Solution, bias: Array, timing: PulseTiming, progress: Progress | None
+        self,
+        solution: Solution,
+        bias: Array,
+        timing: PulseTiming,
+        progress: Progress | None,
+        options: PulseOptions,
     ) -> None:
         self._probe, self._timing, self._progress = solution.probe, timing, progress
-        self._done, self._all = 0, 2 * (_HEIGHTS + len(solution.objective.varied))
-        self.heights = np.linspace(float(bias[0]), float(bias[-1]), _HEIGHTS)
+        self._options = options
+        self._done, self._all = 0, 2 * (options.heights + len(solution.objective.varied))
+        self.heights = np.linspace(float(bias[0]), float(bias[-1]), options.heights)
         self.coarse, self.fine = Lever(solution.probe, COARSE), Lever(solution.probe)
         self._similar = SimilarLevers(self.coarse)
         # a train settles sooner from where one that is a little lower has
@@ -132,9 +163,9 @@ class _Pulses:
         The other way if it melts this way, or its mesh turns over.
         """
         try:
-            return self._aside(row, direction, -_ASIDE)
+            return self._aside(row, direction, -self._options.distance)
         except ComputationError:
-            return self._aside(row, direction, _ASIDE)
+            return self._aside(row, direction, self._options.distance)
 
     def _aside(self, row: int, direction: dict[str, float], way: float) -> Array:
         values = self._probe.values(list(direction)) + way * np.array(list(direction.values()))
@@ -149,15 +180,16 @@ class _Pulses:
         A lever that holds more heat does the same more slowly: its pulse is that of a shorter one.
         """
         length, period = self._timing.length_us / slower, self._timing.period_us
-        wave, state = pulse(float(height), length), None
+        wave, state, per_step = pulse(float(height), length), None, self._options.per_step
         if period is None:
-            for longer in range(1, _LONGER + 1):
-                history = simulate(lever, wave, length * 2.0**longer, per_step=_PER_STEP)
+            # for longer, until its peak has passed
+            for longer in range(1, 9):
+                history = simulate(lever, wave, length * 2.0**longer, per_step=per_step)
                 if int(history.tip_K.values.argmax()) < history.sizes["time"] - 1:
                     break
         else:
             history, state = cyclic_steady_state(
-                lever, wave, period / slower, start=near, per_step=_PER_STEP
+                lever, wave, period / slower, start=near, per_step=per_step
             )
         self._done += 1
         if self._progress is not None:
@@ -184,6 +216,7 @@ def _with_errors(
     rise: Array,
     slopes: Array,
     directions: list[dict[str, float]],
+    options: PulseOptions,
 ) -> PulseCalibration:
     """Return rises (n, moments) with errors, by their changes (n, directions + 1, moments)."""
     probe, varied = solution.probe, solution.objective.varied
@@ -196,8 +229,8 @@ def _with_errors(
     parts["heat capacity"] = np.abs(slopes[:, -1])
     around = probe.surroundings
     if around.medium == "air":
-        share = _share_of_air(probe, timing.length_us) / HEAT_CAPACITY_SPREAD
-        parts["heat in air"] = parts["heat capacity"] * _HEAT_IN_AIR_SPREAD * share
+        share = _share_of_air(probe, timing.length_us) / options.heat_capacity_spread
+        parts["heat in air"] = parts["heat capacity"] * options.heat_in_air_spread * share
     of_model = [error_of_model(around, bias, column) for column in rise.T]
     parts["model"] = np.stack(of_model, axis=1)
     tip = probe.circuit.base_temperature_K + rise
@@ -207,7 +240,7 @@ def _with_errors(
     columns = dict(zip(PULSE_COLUMNS, rows.T, strict=True))
     peak = MOMENTS.index("peak")
     budget = {source: part[:, peak] for source, part in parts.items()}
-    return PulseCalibration(timing, table_with_budgets(columns, {BUDGETS[0]: budget}, "height"))
+    return PulseCalibration(timing, table_with_budgets(columns, {"budget_K": budget}, "height"))
 
 
 def _share_of_air(probe: Probe, time_us: float) -> float:

@@ -21,15 +21,6 @@ from hotlever.probe.priors import PriorShift
 from hotlever.quantities import FITTED
 from hotlever.types import Array
 
-#: Observables that have a zero.
-ZEROED = ("current", "reader", "bridge")
-#: A zero is worth a note beyond this many standard errors.
-_NOTICED = 7.0
-
-#: A model is off by nearly the same near a sample and away from it: of its discrepancy so much is
-#: left in the difference, which is what rows at several distances tell.
-_OF_DIFFERENCES = 0.05
-
 
 class Residuals:
     """The weighted differences of a measurement from predictions.
@@ -241,7 +232,9 @@ class Residuals:
         """
         difference = self.own_difference(values)
         if self.distance_um is not None and np.unique(self.distance_um).size > 1:
-            discrepancy *= _OF_DIFFERENCES
+            # a model is off by nearly the same near a sample and away from it: so much is left in
+            # the difference, which is what rows at several distances tell
+            discrepancy *= 0.05
         self.errors.take_scatter(difference, values[self.rows], leverage, discrepancy)
 
     def drifting_zeros(self, values: Array, slopes: Array) -> list[str]:
@@ -266,8 +259,8 @@ class Residuals:
 class Drift:
     """Straight lines over the rows of some observables.
 
-    Those of `ZEROED` get a line; `present`, (k, n), says which data there are. Weights, by which
-    residuals are multiplied, have the same shape.
+    Current, reader and bridge have a zero, and get a line; `present`, (k, n), says which data there
+    are. Weights, by which residuals are multiplied, have the same shape.
     """
 
     def __init__(self, observables: Sequence[str], present: NDArray[np.bool_]) -> None:
@@ -275,7 +268,7 @@ class Drift:
         order = np.linspace(-1.0, 1.0, present.shape[1])
         self._columns = np.zeros((*present.shape, 2 * len(self._names)))
         for row, name in enumerate(self._names):
-            if name in ZEROED:
+            if name in ("current", "reader", "bridge"):
                 self._columns[row, :, 2 * row] = 1.0
                 self._columns[row, :, 2 * row + 1] = order
         nonzero = np.any(self._columns, axis=(0, 1))
@@ -299,7 +292,7 @@ class Drift:
         # each datum's own variance, as in the covariance of the parameters
         influence = inverse @ columns.T * rest
         errors = np.sqrt((influence**2).sum(axis=1))
-        out = np.abs(sizes) > _NOTICED * errors
+        out = np.abs(sizes) > 7.0 * errors
         lines, which = self._columns @ sizes, np.any(self._columns, axis=1) @ out
         return [
             f"{name}: the zero seems to go from {first:+.3g} to {last:+.3g} "

@@ -34,8 +34,6 @@ from hotlever.types import Array, Progress
 
 #: Quantiles (%) of a predictive band: median, 68 % and 95 %.
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
-#: Standard deviations from which on a solved lever tells of those that samples reach.
-_TELLING = 1.0
 
 
 class SampledLever:
@@ -133,7 +131,8 @@ def sample_tip(
     sampled costs too little for processes of its own.
     """
     objective, at = posterior.objective, posterior.at
-    near = Subproblem(objective, at, predictor.others(at), least=_TELLING)
+    # a solved lever that far away tells of those that samples reach
+    near = Subproblem(objective, at, predictor.others(at), least=1.0)
     drawn, rows = draw_samples(Trials(near), samples, progress=progress), hotter_rows(at)
     # one that counts for much is there several times
     different, index = np.unique(drawn.points, axis=0, return_inverse=True)

@@ -36,20 +36,6 @@ from hotlever.probe.priors import Prior, PriorUse, default_priors
 from hotlever.probe.probe_parameters import dimensions_of, parameters_of
 from hotlever.types import Array, Progress
 
-#: A lever is far from data that differ from what it shows by this share of the largest (median).
-_FAR = 0.06
-#: Portions by which a lever grows, the last of which is all of the rows; the least rows of one.
-_PORTIONS, _FEWEST_ROWS = 6, 3
-#: By how much the usual priors are widened, and the spread of what has none, where only the
-#: directions are to be closed that a few cold rows leave open.
-_WIDENED, _OPEN = 4.0, 0.5
-#: Share of a dimension by which a mesh follows it well; edges' bias moves all of them.
-_MESH_FOLLOWS = 0.2
-#: A portion is to be met within some per cent: the next moves the lever anyway.
-_OF_PORTIONS = SearchOptions(
-    most_branches=4, decrement=2.0, scatter_rounds=0, first_region=0.7, largest_region=1.2
-)
-
 
 @dataclass(frozen=True)
 class Solution(Optimum):
@@ -194,8 +180,13 @@ class Search:
         bias = np.abs(measurement.bias_V)
         current = measurement.current(start.circuit)
         heated = np.unique(bias[np.isfinite(current) & (bias > 0)])
-        for portion in range(1, _PORTIONS):
-            count = max(_FEWEST_ROWS, -(-heated.size * portion // _PORTIONS))
+        portions = 6  # the last of which is all of the rows
+        # each is to be met within some per cent: the next moves the lever anyway
+        options = SearchOptions(
+            most_branches=4, decrement=2.0, scatter_rounds=0, first_region=0.7, largest_region=1.2
+        )
+        for portion in range(1, portions):
+            count = max(3, -(-heated.size * portion // portions))
             if count >= heated.size:
                 break
             part = measurement.part(bias <= heated[count - 1])
@@ -212,7 +203,7 @@ class Search:
             # what is seen of a portion is not seen at the rows of the measurement
             predictor = Predictor(of_part, self.progress, before=before)
             try:
-                start = Optimiser(objective, predictor, _OF_PORTIONS).solve(start).probe
+                start = Optimiser(objective, predictor, options).solve(start).probe
                 before = predictor.evaluations
             except ComputationError:
                 if portion == 1:
@@ -225,27 +216,34 @@ class Search:
 def _is_far(residuals: Residuals, at: Prediction) -> bool:
     """Whether a lever shows something else than the data."""
     share = residuals.difference(at.values) / residuals.largest
-    # a few wrong rows are no other lever
-    return bool(np.nanmax(np.nanmedian(np.abs(share), axis=1)) > _FAR)
+    # by the median: a few wrong rows are no other lever
+    return bool(np.nanmax(np.nanmedian(np.abs(share), axis=1)) > 0.06)
 
 
 def _has_moved(drawn: Probe, probe: Probe) -> bool:
     """Whether a probe's dimensions are far from those that a mesh was drawn with."""
     names = dimensions_of(probe)
     before, now = drawn.values(names), probe.values(names)
-    return bool(np.any(np.abs(now - before) > _MESH_FOLLOWS * np.abs(before)))
+    # a mesh follows a fifth well; edges' bias moves all of them
+    return bool(np.any(np.abs(now - before) > 0.2 * np.abs(before)))
 
 
-def _closing(probe: Probe, varied: Sequence[str]) -> dict[str, Prior]:
-    """Return wide priors about a probe for all that is varied."""
+def _closing(
+    probe: Probe, varied: Sequence[str], widening: float = 4.0, spread: float = 0.5
+) -> dict[str, Prior]:
+    """Return wide priors about a probe for all that is varied.
+
+    They close only the directions that a few cold rows leave open: the usual ones are widened, and
+    what has none gets a spread.
+    """
     usual, every = default_priors(probe), parameters_of(probe, anywhere=True)
     closing = {}
     for name, value in zip(varied, probe.values(list(varied)).tolist(), strict=True):
         if name in usual:
             prior = usual[name]
-            closing[name] = Prior(value, _WIDENED * prior.spread, prior.relative)
+            closing[name] = Prior(value, widening * prior.spread, prior.relative)
         elif every[name].lower > 0:
-            closing[name] = Prior(value, _OPEN)
+            closing[name] = Prior(value, spread)
         else:
-            closing[name] = Prior(value, _OPEN * every[name].scale, relative=False)
+            closing[name] = Prior(value, spread * every[name].scale, relative=False)
     return closing

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.tip_table import BUDGETS, PulseCalibration, budgets_of
+from hotlever.estimate.tip_table import PulseCalibration, budgets_of
 from hotlever.estimate.uncertainty_budget import TemperatureBudget
 from hotlever.materials.parameters import own_name, scale_of, scaled_unit
 from hotlever.probe.priors import PriorUse
@@ -18,45 +18,11 @@ from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.text import NOT_DETERMINED, aligned, significant, value_with_error
 from hotlever.types import Array
 
-#: A prior is named as leaned on where its data narrow it to no less than this share, and as moved
-#: where they move it by so many of its standard deviations.
-_LEANED_ON, _LARGE_SHIFT = 0.9, 1.0
 #: What the numbers of a fit are that does not describe its data.
 NEAREST = (
     "what follows is of the lever that comes nearest, and no estimate: errors are not stated, "
     "since they would not hold"
 )
-#: Caption of the temperatures at a contact.
-_OF_THE_APEX = (
-    "in contact: the apex with its error by source, and the surface of the sample under it"
-)
-#: Tip temperatures (K) at which the error budget is printed.
-_SHOWN, _FEW = (400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0), 4
-#: What each route rests on, in words.
-_BASIS = {
-    "power law": "a given power law",
-    "probe": "a probe like this lever, brought up to date by these data",
-    "fit in vacuum": "a fit of this lever in vacuum, and these data",
-    "fit in air": "a fit of this lever in air, and these data",
-}
-#: What would make the largest error smaller, by its source.
-_ADVICE = {
-    "measurement": "less noise, or {temperatures}, would help",
-    "geometry": "better known dimensions would help (--prior dimensions=±2%)",
-    "material": "a fit of this lever (--fit), or {temperatures}, would know its material",
-    "laws": "{temperatures} would help; what is known better of a law may be said "
-    "(--prior law.n_i=±5%)",
-    "fit": "more data for the fit would help",
-    "air": "a fit in air would measure the loss to air",
-    "k": "a finer measurement near the knee would help",
-    "constant k": "--medium air would not assume a constant k",
-    "electronics": "better known meters would help",
-    "contact": "melting points, or the current in and out of contact, would help",
-    "base temperature": "a thermometer at the chip would help",
-}
-#: Errors (K) up to which a calibration is called good, and fair.
-_GOOD, _FAIR = 15.0, 40.0
-
 
 # --- of the parameters --------------------------------------------------------------------------
 
@@ -106,12 +72,16 @@ def _tip_in_time(band: xr.Dataset) -> str:
 
 
 def prior_lines(priors: Mapping[str, PriorUse]) -> list[str]:
-    """Say which priors an answer leans on, and which the data moved far."""
-    leaned = [name for name, use in priors.items() if use.spread_ratio > _LEANED_ON]
+    """Say which priors an answer leans on, and which the data moved far.
+
+    That is where the data narrow them to no less than nine tenths, and where they move them by more
+    than their standard deviation.
+    """
+    leaned = [name for name, use in priors.items() if use.spread_ratio > 0.9]
     shifts = [
         f"{name} by {use.shift:+.1f} σ to {use.posterior_value:.4g}"
         for name, use in priors.items()
-        if abs(use.shift) > _LARGE_SHIFT
+        if abs(use.shift) > 1.0
     ]
     lines = {
         "moved by the data beyond what was known before": shifts,
@@ -140,13 +110,20 @@ class Parts(NamedTuple):
 
 def calibration_parts(calibration: Estimate) -> Parts:
     """Return what a calibration says in words and tables; of one not described no table."""
-    basis = f"based on {_BASIS[calibration.route]}, used in {calibration.medium}"
+    routes = {
+        "power law": "a given power law",
+        "probe": "a probe like this lever, brought up to date by these data",
+        "fit in vacuum": "a fit of this lever in vacuum, and these data",
+        "fit in air": "a fit of this lever in air, and these data",
+    }
+    basis = f"based on {routes[calibration.route]}, used in {calibration.medium}"
     after, tables = prior_lines(calibration.priors), []
     if calibration.describes_data:
         before = [basis, *_knee_lines(calibration), _law_line(calibration)]
         tables = [("", _budget_rows(calibration))]
-        if BUDGETS[1] in calibration.table:
-            tables.append((_OF_THE_APEX, _apex_rows(calibration)))
+        if "apex_budget_K" in calibration.table:
+            caption = "in contact: the apex with its error by source, and the surface of the sample"
+            tables.append((f"{caption} under it", _apex_rows(calibration)))
         if calibration.pulse is not None:
             tables.append((calibration.pulse.timing.text, _pulse_rows(calibration.pulse)))
         stated = significant(calibration.tip_temperature_uncertainty_K)
@@ -259,9 +236,10 @@ def _budget_rows(calibration: Estimate) -> list[list[str]]:
     """
     table, tip = calibration.heating, calibration.heating.tip_K.values
     tells = ("V_b (V)", "bias_V") if calibration.power_law is None else ("P_l (mW)", "power_mW")
-    temperatures = np.array([kelvins for kelvins in _SHOWN if tip[0] <= kelvins <= tip[-1]])
-    if temperatures.size < _FEW:  # a cold lever, or a short range
-        temperatures = np.linspace(tip[0], tip[-1], _FEW + 1)[1:].round(1)
+    usual = np.array([400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0])
+    temperatures = usual[(tip[0] <= usual) & (usual <= tip[-1])]
+    if temperatures.size < 4:  # a cold lever, or a short range
+        temperatures = np.linspace(tip[0], tip[-1], 5)[1:].round(1)
     columns = [("T_tip (K)", "tip_K", 0), (*tells, 3), ("± (K)", "tip_stderr_K", 1)]
     return _rows(table, columns, temperatures)
 
@@ -271,13 +249,13 @@ def _apex_rows(calibration: Estimate) -> list[list[str]]:
     temperatures = [float(row[0]) for row in _budget_rows(calibration)[1:]]
     columns = [("T_tip (K)", "tip_K", 0), ("apex (K)", "apex_K", 0), ("± (K)", "apex_stderr_K", 1)]
     columns += [("surface (K)", "surface_K", 0), ("± (K)", "surface_stderr_K", 1)]
-    return _rows(calibration.heating, columns, np.array(temperatures), BUDGETS[1])
+    return _rows(calibration.heating, columns, np.array(temperatures), "apex_budget_K")
 
 
 def _pulse_rows(pulse: PulseCalibration) -> list[list[str]]:
     """Return heights of the pulse for some peak temperatures, with the error by source."""
     first, last = pulse.table.peak_K.values[[0, -1]]
-    peak = np.linspace(first, last, _FEW + 2)[1:].round(0 if last - first > 50 else 1)
+    peak = np.linspace(first, last, 6)[1:].round(0 if last - first > 50 else 1)
     columns = [("peak (K)", "peak_K", 0), ("height (V)", "height_V", 3)]
     columns += [("± (K)", "peak_stderr_K", 1)]
     columns += [(f"{moment} (K)", f"{moment}_K", 0) for moment in ("end", "mean")]
@@ -285,7 +263,7 @@ def _pulse_rows(pulse: PulseCalibration) -> list[list[str]]:
 
 
 def _rows(
-    table: xr.Dataset, columns: list[tuple[str, str, int]], at: Array, budget: str = BUDGETS[0]
+    table: xr.Dataset, columns: list[tuple[str, str, int]], at: Array, budget: str = "budget_K"
 ) -> list[list[str]]:
     """Return columns of a table as cells where the first has some values, then a budget.
 
@@ -303,8 +281,8 @@ def _rows(
 
 def _verdict(calibration: Estimate) -> str:
     stated = calibration.tip_temperature_uncertainty_K
-    word = "good" if stated <= _GOOD else "fair" if stated <= _FAIR else "rough"
-    budget = budgets_of(calibration.table)[BUDGETS[0]]
+    word = "good" if stated <= 15.0 else "fair" if stated <= 40.0 else "rough"
+    budget = budgets_of(calibration.table)["budget_K"]
     largest = max(budget, key=lambda source: np.fmax.reduce(budget[source]))
     text = f"which is {word}; most of it is from {largest}"
     by_law = calibration.route == "power law"
@@ -313,10 +291,25 @@ def _verdict(calibration: Estimate) -> str:
         edges = [f"{name}=±0.05" for name in calibration.priors if own_name(name) == EDGE_BIAS]
         known = ", ".join([*edges, "thickness_um=±2%"])
         return f"{text}: a better known drawing would help (--prior {known})"
-    if largest in _ADVICE and not (by_law and largest == "constant k"):
-        measured = "tip" in calibration.observables
-        temperatures = "more tip temperatures" if measured else "tip temperatures at some points"
-        return f"{text}: {_ADVICE[largest].format(temperatures=temperatures)}"
+    measured = "tip" in calibration.observables
+    temperatures = "more tip temperatures" if measured else "tip temperatures at some points"
+    # what would make the largest error smaller, by its source
+    advice = {
+        "measurement": f"less noise, or {temperatures}, would help",
+        "geometry": "better known dimensions would help (--prior dimensions=±2%)",
+        "material": f"a fit of this lever (--fit), or {temperatures}, would know its material",
+        "laws": f"{temperatures} would help; what is known better of a law may be said "
+        "(--prior law.n_i=±5%)",
+        "fit": "more data for the fit would help",
+        "air": "a fit in air would measure the loss to air",
+        "k": "a finer measurement near the knee would help",
+        "constant k": "--medium air would not assume a constant k",
+        "electronics": "better known meters would help",
+        "contact": "melting points, or the current in and out of contact, would help",
+        "base temperature": "a thermometer at the chip would help",
+    }
+    if largest in advice and not (by_law and largest == "constant k"):
+        return f"{text}: {advice[largest]}"
     if by_law:
         return f"{text}; a probe (--probe) or a fit (--fit) would know more than a power law"
     return text

@@ -40,12 +40,6 @@ from hotlever.quantities import OBSERVABLES
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
-#: Near a fold the states at a bias move without limit as parameters change; their derivatives
-#: count as if the bias rose along the branch by at least this share of its mean slope up to there.
-_LEAST_SLOPE = 0.03
-#: Where the observables have the tip temperature.
-_TIP = list(OBSERVABLES).index("tip")
-
 
 @dataclass(frozen=True)
 class Rows:
@@ -156,9 +150,13 @@ class Rows:
         return np.asarray(np.nansum(((values - measured[:, rows]) / largest) ** 2, axis=0))
 
     def _steepen(self, along: Array, circuit: Circuit, u: Array) -> None:
-        """Let the bias rise where it hardly does, in derivatives by u (n, 5) of what is shown."""
+        """Let the bias rise where it hardly does, in derivatives by u (n, 5) of what is shown.
+
+        Near a fold the states at a bias move without limit as parameters change; their derivatives
+        count as if the bias rose along the branch by at least 3 % of its mean slope up to there.
+        """
         slope = circuit.bias(along[:, 0], along[:, 1])
-        least = _LEAST_SLOPE * np.abs(self.bias_V) / np.maximum(np.abs(u), 1e-9)
+        least = 0.03 * np.abs(self.bias_V) / np.maximum(np.abs(u), 1e-9)
         flat = np.abs(slope) < least
         along[flat, 0] += (np.where(slope < 0, -least, least) - slope)[flat]
 
@@ -202,7 +200,8 @@ class ContactTemperatures:
             return observables, slopes
         ratio = parameters[self._own] / self._origin
         base_K = self._law.base_temperature_K + float(self._of_base @ (self._origin * (ratio - 1)))
-        rise = observables[_TIP] - base_K
+        tip = list(OBSERVABLES).index("tip")
+        rise = observables[tip] - base_K
         odds, by = self._law.log_odds(rise, self._names)
         powers = np.zeros((*odds.shape, len(self._names)))
         for number, name in enumerate(self._names):
@@ -210,7 +209,7 @@ class ContactTemperatures:
         share = 1.0 / (1.0 + np.exp(-odds - powers @ np.log(ratio)))
         bent = rise * share * (1.0 - share)
         by_tip = share + bent * by["T"]
-        added = by_tip[..., None] * slopes[_TIP]
+        added = by_tip[..., None] * slopes[tip]
         added[..., self._own] += bent[..., None] * powers / (ratio * self._origin)
         added[..., self._own] += (1.0 - by_tip)[..., None] * self._of_base
         return np.concatenate([observables, base_K + rise * share]), np.concatenate([slopes, added])

@@ -22,34 +22,28 @@ from hotlever.types import Array, Mask
 #: Columns of a calibration's table; the last say how sure it is.
 STATED = ("tip_stderr_K", "tip_low_K", "tip_high_K")
 TABLE_COLUMNS = ("bias_V", "lever_V", "current_mA", "power_mW", "tip_K", *STATED)
-#: One more with held supplies: the power of all of them together.
-TOTAL_POWER = "total_power_mW"
 #: More of a tip in contact: its apex and the sample's surface under it, and their standard errors.
 OF_THE_CONTACT = ("apex_K", "apex_stderr_K", "surface_K", "surface_stderr_K")
-#: The standard errors of the tip and, in contact, the apex by source; both have the same sources.
-BUDGETS = ("budget_K", "apex_budget_K")
-Budgets = Mapping[str, Mapping[str, Array]]
-#: A table has more rows where the tip rises by more than this (K) from one to the next.
-STEEP_K = 10.0
-#: Between rows further apart (K), and by so many times further than those beside them, a lever
-#: jumps.
-_FAR_K, _FURTHER = 2.5 * STEEP_K, 2.4
-#: Rows of a table for an instrument.
-MOST_ROWS = 10_000
 #: What rows may be even in, by the word for it: their column and its unit.
 TABLES_BY = {"temperature": ("tip_K", "K"), "power": ("power_mW", "mW"), "bias": ("bias_V", "V")}
 #: What is told of a pulse: its highest tip temperature, that at its end, and the mean during it.
 MOMENTS = ("peak", "end", "mean")
-_KINDS = ("_K", "_stderr_K", "_low_K", "_high_K")
-#: Columns of the table.
-PULSE_COLUMNS = ("height_V", *(f"{moment}{kind}" for moment in MOMENTS for kind in _KINDS))
+#: Columns of the table of a pulse.
+PULSE_COLUMNS = (
+    "height_V",
+    *(f"{moment}{of}_K" for moment in MOMENTS for of in ("", "_stderr", "_low", "_high")),
+)
 
 
 def table_with_budgets(
-    columns: Mapping[str, Array], budgets: Budgets, along: str = "bias"
+    columns: Mapping[str, Array], budgets: Mapping[str, Mapping[str, Array]], along: str = "bias"
 ) -> xr.Dataset:
-    """Return columns on a dimension, rising in ``{along}_V``, and `BUDGETS` by ``source``."""
-    sources = list(budgets[BUDGETS[0]])
+    """Return columns on a dimension, rising in ``{along}_V``, and budgets by ``source``.
+
+    They are the standard errors of the tip, ``budget_K``, and in contact ``apex_budget_K``; both
+    have the same sources.
+    """
+    sources = list(budgets["budget_K"])
     errors = {
         name: (("source", along), np.array([parts[source] for source in sources]))
         for name, parts in budgets.items()
@@ -62,7 +56,7 @@ def budgets_of(table: xr.Dataset) -> dict[str, dict[str, Array]]:
     """Return the standard errors (K) of a table by source, independent of each other."""
     return {
         name: dict(zip(table.source.values.tolist(), table[name].values, strict=True))
-        for name in BUDGETS
+        for name in ("budget_K", "apex_budget_K")
         if name in table
     }
 
@@ -84,14 +78,15 @@ def interpolated(
 def _no_jump(table: xr.Dataset, along: str, at: Array, tip: str) -> Mask:
     """Return whether values of a column are those of a row, or lie between two near each other."""
     rising, steps = table[along].values, np.abs(np.diff(table[tip].values))
-    # tables of 0.1 have no more rows where the tip is steep: neighbours are as far apart there
+    # a lever jumps between rows that are much further apart than `with_steep_rows` puts them, and
+    # than those beside them: tables of 0.1 have no more rows where the tip is steep
     beside = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))
-    smooth = np.concatenate([[False], steps <= np.maximum(_FAR_K, _FURTHER * beside), [False]])
+    smooth = np.concatenate([[False], steps <= np.maximum(25.0, 2.4 * beside), [False]])
     return np.asarray(smooth[np.searchsorted(rising, at, side="right")] | np.isin(at, rising))
 
 
-def with_steep_rows(even: Array, bias: Array, tip: Array) -> Array:
-    """Return biases (V), and more between them where the tip rises by more than `STEEP_K`.
+def with_steep_rows(even: Array, bias: Array, tip: Array, steep_K: float = 10.0) -> Array:
+    """Return biases (V), and more between them where the tip rises by more than `steep_K`.
 
     Where a ramp of the bias jumps there are none: no bias leads to what lies between.
 
@@ -106,8 +101,8 @@ def with_steep_rows(even: Array, bias: Array, tip: Array) -> Array:
     for low, high in pairwise(even):
         inside = (bias >= low) & (bias <= high)
         here, rises = tip[inside], np.diff(tip[inside])
-        if rises.sum() > STEEP_K and np.all((rises > 0.0) & (rises < STEEP_K)):
-            between = np.linspace(here[0], here[-1], int(np.ceil(rises.sum() / STEEP_K)) + 1)
+        if rises.sum() > steep_K and np.all((rises > 0.0) & (rises < steep_K)):
+            between = np.linspace(here[0], here[-1], int(np.ceil(rises.sum() / steep_K)) + 1)
             rows.append(np.interp(between[1:-1], here, bias[inside]))
     return np.unique(np.concatenate(rows))
 
@@ -119,6 +114,7 @@ def even_rows(
     step: float | None = None,
     tip: str = "tip_K",
     fewest: int = 50,
+    most: int = 10_000,
 ) -> dict[str, Array]:
     """Return columns of a table at even values of one of them, and at its ends.
 
@@ -136,13 +132,13 @@ def even_rows(
         In its unit; by default the largest of 1, 2 and 5 times a power of ten that gives enough.
     tip : str
         The column of tip temperatures.
-    fewest : int
-        So many rows are enough.
+    fewest, most : int
+        So many rows are enough, and no more are allowed.
 
     Raises
     ------
     InputError
-        If the column does not rise, or there would be more than `MOST_ROWS`.
+        If the column does not rise, or there would be more than `most`.
     """
     values, unit, meaning = table[along].values, QUANTITIES[along].unit, QUANTITIES[along].meaning
     if not np.all(np.diff(values) > 0.0):
@@ -151,10 +147,10 @@ def even_rows(
         largest = np.ptp(values) / fewest
         power = 10.0 ** np.floor(np.log10(largest))
         step = float(power * max(digit for digit in (1, 2, 5) if digit * power <= largest))
-    if np.ptp(values) > MOST_ROWS * step:
+    if np.ptp(values) > most * step:
         raise InputError(
             f"a table by {meaning}: found a step of {step:g} {unit} over {np.ptp(values):.4g} "
-            f"{unit}, expected at most {MOST_ROWS} rows"
+            f"{unit}, expected at most {most} rows"
         )
     even = step * np.arange(np.floor(values[0] / step) + 1.0, np.ceil(values[-1] / step))
     # steps such as 0.1 are no binary numbers
@@ -169,7 +165,7 @@ def table_by_bias(
     bias: Array,
     current: Array,
     tip: Array,
-    budgets: Budgets,
+    budgets: Mapping[str, Mapping[str, Array]],
     limits: tuple[Array, Array] | None = None,
     more: Mapping[str, Array] | None = None,
 ) -> xr.Dataset:
@@ -177,7 +173,7 @@ def table_by_bias(
 
     95 % lie between the limits, or as far away as the errors say. There may be `more` columns.
     """
-    stderr, lever = total_error(budgets[BUDGETS[0]]), circuit.lever_voltage(bias, current)
+    stderr, lever = total_error(budgets["budget_K"]), circuit.lever_voltage(bias, current)
     low, high = limits or (tip - BAND * stderr, tip + BAND * stderr)
     values = (bias, lever, current, lever * current, tip, stderr, low, high)
     columns = dict(zip(TABLE_COLUMNS, values, strict=True))

@@ -22,8 +22,6 @@ from hotlever.estimate.posterior import Posterior, standard_errors
 from hotlever.estimate.profile import profile_of_tip
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import (
-    BUDGETS,
-    TOTAL_POWER,
     table_by_bias,
     total_error,
     with_steep_rows,
@@ -40,8 +38,6 @@ from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
 
-#: Even rows of the table, and biases by which it is found where the tip is steep.
-_ROWS, _FINE = 101, 10_001
 #: By which source of error a parameter counts that is not the lever's own.
 OF_THE_MEASUREMENT = {
     **dict.fromkeys(
@@ -54,20 +50,6 @@ OF_THE_MEASUREMENT = {
     CHIP: "base temperature",
     "interface_K_per_mW": "contact",
 }
-#: Share of the rise by which the flat lever, or air as panels, differ from full 3-D where the tip
-#: is no steeper in bias than that of a lever of constant properties (benchmarks/air.py).
-_MODEL = {"vacuum": 3e-4, "air": 7e-4}
-#: The same by the jump of the air's temperature at surfaces, where no accommodation is stated: with
-#: one of 0.9 air takes up 6 % less, more where the lever is narrow, and an estimate without it is
-#: off by so much (rms of six simulated levers from number 1000 on, of both shapes, linearised).
-_JUMP = 7e-3
-#: Share by which the resistances of tip and sample differ from full 3-D (benchmarks/contact.py).
-_CONTACT = 0.022
-#: Rows that are on another part of the branch than a ramp takes by more than so many kelvins, so
-#: many of them, show no such lever: one or two beside a jump may.
-_ASIDE_K, _ROWS_ASIDE = 20.0, 3
-#: How far above a fold the state after the jump is read, as a share of the bias.
-_BEYOND = 1e-6
 
 
 class TipByBias(NamedTuple):
@@ -129,9 +111,9 @@ def tip_by_bias(
         high = np.where(here, np.maximum(high, jump.hot_K), high)
         either = here * (jump.hot_K - jump.cold_K) / (2.0 * BAND)
         parts["jump"] = np.hypot(parts.get("jump", 0.0), either)
-    more, budgets = dict[str, Array](), {BUDGETS[0]: parts}
+    more, budgets = dict[str, Array](), {"budget_K": parts}
     if probe.contact is not None:
-        more, budgets[BUDGETS[1]] = _at_the_contact(solution, predicted, parts)
+        more, budgets["apex_budget_K"] = _at_the_contact(solution, predicted, parts)
     table = table_by_bias(circuit, bias, predicted.values[0], tip, budgets, (low, high), more)
     if not circuit.starts_cold:
         # the held supplies' part is within a coarse mesh's error
@@ -139,7 +121,7 @@ def tip_by_bias(
         swept = branch.x[-1] * branch.equations.observed(branch.x)[1]
         held = spline_through(branch.u, branch.equations.power(branch.x) - swept)
         total = table.power_mW.values + held(branch.read(circuit, bias).u)
-        table[TOTAL_POWER] = quantity(TOTAL_POWER, "bias", total)
+        table["total_power_mW"] = quantity("total_power_mW", "bias", total)
     return TipByBias(table, jumps, asymmetry)
 
 
@@ -174,7 +156,8 @@ def _at_the_contact(
         risen = predicted.values[row] - base_K
         share = np.divide(risen, rise, out=np.zeros_like(rise), where=rise != 0.0)
         parts |= {source: share * error for source, error in of_tip.items() if source not in parts}
-        parts["model"] = np.hypot(parts["model"], _CONTACT * share * (1.0 - share) * rise)
+        # by so much the resistances of tip and sample differ from full 3-D (benchmarks/contact.py)
+        parts["model"] = np.hypot(parts["model"], 0.022 * share * (1.0 - share) * rise)
         columns |= {of.name: base_K + risen, of.name.replace("_K", "_stderr_K"): total_error(parts)}
         of_apex = of_apex or parts
     return columns, of_apex
@@ -183,7 +166,7 @@ def _at_the_contact(
 def measured_range(solution: Solution) -> Array:
     """Return even biases (V) over the measured range, as far as the lever has states."""
     lowest, highest = limits_of_range(solution.problem.measurement, solution.probe)
-    return np.linspace(lowest, min(highest, highest_bias(solution)), _ROWS)
+    return np.linspace(lowest, min(highest, highest_bias(solution)), 101)
 
 
 def limits_of_range(measured: Measurement, probe: Probe) -> tuple[float, float]:
@@ -206,7 +189,7 @@ def check_in_range(at_V: float | None, lowest_V: float, highest_V: float) -> Non
 def _rows(solution: Solution, at_V: float | None) -> Array:
     """Return the biases (V) of the table: even ones, more where the tip rises steeply, and one."""
     even, branch = measured_range(solution), solution.branch
-    fine = np.linspace(even[0], even[-1], _FINE)
+    fine = np.linspace(even[0], even[-1], 10_001)
     tip = branch.tip_K(branch.read(solution.probe.circuit, fine).u)
     rows = with_steep_rows(even, fine, tip)
     check_in_range(at_V, *even[[0, -1]])
@@ -238,11 +221,16 @@ def errors_by_source(posterior: Posterior, slopes: Array) -> dict[str, Array]:
 
 def error_of_model(around: Surroundings, bias: Array, rise: Array) -> Array:
     """Return by how much the tip may be off since the model is (K); most where the tip is steep."""
-    # a rise that grows as the square of the bias is that of a lever of constant properties
+    # a rise that grows as the square of the bias is that of a lever of constant properties; where
+    # it is no steeper the flat lever, or air as panels, differ from full 3-D by this share of it
+    # (benchmarks/air.py)
     square, size = np.abs(0.5 * bias * np.gradient(rise, bias)), np.abs(rise)
-    error = _MODEL[around.medium] * np.maximum(size, square)
+    error = (7e-4 if around.medium == "air" else 3e-4) * np.maximum(size, square)
     if around.medium == "air" and around.accommodation is None:
-        error = np.hypot(error, _JUMP * size)
+        # the jump of the air's temperature at surfaces: with an accommodation of 0.9 air takes up
+        # 6 % less, more where the lever is narrow, and an estimate without it is off by so much
+        # (rms of six simulated levers from number 1000 on, of both shapes, linearised)
+        error = np.hypot(error, 7e-3 * size)
     return np.asarray(error)
 
 
@@ -319,7 +307,7 @@ def jumps_of(branch: Branch, circuit: Circuit, bias: Array, tip_K: Array) -> lis
     jumps = []
     reading = branch.read(circuit, np.array([float(bias.max())]))
     for fold_V, cold_K in reading.jumps:
-        beyond = branch.read(circuit, np.array([fold_V * (1.0 + _BEYOND)]))
+        beyond = branch.read(circuit, np.array([fold_V * (1.0 + 1e-6)]))
         hot_K = float(branch.tip_K(beyond.u[0]))
         if not np.isfinite(hot_K):
             continue
@@ -332,8 +320,9 @@ def jumps_of(branch: Branch, circuit: Circuit, bias: Array, tip_K: Array) -> lis
 
 def not_of_a_ramp(branch: Branch, circuit: Circuit, bias: Array, tip_K: Array) -> str:
     """Say that rows lie where a slow ramp of the bias does not come; empty if they do not."""
-    aside = np.abs(branch.tip_K(branch.read(circuit, bias).u) - tip_K) > _ASIDE_K
-    if aside.sum() < _ROWS_ASIDE:
+    aside = np.abs(branch.tip_K(branch.read(circuit, bias).u) - tip_K) > 20.0
+    # one or two beside a jump may
+    if aside.sum() < 3:
         return ""
     return (
         f"the lever that comes nearest jumps, and its rows from {bias[aside].min():.3g} to "

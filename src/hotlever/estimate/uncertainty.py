@@ -22,20 +22,6 @@ from hotlever.processes import PROCESSORS, local_processes
 from hotlever.text import BAND, aligned, with_unit
 from hotlever.types import Array, Progress
 
-#: A parameter is called undetermined if this share of the samples lies within the second share
-#: of its range from a bound, or if its spread is more than the third share of the prior's.
-_AT_BOUND, _NEAR, _AS_WIDE = 0.025, 0.02, 0.7
-#: It is said to be as known before from this share of its prior's spread on.
-_AS_KNOWN = 0.9
-#: The lever that is sampled is said to be off from this error on (K).
-_SURROGATE_ERROR_K = 1.0
-#: Intervals are said to differ from those of the standard error by more than this share of it.
-_DIFFERENT = 0.5
-
-
-# Caption, columns and rows.
-Table = tuple[str, list[str], list[list[str]]]
-
 
 @dataclass(frozen=True)
 class Marginal:
@@ -71,7 +57,7 @@ class Uncertainty:
         if self.posterior is not None:
             texts += _unsettled(self.posterior)
             error = self.posterior.attrs["surrogate_error_K"]
-            if error > _SURROGATE_ERROR_K:
+            if error > 1.0:
                 texts.append(
                     f"the lever that was sampled is off by up to {error:.1f} K at the outermost "
                     "samples of the posterior"
@@ -109,7 +95,7 @@ class Uncertainty:
             )
         return quantities
 
-    def tables(self) -> Iterator[Table]:
+    def tables(self) -> Iterator[tuple[str, list[str], list[list[str]]]]:
         """Give the intervals of profiles and the quantiles of a posterior as tables."""
         if self.profiles:
             first = next(iter(self.profiles.values()))
@@ -234,18 +220,19 @@ def _about(fit: Estimate, name: str, values: Array) -> list[str]:
     span = parameter.upper - parameter.lower
     undetermined = f"{name} is not determined by these data: its posterior"
     for bound in (parameter.lower, parameter.upper):
-        if np.mean(np.abs(values - bound) < _NEAR * span) > _AT_BOUND:
+        # one tail of 95 % of the samples lies near a bound
+        if np.mean(np.abs(values - bound) < 0.02 * span) > 0.025:
             return [f"{undetermined} reaches its bound {with_unit(f'{bound:g}', parameter.unit)}"]
     prior = fit.known.get(name)
-    if prior is not None and np.std([*map(prior.deviation, values)]) > _AS_KNOWN:
+    if prior is not None and np.std([*map(prior.deviation, values)]) > 0.9:
         return [f"{name} is as known before: these data do not tell"]
-    if values.std() > _AS_WIDE * span / np.sqrt(12.0):
+    if values.std() > 0.7 * span / np.sqrt(12.0):
         return [f"{undetermined} is about as wide as its bounds"]
     # two standard errors, nearly: the quantile of the normal distribution
     reach = BAND * (fitted.stderr or 0.0)
     expected = np.array([fitted.value - reach, fitted.value + reach])
     sampled = np.percentile(values, (2.5, 97.5))
-    if not reach or np.abs(sampled - expected).max() <= _DIFFERENT * reach:
+    if not reach or np.abs(sampled - expected).max() <= 0.5 * reach:
         return []
     return [
         f"{name}: 95 % of the posterior lies between {sampled[0]:.4g} and {sampled[1]:.4g}, not "

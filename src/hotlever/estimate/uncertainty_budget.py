@@ -25,7 +25,7 @@ from hotlever.estimate.posterior import CurvedQuantity
 from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.search import Solution
 from hotlever.estimate.surrogate import Rows
-from hotlever.estimate.tip_table import BUDGETS, budgets_of
+from hotlever.estimate.tip_table import budgets_of
 from hotlever.materials.departures import DEPARTURES, departure_of
 from hotlever.materials.parameters import own_name
 from hotlever.probe.parts import ProbeParts
@@ -37,19 +37,6 @@ from hotlever.text import BAND
 from hotlever.types import Array, Index
 
 # --- budgets of any quantity ----------------------------------------------------------------------
-
-#: Trials of a block, and the most of all blocks (JCGM 101, 7.9.4 and 7.2.1).
-_BLOCK, _MOST_TRIALS = 10_000, 1_000_000
-#: Ends of an interval are settled within this share of the tolerance that a budget is judged by
-#: (JCGM 101, 8.2).
-_SETTLED = 0.2
-
-# Infinite where a file has none.
-_Dof = Annotated[
-    float,
-    Field(gt=0),
-    WrapValidator(lambda dof, check: math.inf if dof is None else check(dof)),
-]
 
 
 @dataclass(frozen=True)
@@ -84,7 +71,12 @@ class InputQuantity:
     type: Literal["A", "B"]
     distribution: str
     sensitivity: Number
-    dof: _Dof = math.inf
+    # infinite where a file has none
+    dof: Annotated[
+        float,
+        Field(gt=0),
+        WrapValidator(lambda dof, check: math.inf if dof is None else check(dof)),
+    ] = math.inf
     prior: Number | None = None
 
     @property
@@ -206,7 +198,11 @@ class CoverageInterval:
 
 
 def propagate(
-    draw: Callable[[int], Array], tolerance: float, probability: float = 0.95
+    draw: Callable[[int], Array],
+    tolerance: float,
+    probability: float = 0.95,
+    block: int = 10_000,
+    most: int = 1_000_000,
 ) -> CoverageInterval:
     """Propagate distributions by as many trials as it takes (JCGM 101, 7.9.4).
 
@@ -216,29 +212,26 @@ def propagate(
         Return so many independent values of the measurand, (n,).
     tolerance : float
         By which a budget will be judged: blocks are added until two standard deviations of the
-        mean of both ends are within a fifth of it.
+        mean of both ends are within a fifth of it (8.2).
     probability : float
         Of coverage.
+    block, most : int
+        Trials of a block, and the most of all blocks (7.2.1).
     """
     tails = 0.5 * (1.0 - probability), 0.5 * (1.0 + probability)
-    blocks = [draw(_BLOCK)]
+    blocks = [draw(block)]
     ends = [np.quantile(blocks[0], tails)]
-    while len(blocks) * _BLOCK < _MOST_TRIALS:
-        blocks.append(draw(_BLOCK))
+    while len(blocks) * block < most:
+        blocks.append(draw(block))
         ends.append(np.quantile(blocks[-1], tails))
         spread = 2.0 * np.std(ends, axis=0, ddof=1).max() / math.sqrt(len(ends))
-        if not spread > _SETTLED * tolerance:
+        if not spread > 0.2 * tolerance:
             break
     low, high = np.quantile(np.concatenate(blocks), tails).tolist()
-    return CoverageInterval(len(blocks) * _BLOCK, low, high)
+    return CoverageInterval(len(blocks) * block, low, high)
 
 
 # --- that of a temperature ------------------------------------------------------------------------
-
-#: Where the density of priors comes from an earlier estimate.
-_FIT = "fit"
-#: Where the Monte Carlo method fails.
-_NO_INTERVAL = CoverageInterval(0, np.nan, np.nan)
 
 
 def correction(quantity: str, u: float) -> InputQuantity:
@@ -344,7 +337,8 @@ def budget_of_estimate(solution: Solution, row: xr.Dataset, of: BudgetOf) -> Tem
         With the standard errors beside those of the parameters.
     of : {"tip", "apex"}
     """
-    bias_V, errors_K = row.bias_V.item(), budgets_of(row)[BUDGETS[of == "apex"]]
+    bias_V, budgets = row.bias_V.item(), budgets_of(row)
+    errors_K = budgets["apex_budget_K" if of == "apex" else "budget_K"]
     model = {name: errors_K[name].item() for name in ("model", "jump") if name in errors_K}
     residuals, objective, priors = solution.residuals, solution.objective, solution.priors
     predicted = solution.predicted(np.array([bias_V]))
@@ -364,7 +358,7 @@ def budget_of_estimate(solution: Solution, row: xr.Dataset, of: BudgetOf) -> Tem
         rows.append(InputQuantity(noise, 0.0, unit, size, kind, "normal", sensitivity, free))
     units = {name: each.unit for name, each in parameters_of(solution.probe, anywhere=True).items()}
     units |= dict.fromkeys(SCALES, "1")
-    by_fit = contributions.pop(_FIT, None)
+    by_fit = contributions.pop("fit", None)
     for law, parts in _by_law(contributions).items():
         # a row for a law, whatever its coefficients are called
         departure, start = DEPARTURES[own_name(law)], law.removesuffix(own_name(law))
@@ -404,10 +398,11 @@ def budget_of_estimate(solution: Solution, row: xr.Dataset, of: BudgetOf) -> Tem
     if not budget.u > 0.0:
         return temperature_budget
     free = dict(zip(residuals.observables, dof, strict=True))
+    failed = CoverageInterval(0, np.nan, np.nan)
     try:
         curved = CurvedQuantity(solution.posterior, surrogate, observable)
     except (ComputationError, np.linalg.LinAlgError):
-        return replace(temperature_budget, monte_carlo=_NO_INTERVAL)
+        return replace(temperature_budget, monte_carlo=failed)
     errors = _Errors(curved, solution.posterior.influences, free)
 
     def draw(count: int) -> Array:
@@ -419,7 +414,7 @@ def budget_of_estimate(solution: Solution, row: xr.Dataset, of: BudgetOf) -> Tem
     ended[TIP] = surrogate.branch.hottest_K
     hottest = surrogate.contact.added(ended, solution.probe.values(objective.names))[observable, 0]
     beyond = max(interval.high, temperature_budget.interval_K[1]) > hottest
-    return replace(temperature_budget, monte_carlo=_NO_INTERVAL if beyond else interval)
+    return replace(temperature_budget, monte_carlo=failed if beyond else interval)
 
 
 def _by_law(contributions: dict[str, Array]) -> dict[str, dict[str, float]]:
@@ -442,7 +437,7 @@ def _rows_of_fit(
 
     By how uncorrelated deviations of that fit move the temperature, (m,).
     """
-    numbers = [number for number, source in enumerate(prior.sources) if source == _FIT]
+    numbers = [number for number, source in enumerate(prior.sources) if source == "fit"]
     whitening = prior.whitening[np.ix_(numbers, numbers)]
     relative, values = prior.relative[numbers], prior.values[numbers]
     unit = np.where(relative, values, 1.0)

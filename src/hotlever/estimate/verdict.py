@@ -12,7 +12,12 @@ import numpy as np
 from scipy.special import chdtrc
 
 from hotlever.errors import InputError
-from hotlever.estimate.diagnosis import Diagnosis, lack_of_fit_text, run_of_outliers
+from hotlever.estimate.diagnosis import (
+    Diagnosis,
+    DiagnosisOptions,
+    lack_of_fit_text,
+    run_of_outliers,
+)
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_temperature import highest_bias, not_of_a_ramp, tips_in_contact
@@ -24,26 +29,6 @@ from hotlever.measurement.contents import colder_than_base
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
 from hotlever.probe.probe_parameters import parameters_of
-
-#: The resistance of a cold lever is within this factor of its model's.
-_WITHIN = 2.5
-#: Beyond so many times that of its model hardly any current flows.
-_OPEN = 100.0
-#: Different biases that a calibration needs.
-_FEWEST = 3
-#: Biases below this share of the largest hardly change what other supplies drive.
-_HARDLY = 0.05
-#: The share of the sum of squares that another step would take away, below which a search that has
-#: not come to its end has come to a verdict.
-_LITTLE = 0.5
-#: Share of the measured biases that a lever must reach to show the data.
-_REACHED = 0.98
-#: Data are not described where parameters are as far from their priors as one lever in 500 is.
-_UNLIKELY = 2e-3
-#: The same where data and all other priors are so many standard deviations from one prior: of the
-#: nearly twenty of a lever one is, by chance, in one lever of 500.
-_UNLIKELY_PULL = 3.85
-
 
 # --- before the search --------------------------------------------------------------------------
 
@@ -62,24 +47,25 @@ def check_plausible(problem: Problem, causes: Diagnosis) -> None:
     InputError
         Saying what was compared, and the likeliest cause.
     """
-    measured, probe = problem.measurement, problem.probe
+    measured, probe, options = problem.measurement, problem.probe, causes.options
     where = measured.path or "measurement"
     alone, size = probe.circuit.starts_cold, np.abs(measured.bias_V)
     current = measured.current(probe.circuit)
     here = np.isfinite(current) & (measured.bias_V > 0) & (current > 0)
     if not alone:
-        # other supplies drive a current as well, which is known less well than what is added
-        here = np.isfinite(current) & (size > _HARDLY * size.max())
+        # other supplies drive a current as well, which is known less well than what is added, and
+        # which low biases hardly change
+        here = np.isfinite(current) & (size > 0.05 * size.max())
     different = np.unique(measured.bias_V[here]).size
-    if different < _FEWEST:
+    if different < options.fewest_biases:
         above = " above 0" if alone else ""
         raise InputError(
             f"{where}: currents{above} at {different} different biases{above}, expected "
-            f"{_FEWEST} or more"
+            f"{options.fewest_biases} or more"
         )
     _check_temperatures(measured, probe, where)
     bias, current = measured.bias_V[here], current[here]
-    low = np.argsort(np.abs(bias))[: max(_FEWEST, bias.size // 8)]
+    low = np.argsort(np.abs(bias))[: max(options.fewest_biases, bias.size // 8)]
     # what a cold lever shows does not depend on what is around it
     cold = probe.in_medium("vacuum") if alone else probe
     rest = Lever(cold, COARSE).branch_to(0.0)
@@ -88,18 +74,18 @@ def check_plausible(problem: Problem, causes: Diagnosis) -> None:
     added = current[low] - rest.values[0, 1]
     cold_kohm = float(np.median(bias[low] / np.where(added == 0.0, np.nan, added)))
     ratio = cold_kohm / (lever + series)
-    if cold_kohm > series and abs(np.log(ratio)) < np.log(_WITHIN):
+    if cold_kohm > series and abs(np.log(ratio)) < np.log(options.cold_factor):
         return
     # an owner who knows little of a lever, or of the resistor, expects no less of them
     if alone:
-        spread = _UNLIKELY_PULL * cold_resistance_spread(cold, problem.known)
+        spread = options.shift * cold_resistance_spread(cold, problem.known)
         resistor = problem.known.get("series_resistance_ohm", Prior(1e3 * series, 0.0))
-        least, most = (1e-3 * resistor.at(pull) for pull in (-_UNLIKELY_PULL, _UNLIKELY_PULL))
+        least, most = (1e-3 * resistor.at(pull) for pull in (-options.shift, options.shift))
         if least + lever * np.exp(-spread) < cold_kohm < most + lever * np.exp(spread):
             return
     quantity = "V_b / I_h" if alone else "the change of V_b over that of I_h"
     cause = causes.likeliest()
-    if not cause and cold_kohm > _OPEN * (lever + series):
+    if not cause and cold_kohm > 100.0 * (lever + series):
         cause = "hardly any current flows, as if a terminal was open or the meter at another one"
     cause = cause or "no single cause that is known explains it"
     raise InputError(
@@ -148,15 +134,15 @@ def _check_temperatures(measured: Measurement, probe: Probe, where: str) -> None
 # --- after it -----------------------------------------------------------------------------------
 
 
-def verdict_on(solution: Solution) -> tuple[bool, str]:
+def verdict_on(solution: Solution, options: DiagnosisOptions | None = None) -> tuple[bool, str]:
     """Return whether the search came to an end, and why the data are not described, if so.
 
     One that was ended far from describing the data, where another step would take less than half of
     the sum of squares away, has found that no such lever shows them.
     """
-    reason = _misfit(solution)
+    reason = _misfit(solution, options or DiagnosisOptions())
     share = solution.decrement / max(solution.objective.squares(solution.prediction), 1e-300)
-    if solution.converged or (reason and share < _LITTLE):
+    if solution.converged or (reason and share < 0.5):
         return True, reason
     refused = solution.optimiser.refused
     beyond = f"; a lever on the way could not be solved: {refused}" if refused else ""
@@ -171,17 +157,17 @@ def no_ramp(solution: Solution) -> str:
     circuit, highest = solution.probe.circuit, highest_bias(solution)
     if reason := not_of_a_ramp(solution.branch, circuit, *tips_in_contact(solution)):
         return reason
-    if highest < _REACHED * float(solution.residuals.bias.max()):
+    if highest < 0.98 * float(solution.residuals.bias.max()):
         return f"the lever that comes nearest has no steady state above {highest:.4g} V"
     return ""
 
 
-def _misfit(solution: Solution) -> str:
+def _misfit(solution: Solution, options: DiagnosisOptions) -> str:
     """Return why data are not described by what was fitted to them; empty if they are.
 
     Without priors outliers stand for themselves: there is nothing that they contradict.
     """
-    of_data = solution.residuals, solution.prediction.values
+    of_data = solution.residuals, solution.prediction.values, options
     reason = lack_of_fit_text(*of_data)
     if reason or not solution.problem.informed:
         return reason
@@ -189,14 +175,15 @@ def _misfit(solution: Solution) -> str:
         return reason
     shifts = solution.posterior.shifts
     name = max(shifts, key=lambda name: abs(shifts[name].pull), default="")
-    if name and abs(shifts[name].pull) > _UNLIKELY_PULL:
+    if name and abs(shifts[name].pull) > options.shift:
         return (
             f"{name}, known as {solution.priors[name].stated}, would have to be another; the "
             f"data are {abs(shifts[name].pull):.1f} σ from it"
         )
     # as many are free to be away as the data tell of
     dof = sum(each.contraction for each in shifts.values())
-    if dof > 0 and chdtrc(dof, sum(each.size**2 for each in shifts.values())) < _UNLIKELY:
+    squares = sum(each.size**2 for each in shifts.values())
+    if dof > 0 and chdtrc(dof, squares) < options.shift_probability:
         most = sorted(shifts, key=lambda name: -abs(shifts[name].size))[:3]
         away = ", ".join(f"{name} by {shifts[name].size:+.1f} σ" for name in most)
         return f"what was known beforehand would have to be wrong by too much together, {away}"

@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
-from hotlever.estimate.diagnosis import USUAL_SCATTER
+from hotlever.estimate.diagnosis import DiagnosisOptions
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.levers import tips_along
 from hotlever.estimate.next_measurement import SURE, Plan
@@ -129,9 +129,10 @@ def _differences(axes: Axes, measured: xr.Dataset, model: xr.Dataset, name: str)
         error = measured[column.replace("_K", "_error_K")]
         axes.fill_between(x, -error, error, color="0.9", label="± dT")
         return
-    off = np.abs(difference) > USUAL_SCATTER * np.nanmax(np.abs(data), initial=0.0)
+    usual = DiagnosisOptions.usual_scatter
+    off = np.abs(difference) > usual * np.nanmax(np.abs(data), initial=0.0)
     if off.any():
-        style: Any = {"mfc": "none", "label": f"off by more than {USUAL_SCATTER:.1%}"}
+        style: Any = {"mfc": "none", "label": f"off by more than {usual:.1%}"}
         axes.plot(x[off], difference[off] * factor, "o", ms=5.5, color=BLACK, **style)
         axes.legend(loc="best")
 
@@ -554,7 +555,7 @@ def _difference(axes: Axes, calibration: Estimate, measured: xr.Dataset) -> None
     table, data = calibration.table, measured.dropna("bias", subset=["current_mA"])
     expected = np.interp(data.bias_V, table.bias_V, table.current_mA)
     share = 100 * (data.current_mA - expected) / float(np.abs(data.current_mA).max())
-    usual = 100 * USUAL_SCATTER
+    usual = 100 * DiagnosisOptions.usual_scatter
     off = np.abs(share) > usual
     axes.axhspan(-usual, usual, color="0.9", lw=0, label="as usual")
     axes.plot(data.bias_V, share, "o", color=BLACK, ms=3.0, label="measured")

@@ -321,7 +321,7 @@ def calibrate_files(
     from hotlever.estimate import calibrate, read_fit
     from hotlever.estimate.levers import Setting
     from hotlever.estimate.many import calibrate_many
-    from hotlever.estimate.options import UNKNOWN_MEDIUM, CalibrationOptions
+    from hotlever.estimate.options import CalibrationOptions
     from hotlever.estimate.power_law import read_power_law
     from hotlever.estimate.summary import calibration_text
     from hotlever.measurement import parse_columns, read_measurement_of
@@ -334,7 +334,7 @@ def calibrate_files(
     at_most_one(fit=fit, probe=probe, power_law=power_law)
     if fit or power_law:
         refuse("goes with --probe, expected neither --fit nor --power-law", physics=physics)
-    check_medium(medium, UNKNOWN_MEDIUM)
+    check_medium(medium, "unknown")
     if several:
         refuse("expected a single data file", fit=fit, table=table, plot=plot)
     budget_at = None if at is None else Setting(*parse_setting(at))
@@ -504,12 +504,11 @@ def propose(
     with 99 % certainty, and how sure what counts is known then. Without data: where to begin.
     """
     from hotlever.estimate import plan_next, read_calibration
-    from hotlever.estimate.options import UNKNOWN_MEDIUM
 
     if quantity == "knee":
         refuse("the knee has a temperature of its own; leave it out", at=at)
     # of a lever that was not measured nothing could tell in which it is
-    check_medium(medium, *([] if data is None else [UNKNOWN_MEDIUM]))
+    check_medium(medium, *([] if data is None else ["unknown"]))
     check_number("--count", count, 1, MOST_PROPOSALS)
     allowed = parse_kinds(allow)
     limits = list((allowed or {"": None}).values())
