@@ -22,7 +22,6 @@ from hotlever.types import Array
 #: Bare phonon, three-phonon and four-phonon term (cm⁻¹).
 BARE, THREE_PHONON, FOUR_PHONON = 528.0, -2.96, -0.174
 SOURCE = "Balkanski, Wallis and Haro, Phys. Rev. B 28, 1928 (1983), doi:10.1103/PhysRevB.28.1928"
-SECOND_RADIATION = Planck * speed_of_light / Boltzmann * 100.0  #: hc/k, K cm
 
 
 def terms(temperature: ArrayLike) -> tuple[Array, Array, Array, Array]:
@@ -35,7 +34,8 @@ def terms(temperature: ArrayLike) -> tuple[Array, Array, Array, Array]:
 def _occupation(wavenumber: float, temperature: ArrayLike) -> tuple[Array, Array]:
     """Bose occupation of a phonon and its derivative; at and below 0 K nothing is occupied."""
     t = np.maximum(np.asarray(temperature, dtype=float), 1e-3)
-    ratio = np.minimum(SECOND_RADIATION * wavenumber / t, 500.0)
+    second_radiation = Planck * speed_of_light / Boltzmann * 100.0  # hc/k, K cm
+    ratio = np.minimum(second_radiation * wavenumber / t, 500.0)
     n = 1.0 / np.expm1(ratio)
     return n, n * (n + 1.0) * ratio / t
 

@@ -7,19 +7,8 @@ from scipy.ndimage import find_objects, label, maximum_filter1d, median_filter
 
 from hotlever.types import Array, Mask
 
-SPIKE_SIGMAS = 6.0  #: a cosmic ray stands this many standard deviations above the fit
-#: How far the true line may differ from the line model, as a part of the line's height, before
-#: a difference is taken for a cosmic ray: where the fit leaves noise alone, where it does not, and
-#: on a coarse axis, where pixels and the instrument's response shape the line.
-SPIKE_LINE_TOLERANCE = (0.01, 0.04, 0.15)
-SPIKE_MAX_SAMPLES = 5  #: a cosmic ray hits no more neighbouring samples than this
-PLATEAU_TOLERANCE = 0.006  #: part of the line's height within which a clipped top is flat
-PLATEAU_MIN_SAMPLES = 4
-ZEROS_MIN_SAMPLES = 6  #: fewer zeros in a row may be counts
-ZEROS_STEPS = 3.0  #: a signal so many times larger than its steps does not fall to zero
-
-_OFFSETS = np.array([0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 1e6])
-_POISSON_PREFERENCE = 12.0
+#: Fewer zeros in a row may be counts.
+_FEWEST_ZEROS = 6
 
 
 def variance(residual: Array, model: Array, freedom: Array) -> Array:
@@ -44,14 +33,15 @@ def variance(residual: Array, model: Array, freedom: Array) -> Array:
     """
     largest = float(np.max(np.abs(model))) or 1.0
     level = np.maximum(model, 0.0) / largest
-    offsets = _OFFSETS if level.min() > 1e-3 else _OFFSETS[1:]
+    offsets = np.array([0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 1e6])
+    offsets = offsets if level.min() > 1e-3 else offsets[1:]
     shape = (level + offsets[:, None]) / (1.0 + offsets[:, None])
     rounded = np.finfo(float).eps * largest
     free = max(float(freedom.sum()), 1.0)
     scale = np.maximum(np.sum(residual**2 / shape, axis=1) / free, rounded**2)
     loss = free * np.log(scale) + np.log(shape) @ freedom
     best = int(np.argmin(loss))
-    if loss[0] - loss[best] < _POISSON_PREFERENCE:
+    if loss[0] - loss[best] < 12.0:
         best = 0
     return np.asarray(scale[best] * shape[best])
 
@@ -68,11 +58,20 @@ def robust_sigma(residual: Array, model: Array) -> Array:
     return np.asarray(max(scale, 1e-300) * shape)
 
 
-def spikes(y: Array, model: Array, line_part: Array, trusted: Mask, tolerance: float) -> Mask:
+def spikes(
+    y: Array,
+    model: Array,
+    line_part: Array,
+    trusted: Mask,
+    tolerance: float,
+    sigmas: float = 6.0,
+    most: int = 5,
+) -> Mask:
     """Samples hit by cosmic rays: narrow, and far above the fit.
 
     The noise is judged by the ``trusted`` samples; the true line may differ from the model's
-    ``line_part`` by ``tolerance`` of its height.
+    ``line_part`` by ``tolerance`` of its height. A cosmic ray stands so many ``sigmas`` above the
+    fit, and hits no more neighbouring samples than ``most``.
     """
     residual = y - model
     sigma = robust_sigma(residual[trusted], model[trusted])
@@ -81,11 +80,11 @@ def spikes(y: Array, model: Array, line_part: Array, trusted: Mask, tolerance: f
         + (tolerance * maximum_filter1d(np.abs(line_part), 5)) ** 2
     )
     score = residual / sigma_all
-    hit = score > SPIKE_SIGMAS
+    hit = score > sigmas
     # the flanks of a spike that spilled into its neighbours
-    hit |= maximum_filter1d(hit, 3) & (score > 0.5 * SPIKE_SIGMAS)
+    hit |= maximum_filter1d(hit, 3) & (score > 0.5 * sigmas)
     for run in runs(hit):
-        hit[run] = _length(run) <= SPIKE_MAX_SAMPLES
+        hit[run] = _length(run) <= most
     return hit
 
 
@@ -96,22 +95,25 @@ def likely_spikes(y: Array, base: float) -> Mask:
     return np.asarray(y - local > 8.0 * sigma + 1.2 * np.maximum(local - base, 0.0))
 
 
-def plateau(y: Array, candidates: Mask, base: float) -> slice | None:
+def plateau(
+    y: Array, candidates: Mask, base: float, tolerance: float = 0.006, fewest: int = 4
+) -> slice | None:
     """The flat top of a saturated line above its background, or None.
 
     A line that is not clipped has only few samples within a small part of its height; more
-    than its width allows, in one run at the top, is a clipped line. Candidates are samples that
-    are no cosmic rays and may belong to the line.
+    than its width allows, in one run at the top, is a clipped line, which is flat within a
+    ``tolerance`` of its height. Candidates are samples that are no cosmic rays and may belong to
+    the line.
     """
     top = float(y[candidates].max(initial=-np.inf))
     height = top - base
     if height <= 0.0:
         return None
-    at_top = runs(candidates & (y >= top - PLATEAU_TOLERANCE * height))
+    at_top = runs(candidates & (y >= top - tolerance * height))
     longest = max(at_top, key=_length)
     above_half = int(np.count_nonzero(candidates & (y > base + 0.5 * height)))
-    expected = 1.0 + np.sqrt(PLATEAU_TOLERANCE) * above_half
-    return longest if _length(longest) >= max(PLATEAU_MIN_SAMPLES, 2.5 * expected) else None
+    expected = 1.0 + np.sqrt(tolerance) * above_half
+    return longest if _length(longest) >= max(fewest, 2.5 * expected) else None
 
 
 def zeros(y: Array) -> slice | None:
@@ -130,14 +132,14 @@ def zeros(y: Array) -> slice | None:
     # of a number cut in two a part may be left, too small for any detector
     nothing = np.abs(y) <= 1e-12 * np.abs(y).max(initial=0.0)
     gap = max(runs(nothing), key=_length, default=slice(0, 0))
-    if _length(gap) < ZEROS_MIN_SAMPLES or not y.any():
+    if _length(gap) < _FEWEST_ZEROS or not y.any():
         return None
     # the nearest of three is small on the flank of a line, and beside a cosmic ray
     sides = (y[max(gap.start - 3, 0) : gap.start], y[gap.stop : gap.stop + 3])
     beside = max(float(np.abs(side).min()) for side in sides if side.size)
     steps = np.abs(np.diff(np.delete(y, gap)))
     steps = steps[steps > 0.0]
-    return gap if steps.size and beside > ZEROS_STEPS * np.median(steps) else None
+    return gap if steps.size and beside > 3.0 * np.median(steps) else None
 
 
 def overflows(y: Array) -> Mask:
@@ -152,7 +154,7 @@ def overflows(y: Array) -> Mask:
     base = float(np.median(y[~nothing])) if not nothing.all() else 0.0
     half = 0.5 * (base + float(y.max(initial=0.0)))
     for run in runs(nothing):
-        inside = run.start > 0 and run.stop < y.size and _length(run) < ZEROS_MIN_SAMPLES
+        inside = run.start > 0 and run.stop < y.size and _length(run) < _FEWEST_ZEROS
         hit[run] = inside and min(y[run.start - 1], y[run.stop]) > half
     return hit
 

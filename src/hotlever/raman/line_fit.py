@@ -40,26 +40,8 @@ from hotlever.raman.lineshape import (
 )
 from hotlever.types import Array, Mask
 
-DETECTION_SIGMAS = 5.0  #: a line's area must exceed its standard error so many times
-MISFIT_LIMIT = 1.6  #: from this ratio on the residuals are flagged as more than noise
-_BAND_PENALTY = 6.0  # drop of chi-square that three parameters bring by chance, after Akaike
-_DOUBTFUL = 1.1  # times its own; an error that the other model makes so large is flagged
-_BAND_FWHM, _BAND_SPREAD = 25.0, 0.6  # soft prior of the band: ln fwhm = ln 25 ± 0.6
-_NO_BAND = (0.0, 0.0, math.log(_BAND_FWHM))
-_SMALL_MISFIT = 1.25  # below it the line model is the right one
-_SIGMA_SPREAD = 1.0  # soft prior of an unknown spectrometer response: a factor e
-_NATURAL_WIDTH = (math.log(4.0), 0.7)  # soft prior of ln fwhm, with an unknown response only
-_MIN_FWHM_SAMPLES = 0.5
-_COARSE = 1.5  # samples; a narrower line is hardly seen
-_LONE = 1.2  # samples; a narrower line is no more than one of them
-_NARROWEST = 1.2  # cm⁻¹; silicon's line is wider at any temperature
-_NARROWEST_SEEN = 0.5  # cm⁻¹; far below any line of silicon's, with noise
-_COARSE_AXIS = (
-    1.2  # cm⁻¹; with larger steps a cosmic ray, and the response, are as wide as the line
-)
+#: cm⁻¹; no silicon line is wider.
 _MAX_FWHM = 45.0
-_NEAR = 3.0  # cm⁻¹; how far from the start that is given the line may be
-_FLAT = 1e-20  # in whatever unit the intensity is
 
 
 def fit_peak(x: Array, y: Array, options: PeakOptions | None = None, where: str = "") -> Peak:
@@ -99,9 +81,9 @@ def fit_peak(x: Array, y: Array, options: PeakOptions | None = None, where: str 
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     inside = in_window(x, prefix, options.window)
     x, y = x[inside], y[inside]
-    peak, step = _fit(x, y, options), _step(x)
-    searched = options.start is None and step > _COARSE_AXIS
-    if searched and (peak is None or _spiky(peak, step)):
+    peak = _fit(x, y, options)
+    searched = options.start is None and _is_coarse(x)
+    if searched and (peak is None or _spiky(peak, _step(x))):
         peak = _beside_cosmic_ray(x, y, options, peak) or peak
     if peak is None:
         raise NoSiliconLine(
@@ -147,6 +129,11 @@ def _step(x: Array) -> float:
     return float(np.median(np.diff(x)))
 
 
+def _is_coarse(x: Array) -> bool:
+    """Whether steps are so large that a cosmic ray, and the response, are as wide as the line."""
+    return _step(x) > 1.2
+
+
 def _in_range(x: Array) -> Mask:
     return np.asarray((x >= LINE_RANGE[0]) & (x <= LINE_RANGE[1]))
 
@@ -154,12 +141,12 @@ def _in_range(x: Array) -> Mask:
 def _near(x: Array, start: float) -> Mask:
     """The samples about the place that is given, the nearest at least."""
     away = np.abs(x - start)
-    return np.asarray(away <= max(_NEAR, float(away.min())))
+    return np.asarray(away <= max(3.0, float(away.min())))
 
 
 def _spiky(peak: Peak, step: float) -> bool:
-    """Whether a line is too narrow to be silicon's, or to be seen by this axis."""
-    return peak.fwhm < _NARROWEST or observed_width(peak.fwhm, peak.resolution) < _LONE * step
+    """Whether a line is too narrow to be silicon's, or is no more than one sample of this axis."""
+    return peak.fwhm < 1.2 or observed_width(peak.fwhm, peak.resolution) < 1.2 * step
 
 
 def _beside_cosmic_ray(x: Array, y: Array, options: PeakOptions, spike: Peak | None) -> Peak | None:
@@ -178,7 +165,8 @@ def _beside_cosmic_ray(x: Array, y: Array, options: PeakOptions, spike: Peak | N
 
 def _fit(x: Array, y: Array, options: PeakOptions) -> Peak | None:
     """The line, None where there is none."""
-    started = _start(x, y, options) if np.ptp(y) > _FLAT else None
+    # flat in whatever unit the intensity is
+    started = _start(x, y, options) if np.ptp(y) > 1e-20 else None
     if started is None:
         return None
     problem, start = started
@@ -193,14 +181,14 @@ def _fit(x: Array, y: Array, options: PeakOptions) -> Peak | None:
         return None
     if alone is None or beside is None or richer is None:
         return alone or beside
-    return _either(
-        alone, beside, _gain(plain, richer) - _BAND_PENALTY, options.band_evidence or 0.0
-    )
+    # three parameters bring so much of χ² by chance, after Akaike
+    own = _gain(plain, richer) - 6.0
+    return _either(alone, beside, own, options.band_evidence or 0.0)
 
 
 def _stands_out(peak: Peak) -> bool:
     # a clipped line has no known height, but it is there
-    return peak.clipped is not None or peak.area > DETECTION_SIGMAS * peak.area_stderr
+    return peak.clipped is not None or peak.area > 5.0 * peak.area_stderr
 
 
 def _either(alone: Peak, beside: Peak, own: float, elsewhere: float) -> Peak:
@@ -220,7 +208,7 @@ def _either(alone: Peak, beside: Peak, own: float, elsewhere: float) -> Peak:
         return math.sqrt((1.0 - weight) * stated[0] ** 2 + weight * (stated[1] ** 2 + apart**2))
 
     centre_error = error("centre")
-    in_doubt = centre_error > _DOUBTFUL * peak.centre_stderr
+    in_doubt = centre_error > 1.1 * peak.centre_stderr
     return replace(
         peak,
         centre_stderr=centre_error,
@@ -236,7 +224,7 @@ def _likely_spikes(x: Array, y: Array, base: float, start: float | None) -> Mask
     spikes = noise.likely_spikes(y, base)
     if start is not None:
         return np.asarray(spikes & ~_near(x, start))
-    return spikes & ~_in_range(x) if _step(x) > _COARSE_AXIS else spikes
+    return spikes & ~_in_range(x) if _is_coarse(x) else spikes
 
 
 def _start(x: Array, y: Array, options: PeakOptions) -> tuple[LineProblem, Array] | None:
@@ -276,15 +264,16 @@ def _start(x: Array, y: Array, options: PeakOptions) -> tuple[LineProblem, Array
         free.append(At.FANO)
     if options.resolution is not None:
         log_sigma = math.log(options.resolution * SIGMA_PER_FWHM)
-    elif options.shape == "voigt" or (options.shape == "lorentzian" and step > _COARSE_AXIS):
+    elif options.shape == "voigt" or (options.shape == "lorentzian" and _is_coarse(x)):
         # an instrument with pixels so wide has a response that is no narrower
         log_sigma = math.log(max(step, 0.2 * fwhm) * 2.0 * SIGMA_PER_FWHM)
-        # on a coarse axis the two widths are hard to tell apart: keep both near what they are
-        priors = [(At.LOG_FWHM, *_NATURAL_WIDTH), (At.LOG_SIGMA, log_sigma, _SIGMA_SPREAD)]
+        # on a coarse axis the two widths are hard to tell apart: soft priors keep both near what
+        # they are, the response within a factor e
+        priors = [(At.LOG_FWHM, math.log(4.0), 0.7), (At.LOG_SIGMA, log_sigma, 1.0)]
         free.append(At.LOG_SIGMA)
     line = [float(x[top]), math.log(fwhm), height, background, slope, 0.0, log_sigma]
     problem = LineProblem(x, y, origin, tuple(free), tuple(priors), clipped)
-    return problem, np.array([*line, *_NO_BAND])
+    return problem, np.array([*line, 0.0, 0.0, 0.0])
 
 
 def _coarse_background(x: Array, y: Array) -> tuple[float, float]:
@@ -309,11 +298,13 @@ def _refine(
         if not np.all(np.isfinite(value)):
             break
         used, assumed = use, variance
-        strict, lenient, coarse = noise.SPIKE_LINE_TOLERANCE
         so_far = Solution(problem, p, value, variance, use)
-        tolerance = lenient if so_far.misfit > _SMALL_MISFIT else strict
-        if _step(problem.x) > _COARSE_AXIS:
-            tolerance = coarse
+        # how far the true line may differ from the model before that is taken for a cosmic ray:
+        # where the fit leaves noise alone, where it does not, and on a coarse axis, where pixels
+        # and the instrument's response shape the line
+        tolerance = 0.04 if so_far.misfit > 1.25 else 0.01
+        if _is_coarse(problem.x):
+            tolerance = 0.15
         use = problem.unclipped & ~noise.spikes(y, value, part, used, tolerance)
         # a line seen by one or two samples must not be thrown out as a cosmic ray
         if np.count_nonzero(use) < MIN_SAMPLES:
@@ -330,12 +321,15 @@ def _refine(
     return Solution(problem, p, problem.evaluate(p)[0], variance, use)
 
 
-def _with_band(plain: Solution) -> Solution | None:
-    """The best fit with a broad band on the low side, or None if there is none."""
+def _with_band(plain: Solution, band_fwhm: float = 25.0, spread: float = 0.6) -> Solution | None:
+    """The best fit with a broad band on the low side, or None if there is none.
+
+    A soft prior holds ln fwhm of the band within a spread of that of `band_fwhm`, cm⁻¹.
+    """
     problem, x, y = plain.problem, plain.problem.x, plain.problem.y
     centre, fwhm = float(plain.p[At.CENTRE]), width_of(plain.p[At.LOG_FWHM])
     residual = np.where(plain.use, y - plain.value, 0.0) / np.sqrt(plain.variance)
-    width = max(0.5 * _BAND_FWHM, min(fwhm, _BAND_FWHM))
+    width = max(0.5 * band_fwhm, min(fwhm, band_fwhm))
     samples = width * SIGMA_PER_FWHM / _step(x)
     # a matched filter: white noise of unit variance comes out with unit variance
     matched = gaussian_filter1d(residual, samples, mode="constant")
@@ -344,13 +338,14 @@ def _with_band(plain: Solution) -> Solution | None:
     if not low_side.any():
         return None
     at = int(np.argmax(np.where(low_side, matched, -np.inf)))
-    prior = (At.LOG_BAND_FWHM, math.log(_BAND_FWHM), _BAND_SPREAD)
+    prior = (At.LOG_BAND_FWHM, math.log(band_fwhm), spread)
     richer = replace(problem, free=(*problem.free, *At.BAND), priors=(*problem.priors, prior))
-    beside = plain.p.copy()
+    start = plain.p.copy()
+    start[At.LOG_BAND_FWHM] = math.log(band_fwhm)
+    beside, within = start.copy(), start.copy()
     beside[At.BAND_HEIGHT] = np.sqrt(plain.variance[at]) * max(residual[at], 1.0)
     beside[At.BAND_CENTRE] = x[at]
     # the line may have swallowed a part of the band, and left no residual to see
-    within = plain.p.copy()
     within[At.CENTRE], within[At.LOG_FWHM] = centre + 0.2 * fwhm, math.log(0.4 * fwhm)
     within[At.BAND_HEIGHT], within[At.BAND_CENTRE] = 0.4 * plain.p[At.HEIGHT], centre - 0.6 * fwhm
     fits = [_refine(richer, start, plain.use, plain.variance) for start in (beside, within)]
@@ -398,7 +393,7 @@ def _peak(solution: Solution) -> Peak | None:
     if not (
         LINE_RANGE[0] < centre < LINE_RANGE[1]
         # on an axis in nm, which looks alike, a line is forty times narrower
-        and max(_MIN_FWHM_SAMPLES * step, _NARROWEST_SEEN) < width < _MAX_FWHM
+        and max(0.5 * step, 0.5) < width < _MAX_FWHM
         and area > 0.0
     ):
         return None
@@ -407,6 +402,7 @@ def _peak(solution: Solution) -> Peak | None:
         band = Band(low_band[1], width_of(low_band[2]), low_band[0])
         band_gap = centre - band.centre - (0.5 * band.fwhm + width)
     spikes, misfit = x[problem.unclipped & ~solution.use].tolist(), solution.misfit
+    noisy = misfit <= 1.6  # else the residuals are more than noise
     flags = {
         "cosmic-ray": bool(spikes),
         "saturated": clipped is not None,
@@ -414,11 +410,11 @@ def _peak(solution: Solution) -> Peak | None:
         "low-shoulder": band_gap < 0.0,
         "low-band": band_gap >= 0.0,
         "edge": min(centre - x[0], x[-1] - centre) < 2.0 * width,
-        "coarse": width < _COARSE * step,
-        "misfit": misfit > MISFIT_LIMIT,
+        "coarse": width < 1.5 * step,
+        "misfit": not noisy,
     }
     # residuals that are no noise are correlated: fewer samples count than there are
-    growth = math.sqrt(misfit) if misfit > MISFIT_LIMIT else 1.0
+    growth = 1.0 if noisy else math.sqrt(misfit)
     ends, centre_error = None, growth * float(errors[At.CENTRE])
     if clipped is not None:
         ends = (float(x[clipped.start]), float(x[clipped.stop - 1]))

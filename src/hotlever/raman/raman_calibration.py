@@ -34,14 +34,6 @@ from hotlever.spieser2017 import (
 )
 from hotlever.types import Array
 
-ROOM = (273.0, 323.0)  #: K; the coldest spectrum of a series must lie here
-#: Fewer temperatures, or a smaller span (K), cannot tell the three- from the four-phonon
-#: term; their ratio is then the published one.
-FREE_FIT_POINTS, FREE_FIT_SPAN = 6, 250.0
-_FLATTEST = -1e-6  # cm⁻¹/K; silicon's line has −0.02
-_TEMPERATURES = np.arange(20.0, MELTING_POINT + 0.5, 0.5)
-
-
 # no number of a calibration is larger, and none may overflow when it is squared
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
 Size = Annotated[float, Field(ge=0, le=1e12)]
@@ -105,8 +97,9 @@ class AnharmonicFit(Record):
 
     def temperature(self, shift: Array, room_temperature: float) -> Array:
         """Temperature (K) of a shift (cm⁻¹); NaN where silicon has none such below melting."""
-        falling, _ = self.shift(_TEMPERATURES[::-1], room_temperature)
-        return np.asarray(np.interp(shift, falling, _TEMPERATURES[::-1], np.nan, np.nan))
+        temperatures = np.arange(20.0, MELTING_POINT + 0.5, 0.5)[::-1]
+        falling, _ = self.shift(temperatures, room_temperature)
+        return np.asarray(np.interp(shift, falling, temperatures, np.nan, np.nan))
 
 
 class RamanCalibration(Record):
@@ -129,8 +122,10 @@ class RamanCalibration(Record):
 
     @model_validator(mode="after")
     def _falling(self) -> RamanCalibration:
-        _, slope = self.anharmonic.shift(_TEMPERATURES, self.room_temperature_K)
-        if not np.all(slope[_TEMPERATURES > 100.0] < _FLATTEST):
+        temperatures = np.arange(100.5, MELTING_POINT + 0.5, 0.5)
+        _, slope = self.anharmonic.shift(temperatures, self.room_temperature_K)
+        # cm⁻¹/K; silicon's line has −0.02
+        if not np.all(slope < -1e-6):
             raise ValueError(
                 "anharmonic: the line must fall with temperature up to the melting point, "
                 f"found three-phonon {self.anharmonic.three_phonon_cm:g} and four-phonon "
@@ -243,10 +238,10 @@ def calibrate_raman(
             "(a hot-plate series from room temperature up)"
         )
     room = float(temperature.min())
-    if not ROOM[0] <= room <= ROOM[1]:
+    if not 273.0 <= room <= 323.0:
         raise InputError(
             f"calibration: the coldest spectrum is at {room:g} K, expected one at room "
-            f"temperature ({ROOM[0]:g} to {ROOM[1]:g} K), from which the shifts are taken"
+            f"temperature (273 to 323 K), from which the shifts are taken"
         )
     if np.any(stderr <= 0.0):
         raise InputError("calibration: every line position needs a standard error above 0")
@@ -287,7 +282,9 @@ def _fit_anharmonic(
     """Line's place at room temperature and the law, by weighted linear least squares."""
     columns = anharmonic.gradient(temperature, room)
     distinct = np.unique(np.round(temperature, 1)).size
-    free = distinct >= FREE_FIT_POINTS and np.ptp(temperature) >= FREE_FIT_SPAN
+    # fewer temperatures, or a smaller span, cannot tell the three- from the four-phonon term; their
+    # ratio is then the published one
+    free = distinct >= 6 and np.ptp(temperature) >= 250.0
     ratio = anharmonic.FOUR_PHONON / anharmonic.THREE_PHONON
     basis = np.eye(3) if free else np.array([[1.0, 0.0], [0.0, 1.0], [0.0, ratio]])
     reduced, covariance, chi_square = _least_squares(columns @ basis, centre, stderr)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from hotlever.raman.line_fit import fit_peak, with_hidden_top
 from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.raman_calibration import Point, RamanCalibration, calibrate_raman
 from hotlever.raman.spectrum import Spectrum, aliases
-from hotlever.raman.spectrum_tables import NOTHING, Correction, of_spectrum
+from hotlever.raman.spectrum_tables import Correction, of_spectrum
 from hotlever.raman.thermometer import Thermometer
 from hotlever.steps import each
 from hotlever.types import Progress
@@ -33,10 +33,6 @@ DIGITS = {
     "temperature_K": 2,
     "temperature_error_K": 2,
 }
-#: Evidence for a band beyond which more of it changes nothing: none has a weight of 0.1 %.
-_BEYOND_DOUBT = 14.0
-#: Header of the Raman CSV.
-COLUMNS = ("file", *(name.replace("_per_cm", "_cm-1") for name in DIGITS), "flags")
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,7 @@ class MeasuredLine:
 
     spectrum: Spectrum
     peak: Peak | None
-    correction: Correction = NOTHING  #: by hand
+    correction: Correction = field(default_factory=Correction)  #: by hand
 
     @property
     def window(self) -> tuple[float, float]:
@@ -58,7 +54,7 @@ class MeasuredLine:
         if not self.correction.use:
             return ["left-out"]
         flags = ["no-line"] if self.peak is None else list(self.peak.flags)
-        return flags if self.correction == NOTHING else [*flags, "by-hand"]
+        return flags if self.correction == Correction() else [*flags, "by-hand"]
 
 
 def measure(
@@ -110,9 +106,10 @@ def _line(spectrum: Spectrum, correction: Correction, options: PeakOptions) -> M
 def _together(lines: Sequence[MeasuredLine], options: PeakOptions) -> list[MeasuredLine]:
     """Fit again what is in doubt by itself, with what the others say for a band."""
     total, together = band_evidence(lines), []
+    beyond_doubt = 14.0  # no band has a weight of 0.1 % then
     for line in lines:
-        own = _BEYOND_DOUBT if line.peak is None else line.peak.band_evidence
-        if own < _BEYOND_DOUBT and total > own:
+        own = beyond_doubt if line.peak is None else line.peak.band_evidence
+        if own < beyond_doubt and total > own:
             with_others = replace(options, band_evidence=total - own)
             together.append(_line(line.spectrum, line.correction, with_others))
         else:
@@ -171,7 +168,8 @@ def to_csv(table: xr.Dataset) -> str:
     frame = table[["file", *DIGITS, "flags"]].to_dataframe()
     for name, digits in DIGITS.items():
         frame[name] = frame[name].map(f"{{:.{digits}f}}".format, na_action="ignore")
-    return frame_text(frame, index=False, header=COLUMNS)
+    header = ["file", *(name.replace("_per_cm", "_cm-1") for name in DIGITS), "flags"]
+    return frame_text(frame, index=False, header=header)
 
 
 def calibrate_from(

@@ -12,8 +12,6 @@ import numpy as np
 from hotlever.types import Array
 from hotlever.units import ZERO_CELSIUS_K, quantity
 
-_LONGEST = 60  # characters of a label
-
 
 @dataclass(frozen=True)
 class Spectrum:
@@ -43,9 +41,7 @@ def names_in_file(file: str, labels: list[str]) -> list[str]:
     if len(labels) == 1:
         return [file]
     # a name is a cell of a CSV, and the last part of a path
-    plain = [
-        " ".join(re.sub(r"[\[\]\\/,;|\"']", " ", label).split())[:_LONGEST] for label in labels
-    ]
+    plain = [" ".join(re.sub(r"[\[\]\\/,;|\"']", " ", label).split())[:60] for label in labels]
     distinct = all(plain) and len(set(plain)) == len(plain)
     return [f"{file}[{label}]" for label in (plain if distinct else range(len(plain)))]
 
@@ -92,19 +88,8 @@ def positions(columns: Mapping[str, Array], count: int) -> list[str]:
     ]
 
 
-HOTTEST = 2000.0  #: K; a higher number with the unit of a temperature is something else
-#: K; what a header calls "Temperature (C)", no more, and is lower is a detector's: Andor writes so.
-COLDEST_UNNAMED = 253.0
-
-_NUMBER = r"(-?\d+(?:[.,]\d+)?)"
+#: How the unit of a temperature is written.
 _UNIT = r"(K|kelvin|°C|ºC|degC|deg\s?C|C|celsius)"
-_IN_NAME = re.compile(rf"T?{_NUMBER}{_UNIT}")
-_SPACED = re.compile(rf"(?<![A-Za-z0-9]){_NUMBER}[\s_]{_UNIT}(?![A-Za-z0-9])")
-_KEY = re.compile(
-    r"^\W*(sample|stage|hot\s?-?plate|linkam|actual|measured|nominal|set)?[\s_]*"
-    rf"(?:temperature|temp\.?|T)[\s_]*(?:[\[(]?\s*{_UNIT}\s*[\])]?)?\s*$",
-    re.I,
-)
 
 
 def temperature_in_name(stem: str) -> float | None:
@@ -118,7 +103,11 @@ def temperature_in_name(stem: str) -> float | None:
     parts = re.split(r"[_\s;()\[\]=]+", stem)
     # a dash may be a minus or stand between words
     parts += [part for pair in parts for part in pair.split("-")]
-    match = next(filter(None, map(_IN_NAME.fullmatch, parts)), None) or _SPACED.search(stem)
+    number = r"(-?\d+(?:[.,]\d+)?)"
+    matches = (re.fullmatch(rf"T?{number}{_UNIT}", part) for part in parts)
+    match = next(filter(None, matches), None) or re.search(
+        rf"(?<![A-Za-z0-9]){number}[\s_]{_UNIT}(?![A-Za-z0-9])", stem
+    )
     return _kelvin(quantity(match[1])[0], match[2]) if match else None
 
 
@@ -132,15 +121,20 @@ def temperature_in_metadata(metadata: dict[str, str]) -> float | None:
     >>> temperature_in_metadata({"Detector temperature (°C)": "-70", "Temperature (K)": "295"})
     295.0
     """
+    stated = (
+        r"(?i)^\W*(sample|stage|hot\s?-?plate|linkam|actual|measured|nominal|set)?[\s_]*"
+        rf"(?:temperature|temp\.?|T)[\s_]*(?:[\[(]?\s*{_UNIT}\s*[\])]?)?\s*$"
+    )
     for key, value in metadata.items():
-        match = _KEY.match(key[:80])
+        match = re.match(stated, key[:80])
         if match is None:
             continue
         number, unit = quantity(value)
         unit = unit.strip() or match[2] or ""
         kelvin = _kelvin(number, unit)
-        # a sample's by name or unit, else it may be a detector's
-        if kelvin is not None and (match[1] or unit[0] in "kK" or kelvin > COLDEST_UNNAMED):
+        # a sample's by name or unit; what a header calls "Temperature (C)", no more, and is cold is
+        # a detector's: Andor writes so
+        if kelvin is not None and (match[1] or unit[0] in "kK" or kelvin > 253.0):
             return kelvin
     return None
 
@@ -153,7 +147,7 @@ def sample_temperature(kelvin: float) -> float | None:
     >>> sample_temperature(298.15), sample_temperature(-3.0)
     (298.15, None)
     """
-    return round(kelvin, 6) if 0.0 < kelvin < HOTTEST else None
+    return round(kelvin, 6) if 0.0 < kelvin < 2000.0 else None
 
 
 def _kelvin(number: float | None, unit: str) -> float | None:

@@ -17,7 +17,7 @@ from hotlever.errors import InputError
 from hotlever.files import LARGEST_TEXT, read_bytes
 from hotlever.raman.detector_noise import overflows, zeros
 from hotlever.raman.lineshape import in_window
-from hotlever.raman.makers import MAKERS, WDF_SIGNATURE, read_makers, refuse_labspec
+from hotlever.raman.makers import MAKERS, read_makers, refuse_labspec
 from hotlever.raman.spectrum import (
     Spectrum,
     names_in_file,
@@ -28,10 +28,6 @@ from hotlever.raman.text_layout import pick_spectra, require_line
 from hotlever.steps import each
 from hotlever.tables import find_tables
 from hotlever.types import Array, Progress
-
-SKIPPED_SUFFIXES = {".md", ".json", ".toml", ".yaml", ".yml", ".py", ".ipynb", ".html", ".pdf"}
-SKIPPED_SUFFIXES |= {".png", ".jpg", ".jpeg", ".svg", ".tif", ".tiff", ".bmp", ".log", ".zip"}
-_GZIP = b"\x1f\x8b"
 
 
 def read_spectrum(path: str | os.PathLike[str]) -> Spectrum:
@@ -94,7 +90,7 @@ def read_file(path: str | os.PathLike[str]) -> list[Spectrum]:
 
 def _unpacked(raw: bytes, file: Path) -> bytes:
     """A file's content, as it was before gzip if that is what made it."""
-    if not raw.startswith(_GZIP):
+    if not raw.startswith(b"\x1f\x8b"):
         return raw
     try:
         with gzip.open(io.BytesIO(raw)) as packed:
@@ -111,7 +107,7 @@ def _unpacked(raw: bytes, file: Path) -> bytes:
 
 def _kind(file: Path, raw: bytes) -> str:
     """What kind of file it is, by its content, then by its name; empty for text."""
-    if raw.startswith(WDF_SIGNATURE):
+    if raw.startswith(b"WDF1"):
         return ".wdf"
     if raw.lstrip(b"\xef\xbb\xbf \r\n").upper().startswith(b"##TITLE="):
         return ".jdx"
@@ -161,6 +157,8 @@ def spectrum_files(paths: Iterable[str | os.PathLike[str]]) -> list[tuple[Path, 
     InputError
         If a path does not exist or a folder holds no file that could be a spectrum.
     """
+    others = {".md", ".json", ".toml", ".yaml", ".yml", ".py", ".ipynb", ".html", ".pdf", ".log"}
+    others |= {".png", ".jpg", ".jpeg", ".svg", ".tif", ".tiff", ".bmp", ".zip"}
     listed: list[tuple[Path, bool]] = []
     for path in map(Path, paths):
         # unlike a Path's methods these do not raise on a name that is too long
@@ -175,7 +173,7 @@ def spectrum_files(paths: Iterable[str | os.PathLike[str]]) -> list[tuple[Path, 
                 for file in path.iterdir()
                 if not file.is_dir()
                 and not file.name.startswith((".", "~"))
-                and file.suffix.lower() not in SKIPPED_SUFFIXES
+                and file.suffix.lower() not in others
                 and file.stem.upper() not in ("README", "LICENSE", "LICENCE")
             ]
         except OSError as error:

@@ -32,14 +32,6 @@ if TYPE_CHECKING:
 
 #: Header of a table of corrections.
 COLUMNS = ("file", "start_cm-1", "from_cm-1", "to_cm-1", "use")
-_USE = {"": True, "yes": True, "no": False}
-#: Columns that a bias log gets, and those that it has.
-TEMPERATURE, ERROR = "T_tip (K)", "dT_tip (K)"
-_BIAS = re.compile(r"(V_?b|bias)\b", re.I)
-_FILE = re.compile(r"(file|spectrum|spectra)\b", re.I)
-_SCALE = re.compile(r"\W*raman_?scale\b", re.I)
-_OLD = re.compile(r"d?T_?tip\b", re.I)
-_IN_NAME = re.compile(r"(?:^|[^0-9A-Za-z.,-])(-?\d+(?:[.,p]\d+)?)\s?V(?![a-zA-Z0-9])")
 
 
 def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
@@ -98,10 +90,6 @@ class Correction:
         window = (low if self.low is None else self.low, high if self.high is None else self.high)
         start = options.start if self.start is None else self.start
         return replace(options, start=start, window=window)
-
-
-#: What is said of most spectra.
-NOTHING = Correction()
 
 
 def corrections_text(corrections: Mapping[str, Correction]) -> str:
@@ -170,9 +158,9 @@ def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
         at_row = (float(column[row]) for column in numbers)
         start, low, high = (None if np.isnan(value) else value for value in at_row)
         use = cells[heads.index("use")].strip().lower() if "use" in heads else ""
-        if use not in _USE:
+        if use not in ("", "yes", "no"):
             raise InputError(f"{table.where(row)}: use: found '{excerpt(use)}', expected yes or no")
-        corrections[name] = Correction(start, low, high, _USE[use])
+        corrections[name] = Correction(start, low, high, use != "no")
         try:
             corrections[name].of(PeakOptions())
         except InputError as error:
@@ -183,7 +171,7 @@ def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
 def of_spectrum(spectrum: Spectrum, corrections: Mapping[str, Correction]) -> Correction:
     """Return what is said of a spectrum, the row with the most folders before its name first."""
     names = _names(spectrum) if corrections else []
-    return next((corrections[name] for name in names if name in corrections), NOTHING)
+    return next((corrections[name] for name in names if name in corrections), Correction())
 
 
 def check_corrections(
@@ -240,7 +228,7 @@ def read_bias_log(path: str | os.PathLike[str]) -> TextTable:
         is no number.
     """
     log = read_table(path, "a header row like 'V_b (V),I_h (mA),V_r (mV)'")
-    if _bias(log) is None and _column(log, _FILE) is None:
+    if _bias(log) is None and _file_column(log) is None:
         raise InputError(
             f"{log.where(-1)}: no bias column in '{excerpt(','.join(log.names))}', expected a "
             "header like 'V_b (V),I_h (mA),V_r (mV)'"
@@ -274,18 +262,19 @@ def join(log: TextTable, spectra: xr.Dataset) -> str:
         If spectra and rows cannot be brought together.
     """
     matched = _match(log, [str(name) for name in spectra.file.values])
-    keep = [j for j, name in enumerate(log.names) if not _OLD.match(name)]
+    keep = [j for j, name in enumerate(log.names) if not re.match(r"(?i)d?T_?tip\b", name)]
     comments = [line for _, line in log.comments]
+    scale = r"(?i)\W*raman_?scale\b"
     if len(keep) < len(log.names):
-        comments = [line for line in comments if not _SCALE.match(line)]
+        comments = [line for line in comments if not re.match(scale, line)]
     errors, share = _own_and_common(spectra)
-    if not any(_SCALE.match(line) for line in comments):
+    if not any(re.match(scale, line) for line in comments):
         comments.append(f"# raman_scale: ± {100.0 * math.hypot(share, THERMOMETER):.2g} %")
     out = io.StringIO()
     for line in comments:
         out.write(line + "\n")
     writer = csv.writer(out, delimiter=log.dialect.separator or ",", lineterminator="\n")
-    writer.writerow([log.names[j] for j in keep] + [TEMPERATURE, ERROR])
+    writer.writerow([log.names[j] for j in keep] + ["T_tip (K)", "dT_tip (K)"])
     temperature = spectra.temperature_K.values
     for cells, spectrum in zip(log.rows, matched, strict=True):
         numbers = ["", ""]
@@ -311,14 +300,18 @@ def _own_and_common(spectra: xr.Dataset) -> tuple[Array, float]:
     return np.sqrt(noise**2 + np.maximum(common - share * rise, 0.0)), math.sqrt(share)
 
 
-def _column(log: TextTable, pattern: re.Pattern[str]) -> int | None:
+def _column(log: TextTable, pattern: str) -> int | None:
     """Index of the first column whose heading begins so."""
-    return next((j for j, name in enumerate(log.names) if pattern.match(name)), None)
+    return next((j for j, name in enumerate(log.names) if re.match(pattern, name)), None)
+
+
+def _file_column(log: TextTable) -> int | None:
+    return _column(log, r"(?i)(file|spectrum|spectra)\b")
 
 
 def _bias(log: TextTable) -> np.ndarray | None:
     """Bias of each row in volts, NaN where blank; None without such a column."""
-    column = _column(log, _BIAS)
+    column = _column(log, r"(?i)(V_?b|bias)\b")
     if column is None:
         return None
     return log.values(column, "V", name_and_unit(log.names[column])[0], unit="V")
@@ -326,7 +319,7 @@ def _bias(log: TextTable) -> np.ndarray | None:
 
 def _match(log: TextTable, names: list[str]) -> list[int | None]:
     """For each row of the log the index of its spectrum."""
-    column = _column(log, _FILE)
+    column = _file_column(log)
     if column is not None:
         return _by_name(log, column, names)
     bias = _bias(log)
@@ -344,7 +337,8 @@ def _match(log: TextTable, names: list[str]) -> list[int | None]:
 def _bias_in_name(name: str) -> float | None:
     """Bias (V) that a spectrum's own name in its file states, else the file's name."""
     file, label = file_and_label(Path(name).name)
-    match = _IN_NAME.search(label) or _IN_NAME.search(Path(file).stem)
+    bias = r"(?:^|[^0-9A-Za-z.,-])(-?\d+(?:[.,p]\d+)?)\s?V(?![a-zA-Z0-9])"
+    match = re.search(bias, label) or re.search(bias, Path(file).stem)
     return float(match[1].replace(",", ".").replace("p", ".")) if match else None
 
 

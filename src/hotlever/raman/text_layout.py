@@ -22,11 +22,6 @@ from hotlever.tables import TextTable
 from hotlever.types import Array, Index
 from hotlever.units import quantity
 
-_MAP_COLUMNS = 40  # from so many on, rows may be spectra
-_SHIFT_UNITS = ("", "cm-1", "cm^-1", "cm⁻¹", "1/cm")
-_TURNS = 1.9  # times that each value of an axis stands in it, if positions take turns
-_OVERLAP = 0.5  # part of an axis that it repeats, from which on it is that of another spectrum
-
 
 def pick_spectra(table: TextTable) -> list[Spectrum]:
     """Every spectrum of a table, with what sets it apart: its position, or its column's heading.
@@ -46,7 +41,8 @@ def pick_spectra(table: TextTable) -> list[Spectrum]:
 def _in_rows(table: TextTable) -> list[Spectrum]:
     """Spectra of a table with the axis in its first row or its headings, as LabSpec's maps."""
     values, names = table.array, table.names
-    if values.shape[1] <= _MAP_COLUMNS:
+    # fewer columns are those of a table
+    if values.shape[1] <= 40:
         return []
     first, rows = values[0], values[1:]
     if not (is_axis(first) and reaches_line(first)):
@@ -67,7 +63,11 @@ def _in_rows(table: TextTable) -> list[Spectrum]:
 def _heading(name: str) -> float:
     """The Raman shift that a column is headed by, NaN if it is headed by anything else."""
     value, unit = quantity(name.strip())
-    return value if value is not None and unit.strip() in _SHIFT_UNITS else np.nan
+    return (
+        value
+        if value is not None and unit.strip() in ("", "cm-1", "cm^-1", "cm⁻¹", "1/cm")
+        else np.nan
+    )
 
 
 def _in_pairs(table: TextTable) -> list[Spectrum]:
@@ -127,7 +127,8 @@ def _labelled(
 def _groups(x: Array, values: Array, others: list[int]) -> list[Index]:
     """Rows of each spectrum: the axis begins again, or positions take turns along it."""
     begun = _begun_again(x)
-    if len(begun) > 1 or x.size < _TURNS * np.unique(x).size:
+    # if positions take turns each value of an axis stands in it more than once
+    if len(begun) > 1 or x.size < 1.9 * np.unique(x).size:
         return begun
     distinct = {j: np.unique(values[:, j]).size for j in others}
     few = sorted(
@@ -156,43 +157,12 @@ def _begun_again(x: Array) -> list[Index]:
         first, last = along[start], along[end - 1]
         overlap, shorter = high - first, min(high - low, last - first)
         few = min(start - starts[-1], end - start) < MIN_SAMPLES
-        if start and not few and overlap >= _OVERLAP * shorter:
+        # an axis that repeats half of one is that of another spectrum
+        if start and not few and overlap >= 0.5 * shorter:
             starts.append(start)
             low, high = first, last
         low, high = min(low, first), max(high, last)
     return np.split(finite, starts[1:])
-
-
-#: cm⁻¹; a spectrum must reach the line, and go on so far on both sides.
-SILICON_LINE, MARGIN = 520.0, 5.0
-
-#: Steps of an axis that lead on; the others go back to its beginning, where a spectrum follows.
-_STEADY = 0.9
-_SHIFT = re.compile(r"raman|shift|rel\.?\s*1/cm|wave\b|#wave|cm-1|cm\^-1|1/cm|cm⁻¹|cm\?1", re.I)
-_RAMAN = re.compile(r"raman|shift", re.I)
-_ABSOLUTE = re.compile(r"wave\s*numbers?", re.I)
-_WAVELENGTH = re.compile(r"wave\s*length|lambda|\bnm\b|\(nm\)|\[nm\]", re.I)
-#: What intensities are called: the first of these kinds that a table has are the spectra.
-_WANTED = (
-    re.compile(
-        r"(dark|baseline|background)\s*subtracted|corrected|processed|raw\s*[-−–]\s*dark", re.I
-    ),
-    re.compile(r"intensity|counts|cts|signal|ccd|raman\s*int", re.I),
-    # raw ones, where the file has no others, or any that a user has named
-    re.compile(r"raw|spectrum|sample|data|\by\b", re.I),
-)
-_OTHER, _PLAIN, _UNNAMED = -1, 2, 3  # kinds of columns beside the places in _WANTED
-_LASER = re.compile(r"laser|excitation", re.I)
-_NO_WAVELENGTH = re.compile(r"pol|power|level", re.I)
-_UNWANTED = re.compile(
-    r"pixel|index|^dark\b(?!\s*sub)|^reference$|%|absorb|irrad|transm|reflect|wave|^#?[xz]\b|time"
-    r"|background|baseline|std|\berr|error|sigma|uncert|±|\bfit|model|resid|weight|smooth|mask|flag",
-    re.I,
-)
-_MOST_COMPARED = 8  # columns; a series of many is one
-_OTHER_QUANTITY = re.compile(
-    r"[\[(]\s*(?:°?[CF]|[kmµμun]?(?:[VAKWsm]|Hz|Ohm|Ω|Pa|bar)|min|h)\s*[\])]\s*$"
-)
 
 
 def axis_of(table: TextTable) -> tuple[int, Array]:
@@ -205,12 +175,13 @@ def axis_of(table: TextTable) -> tuple[int, Array]:
     """
     values, names = table.array, table.names
     axes = [j for j in range(values.shape[1]) if is_axis(values[:, j])]
-    headed = [j for j in axes if _SHIFT.search(names[j]) and not _is_wavelength(names[j])]
-    headed += [j for j in axes if _WAVELENGTH.search(names[j])]
+    shift = r"(?i)raman|shift|rel\.?\s*1/cm|wave\b|#wave|cm-1|cm\^-1|1/cm|cm⁻¹|cm\?1"
+    headed = [j for j in axes if re.search(shift, names[j]) and not _is_wavelength(names[j])]
+    headed += [j for j in axes if _names_wavelength(names[j])]
     reaching = [j for j in axes if reaches_line(values[:, j])]
     # a position in a map reaches it too, and an axis has many values there
     reaching = [j for j in reaching if covers_line(values[:, j])] or reaching
-    absolute = [j for j in reaching if _ABSOLUTE.search(names[j])]
+    absolute = [j for j in reaching if re.search(r"(?i)wave\s*numbers?", names[j])]
     # a running number reaches 520 too, but a later column may be the axis
     others = [j for j in reaching if not is_index(values[:, j])]
     axis = (*headed, *absolute, *others, *reaching, *axes, 0)[0]
@@ -222,15 +193,25 @@ def axis_of(table: TextTable) -> tuple[int, Array]:
             f"{table.path}: none of {len(names)} columns rises or falls all the way, expected a "
             "Raman shift (cm⁻¹) in one"
         )
-    if not headed and _OTHER_QUANTITY.search(names[axis]):
+    if not headed and _is_other_quantity(names[axis]):
         raise InputError(
             f"{table.path}: the axis is '{excerpt(names[axis])}', expected a Raman shift in cm⁻¹"
         )
     return axis, x
 
 
+def _names_wavelength(name: str) -> bool:
+    return bool(re.search(r"(?i)wave\s*length|lambda|\bnm\b|\(nm\)|\[nm\]", name))
+
+
 def _is_wavelength(name: str) -> bool:
-    return bool(_WAVELENGTH.search(name) and not _RAMAN.search(name))
+    return _names_wavelength(name) and not re.search(r"(?i)raman|shift", name)
+
+
+def _is_other_quantity(name: str) -> bool:
+    """Whether a heading ends in the unit of something that is no Raman shift and no intensity."""
+    units = r"°?[CF]|[kmµμun]?(?:[VAKWsm]|Hz|Ohm|Ω|Pa|bar)|min|h"
+    return re.search(rf"[\[(]\s*(?:{units})\s*[\])]\s*$", name) is not None
 
 
 def raman_shift(table: TextTable, column: int) -> Array:
@@ -249,21 +230,24 @@ def raman_shift(table: TextTable, column: int) -> Array:
 
 
 def is_axis(column: Array) -> bool:
-    """Whether a column rises or falls all the way, or does so time and again."""
+    """Whether a column rises or falls all the way, or does so time and again.
+
+    Steps that do not lead on go back to its beginning, where a spectrum follows.
+    """
     steps = np.diff(column[np.isfinite(column)])
     rising, falling = np.count_nonzero(steps > 0.0), np.count_nonzero(steps < 0.0)
-    return bool(rising + falling and max(rising, falling) >= _STEADY * (rising + falling))
+    return bool(rising + falling and max(rising, falling) >= 0.9 * (rising + falling))
 
 
 def is_index(column: Array) -> bool:
     """Whether a column counts its rows."""
     good = column[np.isfinite(column)]
-    return bool(good.size > 1 and good[0] in (0.0, 1.0) and np.mean(np.diff(good) == 1.0) > _STEADY)
+    return bool(good.size > 1 and good[0] in (0.0, 1.0) and np.mean(np.diff(good) == 1.0) > 0.9)
 
 
 def reaches_line(column: Array) -> bool:
-    """Whether these values of an axis (cm⁻¹) hold silicon's line."""
-    low, high = SILICON_LINE - MARGIN, SILICON_LINE + MARGIN
+    """Whether these values of an axis (cm⁻¹) hold silicon's line, and go on on both sides."""
+    low, high = 515.0, 525.0
     good = column[np.isfinite(column)]
     return bool(good.min(initial=np.inf) <= low and good.max(initial=-np.inf) >= high)
 
@@ -279,7 +263,7 @@ def covers_line(column: Array) -> bool:
 def _laser(metadata: dict[str, str]) -> float | None:
     """Laser wavelength in nm, if the header gives a plausible one."""
     for key, value in metadata.items():
-        if _LASER.search(key) and not _NO_WAVELENGTH.search(key):
+        if re.search(r"(?i)laser|excitation", key) and not re.search(r"(?i)pol|power|level", key):
             number, _ = quantity(re.sub(r"^\D+", "", value))
             if number is not None and 200.0 < number < 1500.0:
                 return number
@@ -301,17 +285,18 @@ def intensities(table: TextTable, others: list[int]) -> list[int]:
     # a second axis, such as a running number, is no intensity
     useful = [j for j in useful if not is_axis(values[:, j])] or useful
     kinds = {j: _kind(names[j]) for j in useful}
-    spectra = [j for j in useful if kinds[j] != _OTHER]
-    best = min((kinds[j] for j in spectra), default=_OTHER)
+    spectra = [j for j in useful if kinds[j] >= 0]
+    best = min((kinds[j] for j in spectra), default=-1)
     # beside what is clearly named, another column may be anything
-    unclear = best < _PLAIN and _UNNAMED in kinds.values()
+    unclear = best < 2 and 3 in kinds.values()
     if unclear or (not spectra and len(useful) > 1):
         raise InputError(
             f"{table.path}: the columns beside the axis are {_listed(names, useful)}; expected "
             "intensities alone, or all of them named so"
         )
-    chosen = [j for j in spectra if kinds[j] == best or best >= _PLAIN] or useful
-    for first, second in combinations(chosen[:_MOST_COMPARED], 2):
+    chosen = [j for j in spectra if kinds[j] == best or best >= 2] or useful
+    # a series of many is one
+    for first, second in combinations(chosen[:8], 2):
         if _computed_from(values[:, first], values[:, second]):
             raise InputError(
                 f"{table.path}: columns {first + 1} and {second + 1} rise and fall as one, as "
@@ -321,12 +306,26 @@ def intensities(table: TextTable, others: list[int]) -> list[int]:
 
 
 def _kind(name: str) -> int:
-    """Place in `_WANTED` of what a column is named as, `_UNNAMED` if in none, or `_OTHER`."""
-    if _UNWANTED.search(name) and not _WANTED[0].search(name):
-        return _OTHER
-    kind = next((i for i, pattern in enumerate(_WANTED) if pattern.search(name)), _UNNAMED)
-    quantity = _OTHER_QUANTITY.search(name) and temperature_in_name(name) is None
-    return _OTHER if kind == _UNNAMED and quantity else kind
+    """Return as what kind of intensity a column is named: the first that a table has are spectra.
+
+    They are 0, corrected ones; 1, intensities; 2, raw ones, where the file has no others, or any
+    that a user has named; 3, none of these; and -1, something else.
+    """
+    kinds = (
+        r"(?i)(dark|baseline|background)\s*subtracted|corrected|processed|raw\s*[-−–]\s*dark",
+        r"(?i)intensity|counts|cts|signal|ccd|raman\s*int",
+        r"(?i)raw|spectrum|sample|data|\by\b",
+    )
+    others = (
+        r"(?i)pixel|index|^dark\b(?!\s*sub)|^reference$|%|absorb|irrad|transm|reflect|wave"
+        r"|^#?[xz]\b|time|background|baseline|std|\berr|error|sigma|uncert|±|\bfit|model|resid"
+        r"|weight|smooth|mask|flag"
+    )
+    if re.search(others, name) and not re.search(kinds[0], name):
+        return -1
+    kind = next((kind for kind, pattern in enumerate(kinds) if re.search(pattern, name)), 3)
+    other = _is_other_quantity(name) and temperature_in_name(name) is None
+    return -1 if kind == 3 and other else kind
 
 
 def _listed(names: list[str], which: list[int]) -> str:
@@ -352,5 +351,5 @@ def require_line(x: Array, where: str) -> None:
         span = f"from {good.min():g} to {good.max():g}" if good.size else "over no numbers"
         raise InputError(
             f"{where}: the axis runs {span}, expected a Raman shift that covers silicon's line "
-            f"at {SILICON_LINE:g} cm⁻¹"
+            "at 520 cm⁻¹"
         )
