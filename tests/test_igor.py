@@ -9,7 +9,6 @@ import pytest
 
 from hotlever import InputError, read_measurement
 from hotlever.measurement.columns import parse_columns
-from hotlever.tables.binary import WAVES
 
 NOTE = "V_b (V): 8\rR_s (kOhm): 5.6\rOperator: Zoë\r"
 CURRENT = np.array([1.071, 1.07, 1.0 / 3.0, 1.065])
@@ -75,7 +74,7 @@ def test_a_damaged_wave_is_one_line(tmp_path):
 def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "igor2", None)
     path = tmp_path / "curve.ibw"
-    path.write_bytes(WAVES[-1] + bytes(400))
+    path.write_bytes(b"\0\5" + bytes(400))
     with pytest.raises(InputError, match=r"curve\.ibw: .*pip install 'hotlever\[igor\]'") as error:
         read_measurement(path)
     assert "\n" not in str(error.value)

@@ -10,7 +10,6 @@ import pytest
 from hotlever import InputError, read_measurement
 from hotlever.lever.transient.waveform import read_waveform
 from hotlever.measurement import file_groups
-from hotlever.tables.binary import TDMS
 
 BIAS = np.array([0.1, 1.0, 2.0 / 3.0, 8.25])
 CURRENT = BIAS / 7e3
@@ -105,7 +104,7 @@ def test_a_damaged_file_is_one_line(tmp_path):
 def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "nptdms", None)
     path = tmp_path / "iv.tdms"
-    path.write_bytes(TDMS + bytes(24))
+    path.write_bytes(b"TDSm" + bytes(24))
     with pytest.raises(InputError, match=r"iv\.tdms: .*pip install 'hotlever\[tdms\]'") as error:
         read_measurement(path)
     assert "\n" not in str(error.value)

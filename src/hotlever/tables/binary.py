@@ -35,30 +35,6 @@ T = TypeVar("T")
 # The tables of a file by name, whose lines are made when they are asked for.
 Groups = Mapping[str, Callable[[], list[str]]]
 
-#: Content of a TDMS file begins so, that of a wave with the version of the format, in either order
-#: of bytes.
-TDMS = b"TDSm"
-WAVES = tuple(version.to_bytes(2, order) for version in (2, 3, 5) for order in ("little", "big"))
-#: So begin HDF5 files (MATLAB's of version 7.3 behind a block of their own) and MATLAB's before.
-HDF5, MATLAB = b"\x89HDF\r\n\x1a\n", b"MATLAB 5.0 MAT-file"
-_BLOCK = 512
-#: What a packed workbook of Excel's holds.
-_WORKBOOK = b"xl/workbook.xml"
-
-#: Parts of a wave of version 5 whose sizes its header states: data, formula, note, units, labels
-#: and indices.
-_PARTS = 13
-#: Groups that a question names.
-_MOST_GROUPS = 6
-#: The unit of a channel, as LabVIEW's waveforms and as DAQmx name that property.
-_UNITS = ("unit_string", "NI_UnitDescription")
-#: The same of a dataset of HDF5, as conventions and programs name that attribute.
-_HDF5_UNITS = ("units", "unit", "Units", "Unit")
-#: Time of the first value (s), and between two.
-_OFFSET, _STEP = "wf_start_offset", "wf_increment"
-#: Columns that an array may be; one of more is an image.
-_MOST_COLUMNS = 64
-
 
 @dataclass(frozen=True)
 class _Format:
@@ -72,12 +48,15 @@ class _Format:
         What brings its library, and this.
     groups : callable
         Opens a file's content for as long as a context lasts, and gives its tables.
+    named : bool
+        Whether these have names; else there is one.
     """
 
     what: str
     extra: str
     package: str
     groups: Callable[[bytes, str], AbstractContextManager[Groups]]
+    named: bool = True
 
     def read(self, raw: bytes, where: str, take: Callable[[Groups], T]) -> T:
         """Return what is taken of the tables; errors of the library are those of the input."""
@@ -111,7 +90,7 @@ def lines_of_binary(
         no such group, or several and none is named.
     """
     format_ = _format_of(raw)
-    if format_ is None or format_ is _IGOR:
+    if format_ is None or not format_.named:
         if group is not None:
             raise InputError(f"{where}: has no groups, and so no group {quoted(group)}")
         if format_ is None:
@@ -129,19 +108,26 @@ def groups_in(raw: bytes, where: str) -> list[str]:
         As `lines_of_binary`.
     """
     format_ = _format_of(raw)
-    return [] if format_ in (None, _IGOR) else format_.read(raw, where, list)
+    return format_.read(raw, where, list) if format_ is not None and format_.named else []
 
 
 def _format_of(raw: bytes) -> _Format | None:
-    if raw.startswith(TDMS):
-        return _TDMS
-    if raw.startswith(WAVES):
-        return _IGOR
-    if raw.startswith(HDF5) or raw[_BLOCK:].startswith(HDF5):
-        return _HDF5
-    if raw.startswith(MATLAB):
-        return _MATLAB
-    return _EXCEL if raw.startswith(b"PK") and _WORKBOOK in raw else None
+    """Return the format of a file by how it begins."""
+    hdf5 = b"\x89HDF\r\n\x1a\n"
+    # the version of a wave, in either order of bytes
+    waves = (b"\0\2", b"\2\0", b"\0\3", b"\3\0", b"\0\5", b"\5\0")
+    if raw.startswith(b"TDSm"):
+        return _Format("TDMS file", "tdms", "npTDMS", _tdms_groups)
+    if raw.startswith(waves):
+        return _Format("Igor wave", "igor", "igor2", _igor_groups, named=False)
+    # MATLAB's of version 7.3 have a block of their own in front
+    if raw.startswith(hdf5) or raw[512:].startswith(hdf5):
+        return _Format("HDF5 file", "hdf5", "h5py", _hdf5_groups)
+    if raw.startswith(b"MATLAB 5.0 MAT-file"):
+        return _Format("MATLAB file", "hdf5", "scipy", _matlab_groups)
+    if raw.startswith(b"PK") and b"xl/workbook.xml" in raw:
+        return _Format("workbook", "excel", "openpyxl", _excel_groups)
+    return None
 
 
 def _lines_of(groups: Groups, where: str, group: str | None, group_stated_by: str) -> list[str]:
@@ -149,8 +135,9 @@ def _lines_of(groups: Groups, where: str, group: str | None, group_stated_by: st
     if not groups:
         raise InputError(f"{where}: holds no table of numbers")
     if group is None and len(groups) > 1:
-        some = ", ".join(map(quoted, islice(groups, _MOST_GROUPS)))
-        more = f" and {len(groups) - _MOST_GROUPS} more" if len(groups) > _MOST_GROUPS else ""
+        most = 6  # that a question names
+        some = ", ".join(map(quoted, islice(groups, most)))
+        more = f" and {len(groups) - most} more" if len(groups) > most else ""
         how = group_stated_by.format(group=excerpt(next(iter(groups))))
         raise InputError(
             f"{where}: {len(groups)} groups, each a measurement of its own: {some}{more}; "
@@ -210,7 +197,8 @@ def _igor_lines(raw: bytes, where: str) -> list[str]:
 def _check_sizes(raw: bytes) -> None:
     """Raise ValueError if parts of a wave do not fit into its file: the library would go on."""
     if 5 in raw[:2]:
-        sizes = np.frombuffer(raw, "<i4" if raw[0] else ">i4", _PARTS, offset=4)
+        # those that a header states: data, formula, note, units, labels and indices
+        sizes = np.frombuffer(raw, "<i4" if raw[0] else ">i4", 13, offset=4)
         if sizes.min() < 0 or sizes.sum(dtype=np.int64) > len(raw):
             raise ValueError(f"its parts are larger than its {len(raw)} bytes")
 
@@ -310,8 +298,9 @@ def _lines_of_group(file: Any, group: Any, where: str) -> list[str]:
 
 
 def _channel(channel: Any) -> str:
-    """Return the heading of a channel."""
-    units = (str(channel.properties.get(key, "")) for key in _UNITS)
+    """Return the heading of a channel, with the unit as LabVIEW's waveforms or DAQmx name it."""
+    keys = ("unit_string", "NI_UnitDescription")
+    units = (str(channel.properties.get(key, "")) for key in keys)
     return with_units([_cell(channel.name)], [next(filter(None, units), "")])[0]
 
 
@@ -324,8 +313,8 @@ def _times(channels: Sequence[Any], names: Sequence[str], where: str) -> tuple[f
         If they are not the same, so that rows of values are of different times.
     """
     times = [
-        (float(each.properties.get(_OFFSET, 0.0)), float(each.properties.get(_STEP, 0.0)))
-        for each in channels
+        (float(of.get("wf_start_offset", 0.0)), float(of.get("wf_increment", 0.0)))
+        for of in (each.properties for each in channels)
     ]
     timed = {time: name for time, name in zip(times, names, strict=True) if time[1] > 0.0}
     if len(timed) > 1:
@@ -358,10 +347,13 @@ class _Node:
         What is said of it, as comments.
     columns : dict of int to dict
         Of so many rows each, by their headings.
+    most : int
+        Columns that an array may be; one of more is an image.
     """
 
     settings: list[str]
     columns: dict[int, dict[str, Array]]
+    most: int = 64
 
     @classmethod
     def empty(cls, settings: Sequence[str] = ()) -> _Node:
@@ -380,9 +372,9 @@ class _Node:
             self.settings.append(f"# {heading}: {_cell(float(values))}")
         elif values.ndim == 1:
             self.columns[values.size][heading] = values.astype(float)
-        elif min(values.shape) <= _MOST_COLUMNS:
+        elif min(values.shape) <= self.most:
             # a row is as many values as there are columns, whichever way the array lies
-            columns = values if values.shape[0] <= _MOST_COLUMNS < values.shape[1] else values.T
+            columns = values if values.shape[0] <= self.most < values.shape[1] else values.T
             for number, column in enumerate(columns, start=1):
                 named = _heading(f"{_cell(name)} {number}", _cell(unit))
                 self.columns[column.size][named] = column.astype(float)
@@ -446,12 +438,14 @@ def _walk_hdf5(
 
 
 def _add_dataset(node: _Node, key: str, dataset: Any) -> None:
-    units = (_decoded(dataset.attrs[name]) for name in _HDF5_UNITS if name in dataset.attrs)
+    # as conventions and programs name that attribute
+    names = ("units", "unit", "Units", "Unit")
+    units = (_decoded(dataset.attrs[name]) for name in names if name in dataset.attrs)
     if dataset.dtype.names:
         # a table of HDF5: its fields are columns
         for field in dataset.dtype.names:
             node.add(field, dataset[field])
-    elif dataset.size is None or dataset.size > MOST_LINES * _MOST_COLUMNS:
+    elif dataset.size is None or dataset.size > MOST_LINES * node.most:
         node.settings.append(f"# left out, too large: {_cell(key)}")
     elif _decoded(dataset.attrs.get("MATLAB_class", b"")) == "char":
         node.add(key, "".join(map(chr, np.ravel(dataset[()]).tolist())))
@@ -564,10 +558,3 @@ def _sheet_lines(sheet: Any, formulas: Any, where: str) -> list[str]:
         cells += [""] * (width - len(cells))
         lines.append(f"# {cells[0]}" if alone else "\t".join(cells[:width]))
     return lines
-
-
-_TDMS = _Format("TDMS file", "tdms", "npTDMS", _tdms_groups)
-_IGOR = _Format("Igor wave", "igor", "igor2", _igor_groups)
-_HDF5 = _Format("HDF5 file", "hdf5", "h5py", _hdf5_groups)
-_MATLAB = _Format("MATLAB file", "hdf5", "scipy", _matlab_groups)
-_EXCEL = _Format("workbook", "excel", "openpyxl", _excel_groups)

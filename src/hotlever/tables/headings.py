@@ -15,46 +15,19 @@ import numpy as np
 from hotlever.tables.table import DIALECTS, Dialect, Line, is_readable
 from hotlever.units import LONGEST_NUMBER, is_unit, is_unit_of, name_and_unit, plain_minus
 
-#: Lines among which a header row is looked for, how near to the numbers a comment is one, and
-#: characters of a heading.
-_MOST_ABOVE, _NEAR, _LONGEST_HEADING = 2000, 20, 100
-#: First cells of what stands between the sweeps of LabVIEW and of B1500 files, up to the next
-#: header row; and of a row with the units of the columns.
-_BETWEEN = {"channels", "setuptitle", "labview measurement"}
-_UNIT_ROWS = ("y_unit_label", "vertical units", "unit", "units")
-#: LabVIEW's column of times, which may stand before that of each channel.
-_X = "X_Value"
-#: Last words of the heading of a column that has the unit of the one before it, and what Keithley
-#: writes there, in capitals or not.
-_UNIT_COLUMNS = {"unit", "units"}
-_OF_BUFFERS = {"volt dc": "V", "amp dc": "A", "vdc": "V", "adc": "A"}
-#: LabVIEW's last column, for remarks, which most rows leave out.
-_REMARKS = "comment"
 #: Marks of a comment, around it, and quotes.
 _MARKS = ' \t"#%!'
-#: A first cell in which a spreadsheet says that there is no value, which begins no comment.
-_FIRST_CELL = re.compile(
-    r"#(?:(?:N/A|DIV/0!|NUM!|VALUE!|REF!|NULL!|NAME\?)[\"\s]|"
-    r"(?:N/A|NV|[A-ZÀ-Ý]{3,}(?:/0)?[!?]|#+)\"?\s*[\t;,|])"
-)
-#: What begins as numbers do, behind marks or the letters with which some meters tell their state:
-#: ``(1.5)``, ``~1``, ``='2``, ``CV+4.0E-01``; and a date, a time or a number with its unit.
-_BEGINS_NUMBER = re.compile(r"[\W_]*[.,]?\d|[A-Za-z]{1,3}[+-]?\d+[.,]\d")
-_LIKE_A_NUMBER = re.compile(
-    r"[\W_]*(?:[A-Za-z]{1,3}(?=[+-]?\d+[.,]))?[+-]?[.,]?\d"
-    r"(?:[\d\s.,:/'’+-]|[eEdDT](?=[+-]?\d))*(?P<unit>.*?)[\W_]*"
-)
-_UNIT_PREFIXES = set("yzafpnuµμmkMGT")
-#: Headings in quotes, with blanks between them.
-_QUOTED = re.compile(r'\s*"[^"]*"(?:\s+"[^"]*")+\s*')
-#: A row of marks between the headings and the numbers.
-_UNDERLINE = re.compile(r"[\s:=+|-]*")
 
 
 def is_comment(line: str) -> bool:
     """Whether a line starts with the mark of a comment."""
     text = line.lstrip(' "')
-    return text.startswith("#") and not _FIRST_CELL.match(text)
+    # a first cell in which a spreadsheet says that there is no value begins no comment
+    no_value = (
+        r"#(?:(?:N/A|DIV/0!|NUM!|VALUE!|REF!|NULL!|NAME\?)[\"\s]|"
+        r"(?:N/A|NV|[A-ZÀ-Ý]{3,}(?:/0)?[!?]|#+)\"?\s*[\t;,|])"
+    )
+    return text.startswith("#") and not re.match(no_value, text)
 
 
 def begins_number(cell: str) -> bool:
@@ -65,7 +38,9 @@ def begins_number(cell: str) -> bool:
     >>> [begins_number(cell) for cell in ("-9", "(9)", "16:20:11", "V_b", "---")]
     [True, True, True, False, False]
     """
-    return _BEGINS_NUMBER.match(plain_minus(cell[:LONGEST_NUMBER])) is not None
+    # behind marks, or the letters with which some meters tell their state: (1.5), ~1, CV+4.0E-01
+    begin = r"[\W_]*[.,]?\d|[A-Za-z]{1,3}[+-]?\d+[.,]\d"
+    return re.match(begin, plain_minus(cell[:LONGEST_NUMBER])) is not None
 
 
 def is_like_a_number(cell: str) -> bool:
@@ -78,9 +53,13 @@ def is_like_a_number(cell: str) -> bool:
     """
     if is_readable(cell):
         return True
-    match = _LIKE_A_NUMBER.fullmatch(plain_minus(cell[:LONGEST_NUMBER]))
+    alike = (
+        r"[\W_]*(?:[A-Za-z]{1,3}(?=[+-]?\d+[.,]))?[+-]?[.,]?\d"
+        r"(?:[\d\s.,:/'’+-]|[eEdDT](?=[+-]?\d))*(?P<unit>.*?)[\W_]*"
+    )
+    match = re.fullmatch(alike, plain_minus(cell[:LONGEST_NUMBER]))
     unit = match["unit"] if match else "?"
-    return not unit or unit in _UNIT_PREFIXES or is_unit(unit)
+    return not unit or unit in set("yzafpnuµμmkMGT") or is_unit(unit)
 
 
 def separator_in(line: str) -> str | None:
@@ -125,7 +104,7 @@ def row_mostly_of_numbers(line: str) -> tuple[str | None, int] | None:
 
 def is_underline(cells: Sequence[str]) -> bool:
     """Whether a line merely underlines the headings above it."""
-    return all(map(_UNDERLINE.fullmatch, cells))
+    return all(re.fullmatch(r"[\s:=+|-]*", cell) for cell in cells)
 
 
 def headings_in(line: str) -> list[str]:
@@ -141,7 +120,7 @@ def headings_in(line: str) -> list[str]:
     if separator is not None and (cells := Dialect(separator).cells(text)) is not None:
         return [cells[0].strip(_MARKS), *cells[1:]]
     names: list[str] = []
-    if _QUOTED.fullmatch(line):
+    if re.fullmatch(r'\s*"[^"]*"(?:\s+"[^"]*")+\s*', line):
         return [name.strip(' "') for name in re.findall('"[^"]*"', line)]
     for word in line.strip(_MARKS).split():
         if names and (word[0] in "([{</" or names[-1].endswith("/")):
@@ -161,7 +140,7 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
 
     def width(index: int) -> int:
         names = headings_in(lines[index][1])
-        short_names = [name for name in names if len(name) <= _LONGEST_HEADING]
+        short_names = [name for name in names if len(name) <= 100]
         return len(names) if sum(map(is_heading, short_names)) >= 2 else 0
 
     plain = [index for index, (_, line) in enumerate(lines) if not is_comment(line)]
@@ -179,9 +158,10 @@ def header_row(lines: Sequence[Line], is_heading: Callable[[str], bool]) -> int 
             for next_line in below
         )
 
-    for order, index in enumerate(plain[:_MOST_ABOVE]):
+    for order, index in enumerate(plain[:2000]):
         if is_row(order):
-            above = range(max(plain[order - 1] + 1 if order else 0, index - _NEAR), index)
+            # a comment near to the numbers
+            above = range(max(plain[order - 1] + 1 if order else 0, index - 20), index)
             for comment in reversed(above):
                 mostly = row_mostly_of_numbers(lines[index][1])
                 count = width(comment) or -1
@@ -229,7 +209,7 @@ def _above_the_rows(lines: Sequence[Line], plain: Sequence[int]) -> int | None:
     None if there is no line above it without a number, or the run begins with the first line of
     all, unless that has words and counts columns.
     """
-    rows = [headings_in(lines[index][1]) for index in plain[:_MOST_ABOVE]]
+    rows = [headings_in(lines[index][1]) for index in plain[:2000]]
     widths = [len(row) if len(row) > 1 and any(map(begins_number, row)) else 0 for row in rows]
     ends, longest, start = 0, 0, 0
     for width, run in groupby(widths):
@@ -262,18 +242,22 @@ def unquoted(line: str) -> str:
 
 
 def begins_other_lines(cells: Sequence[str]) -> bool:
-    """Whether a line begins what stands between two sweeps of a file, up to the next header row."""
-    return cells[0].lower() in _BETWEEN
+    """Whether a line begins what stands between two sweeps of a file, up to the next header row.
+
+    So do first cells of LabVIEW's and of a B1500's files.
+    """
+    return cells[0].lower() in ("channels", "setuptitle", "labview measurement")
 
 
 def may_end_early(names: Sequence[str]) -> bool:
-    """Whether rows may lack the last column, which is one for remarks."""
-    return names[-1].lower() == _REMARKS
+    """Whether rows may lack the last column, which is one for remarks as LabVIEW's."""
+    return names[-1].lower() == "comment"
 
 
 def is_row_of_units(line: str) -> bool:
     """Whether a comment says that it has the units of the columns."""
-    return line[:20].strip(_MARKS).lower().startswith(_UNIT_ROWS)
+    first = line[:20].strip(_MARKS).lower()
+    return first.startswith(("y_unit_label", "vertical units", "unit"))
 
 
 def without_marks(name: str) -> str:
@@ -289,10 +273,11 @@ def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
     >>> with_units(["V_b", "I_h (mA)", "note"], ["V", "A"])
     ['V_b (V)', 'I_h (mA)', 'note']
     """
-    if list(names).count(_X) > 1 and any(map(is_unit, units[2:3])):
+    times = "X_Value"  # LabVIEW's, which may stand before each channel
+    if list(names).count(times) > 1 and any(map(is_unit, units[2:3])):
         # units of the channels alone, where each has times of its own
         of_channels = iter(units[1:])
-        units = ["" if name == _X else next(of_channels, "") for name in names]
+        units = ["" if name == times else next(of_channels, "") for name in names]
     units = [*units, *[""] * (len(names) - len(units))]
     return [
         f"{name} ({unit})" if is_unit_of(name, unit) and name_and_unit(name)[1] is None else name
@@ -312,14 +297,16 @@ def units_beside(names: Sequence[str], rows: Sequence[Sequence[str]]) -> list[st
         With a row's index and the units there and above, if they differ.
     """
     units = [""] * len(names)
+    # what Keithley writes there, in capitals or not
+    of_buffers = {"volt dc": "V", "amp dc": "A", "vdc": "V", "adc": "A"}
     for index, name in enumerate(names[1:], start=1):
         of, _, word = name.casefold().rpartition(" ")
-        if word in _UNIT_COLUMNS and names[index - 1].casefold().startswith(of):
+        if word in ("unit", "units") and names[index - 1].casefold().startswith(of):
             written = [row[index] for row in rows]
             other = next((row for row, cell in enumerate(written) if cell != written[0]), None)
             if other is not None:
                 raise ValueError(other, written[other], written[0])
-            units[index - 1] = _OF_BUFFERS.get(written[0].casefold(), written[0])
+            units[index - 1] = of_buffers.get(written[0].casefold(), written[0])
     return units
 
 
@@ -350,11 +337,6 @@ def names_above(above: Sequence[Line], dialect: Dialect, width: int) -> tuple[li
 
 # --- tables that do not stand below their header row --------------------------------------------
 
-#: First and last heading of LabOne's lines of fields: one line for each column of a table.
-_FIELDS = ("chunk", "fieldname")
-#: First cell, and cells in front of the rows, of a TDS's file, whose settings stand beside them.
-_BESIDE, _IN_FRONT = "record length", 3
-
 
 def below_a_header(lines: list[Line]) -> list[Line]:
     """Return the lines of a file whose table has its header row above its rows.
@@ -369,9 +351,11 @@ def below_a_header(lines: list[Line]) -> list[Line]:
     if dialect is None or dialect.separator is None:
         return lines
     first = [cell.strip().lower() for cell in dialect.cells(first_line) or []]
-    if len(first) > 3 and (first[0], first[3]) == _FIELDS:
+    # LabOne's lines of fields: one for each column
+    if len(first) > 3 and (first[0], first[3]) == ("chunk", "fieldname"):
         return _columns_of_fields(lines, dialect.separator)
-    if len(first) > _IN_FRONT + 1 and first[0] == _BESIDE:
+    # a TDS's file, whose settings stand beside the rows
+    if len(first) > 4 and first[0] == "record length":
         return _rows_beside_settings(lines, dialect.separator)
     return lines
 
@@ -402,7 +386,7 @@ def _rows_beside_settings(lines: list[Line], separator: str) -> list[Line]:
         if key:
             settings[key.lower()] = value
             comments.append((number, f"# {key}: {value}"))
-        rows.append((number, separator.join(cells[_IN_FRONT - 2 :])))
+        rows.append((number, separator.join(cells[1:])))
     time, unit = settings.get("horizontal units", ""), settings.get("vertical units", "")
     names = (
         f"TIME ({time})" if time else "TIME",

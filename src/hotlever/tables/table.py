@@ -28,24 +28,11 @@ from hotlever.units import (
     unknown_unit,
 )
 
-MOST_LINES = 200_000  #: of a file, unless its reader says otherwise
-LONGEST_LINE = 2**17  #: characters; a spectrometer's map has some 40 000
-
+#: Lines of a file, unless its reader says otherwise.
+MOST_LINES = 200_000
 # A line of a file, and its number.
 Line = tuple[int, str]
 
-#: Lines by which a file's dialect is told.
-_SAMPLE_LINES = 40
-#: How XML and HTML begin.
-_MARKUP = re.compile(r"\s*<(?:\?xml|!doctype|!--|html|head|body|table|lsx_)\b", re.I)
-#: How workbooks begin, packed (.xlsx, .ods) or of old (.xls).
-_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
-#: A line of nothing but numbers, in any dialect.
-_PLAIN = re.compile(r"[-+.0-9eE \t;,|]*")
-#: What separates cells without another mark, but for blanks within a number; and blanks before an
-#: exponent.
-_FIXED_BLANKS = "\u00a0\u2007\u202f"
-_BLANKS, _EXPONENT = re.compile(rf"[^\S{_FIXED_BLANKS}]+"), re.compile(r"(?<=\d) +(?=E[-+]\d)")
 #: Cells that say that there is no value, in small letters and without a sign: of databases and
 #: programs; of meters, recorders and oscilloscopes beyond their range; and of open inputs.
 _NO_VALUE = {
@@ -54,11 +41,8 @@ _NO_VALUE = {
     *("overload", "ovld", "ovl", "ol", "o.l", "o.l.", "overrange", "over range", "over", "o.r."),
     *("o.f.", "underflow", "underrange", "under range", "under", "burnout", "burn out"),
 }
-#: The same as patterns: marks in place of digits, the names of C's libraries for numbers that are
-#: none, and errors of spreadsheets in any language.
-_NO_VALUES = re.compile(r"\*{2,}|#{2,}|nan\(\w*\)|1\.#[a-z]+\d*|#(?:n/a|nv|[^\W\d]+(?:/0)?[!?])")
-#: What SCPI instruments write for "not a number" and for infinity, and a B1500 for no value.
-_OF_NO_VALUE = {9.91e37, 9.9e37, 1.99999e101}
+#: Blanks within a number, which separate no cells.
+_FIXED_BLANKS = "\u00a0\u2007\u202f"
 
 
 def decode(raw: bytes, where: str) -> str:
@@ -95,30 +79,33 @@ def decode(raw: bytes, where: str) -> str:
     raise InputError(f"{where}: a binary file, not a text file")
 
 
-def text_lines(raw: bytes, where: str, most: int = MOST_LINES) -> list[str]:
+def text_lines(raw: bytes, where: str, most: int = MOST_LINES, longest: int = 2**17) -> list[str]:
     """Decode a file's content, and split it into at most as many lines.
+
+    A spectrometer's map has lines of some 40 000 characters.
 
     Raises
     ------
     InputError
         If it is no text or markup, or has too many lines or too long a line.
     """
-    if raw.startswith(_WORKBOOKS):
+    # packed (.xlsx, .ods) or of old (.xls)
+    if raw.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         raise InputError(
             f"{where}: a workbook such as Excel's, expected .xlsx or a table in text: save the "
             "sheet as CSV"
         )
     text = decode(raw, where)
-    if _MARKUP.match(text):
+    if re.match(r"(?i)\s*<(?:\?xml|!doctype|!--|html|head|body|table|lsx_)\b", text):
         # numbers among its tags are parts of arrays, or settings
         raise InputError(f"{where}: an XML or HTML file, expected a table in text, such as CSV")
     lines = text.splitlines()
     if len(lines) > most:
         raise InputError(f"{where}: {len(lines)} lines, expected at most {most}")
     for number, line in enumerate(lines, start=1):
-        if len(line) > LONGEST_LINE:
+        if len(line) > longest:
             raise InputError(
-                f"{where}: line {number}: {len(line)} characters, expected at most {LONGEST_LINE}"
+                f"{where}: line {number}: {len(line)} characters, expected at most {longest}"
             )
     return lines
 
@@ -146,13 +133,22 @@ def number(cell: str, decimal_comma: bool = False) -> float | None:
         return None
     if NUMBER.fullmatch(cell):
         value = float(cell.replace(",", ".").lower().replace("d", "e"))
-        if abs(value) in _OF_NO_VALUE:
+        # SCPI instruments write so for "not a number" and for infinity, and a B1500 for no value
+        if abs(value) in (9.91e37, 9.9e37, 1.99999e101):
             return math.nan
         if ("." if decimal_comma else ",") in cell:
             return None
         return value if abs(value) <= LARGEST_NUMBER else None
     word = cell.lstrip("+-").casefold()
-    return math.nan if word in _NO_VALUE or _NO_VALUES.fullmatch(word) else None
+    return math.nan if _says_no_value(word) else None
+
+
+def _says_no_value(word: str) -> bool:
+    """Whether a cell, in small letters and without a sign, says that there is no value."""
+    # marks in place of digits, the names of C's libraries for numbers that are none, and errors of
+    # spreadsheets in any language
+    marks = r"\*{2,}|#{2,}|nan\(\w*\)|1\.#[a-z]+\d*|#(?:n/a|nv|[^\W\d]+(?:/0)?[!?])"
+    return word in _NO_VALUE or re.fullmatch(marks, word) is not None
 
 
 def is_readable(cell: str) -> bool:
@@ -172,7 +168,7 @@ class Dialect:
     def of(cls, lines: Sequence[Line]) -> Dialect:
         """Return what makes the most of a sample of lines rows of numbers; two columns beat one."""
         tail = lines[len(lines) // 4 :] if len(lines) > 8 else lines
-        sample = [line for _, line in tail[:: max(len(tail) // _SAMPLE_LINES, 1)]]
+        sample = [line for _, line in tail[:: max(len(tail) // 40, 1)]]
 
         def fit(dialect: Dialect) -> tuple[int, int]:
             rows = [row for line in sample if (row := dialect.row(line)) is not None]
@@ -188,8 +184,9 @@ class Dialect:
         line = line.strip(" ")
         if self.separator is None:
             # an exponent belongs to the number before it
-            line = _EXPONENT.sub("", line) if "E" in line else line
-            return [cell.strip('"') for cell in _BLANKS.split(line.strip())]
+            line = re.sub(r"(?<=\d) +(?=E[-+]\d)", "", line) if "E" in line else line
+            blanks = rf"[^\S{_FIXED_BLANKS}]+"
+            return [cell.strip('"') for cell in re.split(blanks, line.strip())]
         if '"' not in line:
             return [cell.strip() for cell in line.split(self.separator)]
         quotes = csv.reader([line], delimiter=self.separator, skipinitialspace=True, strict=True)
@@ -225,7 +222,7 @@ class Dialect:
     def row(self, line: str) -> Array | None:
         """Return the numbers of a line, NaN for blank cells, None if it holds anything else."""
         # nearly every line has nothing but numbers, and maps have millions
-        if _PLAIN.fullmatch(line) and not (self.decimal_comma and "." in line):
+        if not line.strip("-+.0123456789eE \t;,|") and not (self.decimal_comma and "." in line):
             cells = (line.replace(",", ".") if self.decimal_comma else line).split(self.separator)
             for read in (float, _number_or_blank):
                 with suppress(ValueError):
@@ -255,10 +252,6 @@ DIALECTS = [
     for decimal_comma in (False, True)
     if (separator, decimal_comma) != (",", True)
 ]
-
-#: A number with a mark of thousands, or with three decimals; and a small whole number, and any.
-_GROUPED, _SMALL = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}"), re.compile(r"[+-]?[1-9]\d{0,2}")
-_WHOLE = re.compile(r"[+-]?\d+")
 
 
 @dataclass(frozen=True)
@@ -370,8 +363,11 @@ class TextTable:
             # numbers of three decimals all the way have no whole ones beside them
             if (
                 commas
-                and all(_GROUPED.fullmatch(cells[row]) for row in commas)
-                and (any(map(_SMALL.fullmatch, cells)) or self._may_have_thousands)
+                and all(_is_grouped(cells[row]) for row in commas)
+                and (
+                    any(re.fullmatch(r"[+-]?[1-9]\d{0,2}", cell) for cell in cells)
+                    or self._may_have_thousands
+                )
             ):
                 cell = cells[commas[0]]
                 raise InputError(
@@ -385,7 +381,8 @@ class TextTable:
         """Whether commas may be marks of thousands, since there are whole numbers and no others."""
         cells = [plain_minus(cell) for row in self.rows for cell in row]
         commas = [cell for cell in cells if "," in cell and self.dialect.number(cell) is not None]
-        return all(map(_GROUPED.fullmatch, commas)) and any(map(_WHOLE.fullmatch, cells))
+        whole = any(re.fullmatch(r"[+-]?\d+", cell) for cell in cells)
+        return all(map(_is_grouped, commas)) and whole
 
     def values(self, column: int, inside: str, name: str, unit: str = "") -> Array:
         """Return a column's numbers in the unit `inside`, NaN where there is none.
@@ -409,3 +406,8 @@ class TextTable:
         if converted is None:
             raise unknown_unit(unit, inside, f"{self.where(-1)}: {excerpt(heading)}")
         return converted[0] * self.numbers(column, name) + converted[1]
+
+
+def _is_grouped(cell: str) -> bool:
+    """Whether a cell is a number with a mark of thousands, or with three decimals."""
+    return re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", cell) is not None

@@ -243,19 +243,18 @@ class _Reader:
 
 # --- numbers anywhere -----------------------------------------------------------------------------
 
-#: Of a file; a map of 500 spectra below each other has half a million lines.
-MOST_LINES, MOST_NUMBERS = 600_000, 10_000_000
-_RIVAL = 0.25  # part of the rows that may be of another width
-_MOST_GAPS = 0.1  # of rows; where more have no number, the file means something else
-_SPLIT = re.compile(r",0\d+(,|$)")  # a decimal comma's digits, taken for a cell
-_FEWEST_ROWS = 12  # of a further table; a spectrum has more
+#: Of a further table in a file; a spectrum has more.
+_FEWEST_ROWS = 12
 
 
-def find_tables(raw: bytes, path: str) -> list[TextTable]:
+def find_tables(
+    raw: bytes, path: str, most_lines: int = 600_000, most_numbers: int = 10_000_000
+) -> list[TextTable]:
     """Find the tables of numbers that have the commonest number of columns.
 
     A table goes on beyond lines that say nothing, such as a comment; what has a header of its own
-    is another one, to which the first header applies too where its own says nothing else.
+    is another one, to which the first header applies too where its own says nothing else. A map of
+    500 spectra below each other has half a million lines.
 
     Raises
     ------
@@ -269,7 +268,7 @@ def find_tables(raw: bytes, path: str) -> list[TextTable]:
     >>> table.array.tolist(), table.names, table.settings
     ([[1.5, 10.0], [2.5, 20.0], [3.5, 30.0]], ['shift', 'counts'], {'Laser (nm)': '532'})
     """
-    lines = filled_lines(raw, path, MOST_LINES)
+    lines = filled_lines(raw, path, most_lines)
     if not lines:
         raise InputError(f"{path}: the file is empty, expected a table of numbers")
     dialect = Dialect.of(lines)
@@ -278,8 +277,8 @@ def find_tables(raw: bytes, path: str) -> list[TextTable]:
     for _, line in lines:
         rows.append(row := dialect.row(line))
         size += 0 if row is None else row.size
-        if size > MOST_NUMBERS:
-            raise InputError(f"{path}: more than {MOST_NUMBERS} numbers, expected fewer")
+        if size > most_numbers:
+            raise InputError(f"{path}: more than {most_numbers} numbers, expected fewer")
     _check_commas(lines, dialect, path)
     widths = Counter(row.size for row in rows if row is not None)
     if widths.total() < 2:
@@ -289,7 +288,7 @@ def find_tables(raw: bytes, path: str) -> list[TextTable]:
         )
     width, count = widths.most_common(1)[0]
     for other, rivals in widths.items():
-        if other != width > 1 < other and rivals > max(_FEWEST_ROWS, _RIVAL * count):
+        if other != width > 1 < other and rivals > max(_FEWEST_ROWS, 0.25 * count):
             raise InputError(
                 f"{path}: {count} rows of {width} numbers and {rivals} of {other}, expected rows "
                 "of as many cells"
@@ -318,7 +317,8 @@ def find_tables(raw: bytes, path: str) -> list[TextTable]:
 
 def _check_commas(lines: list[Line], dialect: Dialect, path: str) -> None:
     """Refuse decimal commas between cells that commas separate: the cells are halves of numbers."""
-    split = [line for _, line in lines if "." not in line and _SPLIT.search(line)]
+    # its digits, taken for a cell
+    split = [line for _, line in lines if "." not in line and re.search(r",0\d+(,|$)", line)]
     if dialect.separator == "," and len(split) > 1:
         raise InputError(
             f"{path}: decimal commas between commas (line '{excerpt(split[0])}'), expected decimal "
@@ -350,7 +350,8 @@ def _to_one_width(
             if numbers[0] is not None and not np.isnan(numbers[0]):
                 rows[index] = np.array(numbers, dtype=float)
                 odd, count = odd or cells[numbers.index(None)], count + 1
-    if count > max(_FEWEST_ROWS, _MOST_GAPS * len(inside)):
+    # where more have no number, the file means something else
+    if count > max(_FEWEST_ROWS, 0.1 * len(inside)):
         raise InputError(
             f"{path}: {count} rows of {len(inside) + count} have a cell that is no number, the "
             f"first '{excerpt(odd)}'; expected numbers"
