@@ -13,7 +13,7 @@ import numpy as np
 
 from hotlever.errors import InputError, counted, excerpt, unknown_name
 from hotlever.files import read_bytes
-from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
+from hotlever.measurement.data import MEASURED
 from hotlever.quantities import FITTED, MEASURANDS, PLAIN
 from hotlever.tables import TextTable, read_table
 from hotlever.tables.table import text_lines
@@ -27,15 +27,6 @@ _SYMBOLS = {
 UNUSED = "unused"
 #: In place of a quantity: the group of a binary file that the columns are those of.
 GROUP = "group"
-#: µs that a table in time lasts at most, unless one says that it is one: longer ones are slow
-#: sweeps with the time of each row.
-BRIEF = 1e4
-#: First heading of a B1500's table, whose units are those of SI without a prefix.
-_IN_SI = "DataName"
-#: Unused columns that a note names, and of those how many it says more of.
-_MOST_NAMES, _MOST_HINTS = 6, 2
-#: Bytes of a file of column names.
-_LARGEST = 100_000
 
 
 @dataclass(frozen=True)
@@ -139,7 +130,7 @@ def _lines(text: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
     if "=" in str(text):
         yield f"--column {text!s}", str(text)
         return
-    for row, line in enumerate(text_lines(read_bytes(text, _LARGEST), str(text)), start=1):
+    for row, line in enumerate(text_lines(read_bytes(text, 100_000), str(text)), start=1):
         if line.strip() and not line.lstrip().startswith("#"):
             yield f"{text}: line {row}", line
 
@@ -150,9 +141,9 @@ def _quantity(heading: str, assigned: bool = False) -> tuple[str | None, str | N
     The name alone is no time, unless it is assigned: settings of instruments are called so too.
     """
     name, unit = name_and_unit(heading)
-    of_time = assigned or conversion(unit or "", MEASURANDS[TIME].typed_unit)
+    of_time = assigned or conversion(unit or "", MEASURANDS["t"].typed_unit)
     is_time = name.casefold() in TIMES and of_time
-    return TIME if is_time else symbol_of(name), unit
+    return "t" if is_time else symbol_of(name), unit
 
 
 def quantity_of(heading: str, *, assigned: bool = False) -> str | None:
@@ -223,7 +214,7 @@ def find_columns(
                 "expected one of them"
             )
         columns[symbol] = _column(table, symbol, index, unit)
-    in_time = driven or TIME in columns
+    in_time = driven or "t" in columns
     unavailable = unused | {column.index for column in columns.values()}
     candidates = defaultdict[str, list[int]](list)
     for index, heading in enumerate(table.names):
@@ -234,13 +225,13 @@ def find_columns(
         # its own symbol names a quantity before any other name
         own = [i for i in indices if name_and_unit(table.names[i])[0].lower() == symbol.lower()]
         first, *others = own or indices
-        if others and symbol != TIME:
+        if others and symbol != "t":
             raise InputError(
                 f"{where}: column '{symbol}' stands twice; {_assignment(symbol)} says which it is"
             )
         columns[symbol] = _column(table, symbol, first, None)
-    if TIME in columns and not (in_time or _are_brief(table, columns[TIME])):
-        del columns[TIME]
+    if "t" in columns and not (in_time or _are_brief(table, columns["t"])):
+        del columns["t"]
     if not driven:
         _take_the_only_ones(table, columns, unused)
     _require(table, columns, driven)
@@ -259,7 +250,7 @@ def _take_the_only_ones(
             for index, heading in enumerate(table.names)
             if index not in used and conversion(name_and_unit(heading)[1] or "", unit)
         ]
-        missing = symbol not in columns and not (symbol == "V_b" and LEVER in columns)
+        missing = symbol not in columns and not (symbol == "V_b" and "V_l" in columns)
         plain = [i for i in may_be if _bare(name_and_unit(table.names[i])[0]) in headings]
         if missing and plain == may_be and len(plain) == 1:
             columns[symbol] = _column(table, symbol, plain[0], None)
@@ -270,7 +261,8 @@ def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> 
     heading, inside = table.names[index], MEASURANDS[symbol].typed_unit
     where = f"{table.where(-1)}: column '{excerpt(heading or str(index + 1))}'"
     written = name_and_unit(heading)[1]
-    if table.names[:1] == [_IN_SI]:
+    # a B1500's table is in the units of SI without a prefix
+    if table.names[:1] == ["DataName"]:
         written = written or inside[-1]
     unit = assigned or written
     if unit is None:
@@ -300,16 +292,19 @@ def _assignment(symbol: str, heading: str = "HEADING") -> str:
 
 
 def _are_brief(table: TextTable, column: Column) -> bool:
-    """Whether times are numbers, and close enough to each other for what is measured in time."""
+    """Whether times are numbers, and close enough to each other for what is measured in time.
+
+    Longer ones are slow sweeps with the time of each row.
+    """
     if table.dialect.number(table.rows[0][column.index]) is None:
         return False  # clocks show no numbers
     times = column.values(table)
-    return bool(0.0 < np.nanmax(times, initial=-np.inf) - np.nanmin(times, initial=np.inf) <= BRIEF)
+    return bool(0.0 < np.nanmax(times, initial=-np.inf) - np.nanmin(times, initial=np.inf) <= 1e4)
 
 
 def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> None:
     """Refuse a table without bias or times, or without anything that depends on them."""
-    if driven and TIME not in columns:
+    if driven and "t" not in columns:
         raise InputError(
             f"{table.where(-1)}: no column of the time, expected one like 'time (us)' beside a "
             f"wave form; another name with --column 't (s)={excerpt(table.names[0]) or 1}'"
@@ -322,10 +317,10 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
         )
     observed = {
         *(column.symbol for column in FITTED.values()),
-        *([LEVER] if TIME in columns else []),
+        *(["V_l"] if "t" in columns else []),
     }
-    has_bias = driven or "V_b" in columns or {LEVER, "I_h"} <= columns.keys()
-    has_bias = has_bias or (DISTANCE in columns and constant_bias(table) is not None)
+    has_bias = driven or "V_b" in columns or {"V_l", "I_h"} <= columns.keys()
+    has_bias = has_bias or ("D" in columns and constant_bias(table) is not None)
     if has_bias and observed & columns.keys():
         return
     names = ", ".join(repr(excerpt(name)) for name in table.names[:9])
@@ -366,7 +361,7 @@ def note_on_bias(
     bias = columns["V_b"]
     return [
         f"{table.path}: {bias.origin} is the only voltage and counts as the bias; if it is "
-        f"that over the lever, say {_assignment(LEVER, bias.heading)}"
+        f"that over the lever, say {_assignment('V_l', bias.heading)}"
     ]
 
 
@@ -382,7 +377,7 @@ def note_on_header(table: TextTable, assigned: Sequence[Assignment]) -> list[str
 
     if not names or any(map(is_known, names)):
         return []
-    row = ", ".join(f"'{excerpt(name)}'" for name in names[:_MOST_NAMES])
+    row = ", ".join(f"'{excerpt(name)}'" for name in names[:6])
     return [f"{table.where(-1)}: {row} is taken for the header row"]
 
 
@@ -407,7 +402,7 @@ def note_on_unused(table: TextTable, columns: Mapping[str, Column]) -> list[str]
     unused = [
         (heading, name_and_unit(heading)[1] or "")
         for index, heading in enumerate(table.names)
-        if index not in used and heading != _IN_SI and heading.strip()
+        if index not in used and heading != "DataName" and heading.strip()
     ]
     missing = [measurand for measurand in MEASURED if measurand.symbol not in columns]
     hints = []
@@ -420,7 +415,8 @@ def note_on_unused(table: TextTable, columns: Mapping[str, Column]) -> list[str]
     if not unused:
         return []
     names = [f"'{excerpt(heading)}'" for heading, _ in unused]
-    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    what = f"columns {', '.join(names[:_MOST_NAMES])}{more} are"
+    most = 6
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    what = f"columns {', '.join(names[:most])}{more} are"
     what = what if len(names) > 1 else f"column {names[0]} is"
-    return [f"{table.path}: {'; '.join([f'{what} not used', *hints[:_MOST_HINTS]])}"]
+    return [f"{table.path}: {'; '.join([f'{what} not used', *hints[:2]])}"]

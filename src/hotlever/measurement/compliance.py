@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hotlever.errors import counted
-from hotlever.measurement.data import LEVER, Measurement
+from hotlever.measurement.data import Measurement
 from hotlever.measurement.rows import sweeps_of
 from hotlever.probe import Circuit
 from hotlever.quantities import MEASURANDS, OBSERVABLES
@@ -129,7 +129,7 @@ def _columns(measurement: Measurement, circuit: Circuit | None) -> Iterator[_Col
         ohm = circuit.series_resistance_ohm
     if ohm:
         lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
-        yield _Column(LEVER, lever, "I_h", current, of_source=True)
+        yield _Column("V_l", lever, "I_h", current, of_source=True)
     for name in ("reader", "bridge"):
         symbol = OBSERVABLES[name].symbol
         yield _Column(symbol, measurement.observable(name), "V_b", bias, of_source=False)

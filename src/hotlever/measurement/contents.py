@@ -12,7 +12,7 @@ import numpy as np
 from hotlever.errors import InputError, excerpt
 from hotlever.materials.air import ATMOSPHERE
 from hotlever.measurement.columns import Column
-from hotlever.measurement.data import DISTANCE, LEVER, MEASURED, TIME
+from hotlever.measurement.data import MEASURED
 from hotlever.probe import Circuit
 from hotlever.probe.priors import share_of
 from hotlever.quantities import FITTED, MEASURANDS
@@ -39,52 +39,25 @@ _SETTINGS = {
     "gas_conductivity": ("gas conductivity", "of air's"),
     "raman_scale": ("raman_scale", "of the rise"),
 }
-#: Those that the probe gives where a file is silent.
-_OF_THE_PROBE = ("series_resistance_ohm", "base_temperature_K", "medium")
-#: Their names as people write them, without case, blanks and underscores.
-_SPELLINGS = {
-    **dict.fromkeys(
-        ("rs", "rseries", "seriesresistance", "seriesresistor", "vorwiderstand"),
-        "series_resistance_ohm",
-    ),
-    **dict.fromkeys(
-        ("basetemperature", "basetemp", "tbase", "t0", "basistemperatur"), "base_temperature_K"
-    ),
-    **dict.fromkeys(("medium", "gas", "atmosphere", "environment", "surroundings"), "medium"),
-    "p": "pressure_mbar",
-    "ramanscale": "raman_scale",
+#: Media by their names, and other gases, whose conductivity is another.
+_MEDIA = {
+    "vacuum": "vacuum",
+    "evacuated": "vacuum",
+    "air": "air",
+    "nitrogen": "nitrogen",
+    "n2": "nitrogen",
 }
-#: Where a comment is split: at ``; ``, and at ``, `` and tabs where another setting follows.
-_BETWEEN = re.compile(r";\s|, (?=(?:[^,=:]|,(?! ))*[=:])|\t(?=[^\t=:]*[=:])")
-#: What seems to be a setting, and is said to be unclear unless it is read as one.
-_LIKE_A_SETTING = re.compile(
-    r"(?:series.?resist|base.?temp|(?:medium|pressure)\b)"
-    r"|(?:(?:r_?s(?:eries)?|t_?(?:base|0))\b(?!-)|t\s*[=:]).*\d"
-    r"|[^=:;\t]*(?:resist(?:or|ance)|widerstand|temp(?:eratur(?:e)?)?)\b.*\d",
-    re.I,
-)
-#: Media by their names; other gases, whose conductivity is another; and all of these.
-_MEDIA = {"vacuum": "vacuum", "evacuated": "vacuum", "air": "air"}
-_MEDIA |= dict.fromkeys(("nitrogen", "n2"), "nitrogen")
 _OTHER_GASES = {
     *("helium", "he", "argon", "ar", "hydrogen", "h2", "oxygen", "o2", "co2", "neon", "ne"),
     *("krypton", "kr", "xenon", "xe", "sf6", "methane", "ch4", "steam", "water", "oil"),
 }
-_GASES = {*_MEDIA, *_OTHER_GASES}
-_NOT = {"no", "not", "without", "non", "or"}
-#: Units of pressures, and words beside which gas and pressure alone are clear without a name.
-_PRESSURES = {"mbar", "bar", "hpa", "kpa", "pa", "mpa", "torr", "mtorr", "atm"}
-_PLAIN = {"in", "at", "of", "dry", "lab", "still", "ambient", "e"}
 #: κ of nitrogen over that of air, within 1.3 % from 300 to 1200 K: the dilute gases of Lemmon and
 #: Jacobsen, Int. J. Thermophys. 25, 21 (2004).
 NITROGEN = 0.975
 #: mbar; a gas below it, of free molecules, takes less than 0.2 % of a lever's power.
 VACUUM_MBAR = 0.05
-_LARGEST_MBAR = 1e6
-#: A number with a unit, in text of a limited length.
-_WITH_UNIT = re.compile(r"([-+]?\d[\d.,]*(?:e[-+]?\d+)?)\s*([A-Za-z]+)", re.I | re.ASCII)
-_LONGEST = 200  # characters of a medium
-_LONGEST_COMMENT = 2000
+#: Characters of a setting that are looked at.
+_LONGEST = 200
 
 
 @dataclass
@@ -113,7 +86,9 @@ class Settings:
         thousands = ",." if table.dialect.decimal_comma else ","
         for line, text in table.comments:
             where = f"{table.path}: line {line}"
-            for part in _BETWEEN.split(text):
+            # at '; ', and at ', ' and tabs where another setting follows
+            between = r";\s|, (?=(?:[^,=:]|,(?! ))*[=:])|\t(?=[^\t=:]*[=:])"
+            for part in re.split(between, text):
                 values = _setting(part, where, thousands)
                 if values is None:
                     settings.notes.append(
@@ -121,7 +96,7 @@ class Settings:
                         "line like '# R_s (kOhm): 5.6', '# base temperature (K): 293' or "
                         "'# medium: air'"
                     )
-                elif not values and _words(part) & _GASES:
+                elif not values and _gases(part):
                     mentioned.append((where, part))
                 for name, value in (values or {}).items():
                     first = settings.values.get(name, value)
@@ -150,7 +125,7 @@ class Settings:
             if value is not None:
                 text = value if isinstance(value, str) else f"{value:g} {unit}"
                 yield name, text, self.origin[attribute]
-            elif attribute in _OF_THE_PROBE:
+            elif attribute in ("series_resistance_ohm", "base_temperature_K", "medium"):
                 yield name, "not said", "the probe's counts"
 
     def _settle(self, path: str) -> None:
@@ -159,7 +134,7 @@ class Settings:
         if pressure is not None:
             line = self.origin["pressure_mbar"]
             where = f"{path}: {line}"
-            plausible(f"{where}: pressure", "mbar", pressure, 0.0, _LARGEST_MBAR)
+            plausible(f"{where}: pressure", "mbar", pressure, 0.0, 1e6)
             if pressure <= VACUUM_MBAR:
                 if medium != "vacuum":
                     self.notes.append(f"{where}: {pressure:g} mbar of any gas count as vacuum")
@@ -179,21 +154,37 @@ class Settings:
 
 def _setting(text: str, where: str, thousands: str) -> dict[str, Any] | None:
     """Return what a comment sets, nothing where it is another comment, None where it is unclear."""
-    if len(text) > _LONGEST_COMMENT:
+    if len(text) > 2000:
         return None
     key, value = key_and_value(text)
     words = _words(key)
-    if not value and words & {*_MEDIA, *_PRESSURES} and words <= _GASES | _PRESSURES | _PLAIN:
-        return _gas(key, where)  # as in 100 mbar N2
+    pressures = {"mbar", "bar", "hpa", "kpa", "pa", "mpa", "torr", "mtorr", "atm"}
+    # beside these gas and pressure alone are clear without a name, as in 100 mbar N2
+    plain = {"in", "at", "of", "dry", "lab", "still", "ambient", "e"}
+    if not value and words & {*_MEDIA, *pressures} and words <= _gases(key) | pressures | plain:
+        return _gas(key, where)
     if not value:
         # cells of a file with commas
         key, value = (part.strip(' ,"') for part in (*key.split(",", 1), "")[:2])
     name, unit = name_and_unit(key)
     bare = re.sub(r"[\W_]+", "", name[:40]).lower()
-    attribute = "pressure_mbar" if bare.endswith("pressure") else _SPELLINGS.get(bare)
+    # as people write them, without case, blanks and underscores
+    spellings = {
+        **dict.fromkeys(
+            ("rs", "rseries", "seriesresistance", "seriesresistor", "vorwiderstand"),
+            "series_resistance_ohm",
+        ),
+        **dict.fromkeys(
+            ("basetemperature", "basetemp", "tbase", "t0", "basistemperatur"), "base_temperature_K"
+        ),
+        **dict.fromkeys(("medium", "gas", "atmosphere", "environment", "surroundings"), "medium"),
+        "p": "pressure_mbar",
+        "ramanscale": "raman_scale",
+    }
+    attribute = "pressure_mbar" if bare.endswith("pressure") else spellings.get(bare)
     if value and attribute == "medium":
-        return _gas(value, where) if bare == "medium" or _words(value) & _GASES else None
-    if value and attribute == "pressure_mbar" and unit is None and _words(value) & _GASES:
+        return _gas(value, where) if bare == "medium" or _gases(value) else None
+    if value and attribute == "pressure_mbar" and unit is None and _gases(value):
         return _gas(value, where)
     if value and attribute == "raman_scale":
         return {attribute: share_of(value[:_LONGEST], f"{where}: {attribute}")}
@@ -211,11 +202,21 @@ def _setting(text: str, where: str, thousands: str) -> dict[str, Any] | None:
     units = unit or "", unit_behind(rest)
     measured = any(conversion(each, inside) for each in units for inside in ("ohm", "K", "mbar"))
     measured = measured and (number is not None or key[-1:] in (")", "]"))
-    return None if measured or _LIKE_A_SETTING.match(text.strip(' \t#"')) else {}
+    # what seems to be a setting is said to be unclear
+    alike = (
+        r"(?i)(?:series.?resist|base.?temp|(?:medium|pressure)\b)"
+        r"|(?:(?:r_?s(?:eries)?|t_?(?:base|0))\b(?!-)|t\s*[=:]).*\d"
+        r"|[^=:;\t]*(?:resist(?:or|ance)|widerstand|temp(?:eratur(?:e)?)?)\b.*\d"
+    )
+    return None if measured or re.match(alike, text.strip(' \t#"')) else {}
 
 
 def _words(text: str) -> set[str]:
     return set(re.findall(r"[a-z]+\d?\b", text[:_LONGEST].lower()))
+
+
+def _gases(text: str) -> set[str]:
+    return _words(text) & {*_MEDIA, *_OTHER_GASES}
 
 
 def _gas(text: str, where: str) -> dict[str, Any]:
@@ -233,7 +234,8 @@ def _gas(text: str, where: str) -> dict[str, Any]:
         media &= {"vacuum"}
     else:
         first = re.match(r"[\W\d_]*([a-z]+\d?)", text[:_LONGEST].lower())
-        denied = words & _NOT and (first is None or first[1] not in _MEDIA)
+        begins_so = first is not None and first[1] in _MEDIA
+        denied = words & {"no", "not", "without", "non", "or"} and not begins_so
         if len(media) > 1 or denied or words & _OTHER_GASES or not (media or settings):
             raise InputError(
                 f"{where}: medium is '{excerpt(text)}', expected vacuum, air or nitrogen, with its "
@@ -244,7 +246,8 @@ def _gas(text: str, where: str) -> dict[str, Any]:
 
 def _pressure(text: str, where: str) -> float | None:
     """Return the pressure (mbar) that a text names, None if there is none."""
-    for number, unit in _WITH_UNIT.findall(plain_powers(text[:_LONGEST])):
+    with_unit = r"(?ia)([-+]?\d[\d.,]*(?:e[-+]?\d+)?)\s*([A-Za-z]+)"
+    for number, unit in re.findall(with_unit, plain_powers(text[:_LONGEST])):
         scale, value = conversion(unit, "mbar"), quantity(number)[0]
         if scale is not None and value is not None:
             if may_be_thousands(number):
@@ -291,7 +294,7 @@ class Contents:
         self.values = dict.fromkeys(MEASURANDS, np.full(len(self.table.rows), np.nan))
         for symbol, column in self.columns.items():
             self.values[symbol] = column.values(self.table)
-            if symbol not in ("V_b", LEVER, TIME):
+            if symbol not in ("V_b", "V_l", "t"):
                 filled = np.array([bool(row[column.index]) for row in self.table.rows])
                 missing = np.isnan(self.values[symbol]) & filled
                 self.note_rows(missing, f"{symbol} is written as missing")
@@ -324,21 +327,15 @@ class Contents:
             self.notes.append(f"{self.table.where(int(np.argmax(rows)))}: {text}{others}")
 
 
-#: A standard error this much smaller than the largest value is none.
-_LEAST_ERROR = 1e-9
 #: Part of the largest value by which noise and drift may push a current or voltage below 0.
 NOISE = 0.05
-#: K, and standard errors, by which a tip may seem colder than its base.
-_COLDER_K, _COLDER_ERRORS = 20.0, 4.0
-#: Resistances (kΩ) of levers, cold and hot.
-_LEVER_KOHM = (0.1, 60.0)
-#: K; probe files take no colder base.
-_COLDEST_BASE_K = 250.0
 
 
-def colder_than_base(tip_K: Array, error_K: Array, base_K: float) -> Mask:
+def colder_than_base(
+    tip_K: Array, error_K: Array, base_K: float, offset_K: float = 20.0, errors: float = 4.0
+) -> Mask:
     """Return where a tip seems colder than its base by more than an offset or noise explain."""
-    margin = np.maximum(_COLDER_K, _COLDER_ERRORS * np.nan_to_num(error_K))
+    margin = np.maximum(offset_K, errors * np.nan_to_num(error_K))
     return np.asarray(tip_K < base_K - margin)
 
 
@@ -361,8 +358,8 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
         size = np.nanmax(np.abs(values[of]), initial=0.0)
         if symbol != of:
             expected = f"a standard error above 0 and up to {high:g} {unit}, or an empty cell"
-            contents.refuse((data <= _LEAST_ERROR * size) | (data > high), expected, symbol)
-        elif symbol != DISTANCE and not np.isnan(data).all():
+            contents.refuse((data <= 1e-9 * size) | (data > high), expected, symbol)
+        elif symbol != "D" and not np.isnan(data).all():
             if unit == "K":
                 contents.refuse(data <= 0.0, "a temperature above 0 K", symbol)
             where = f"{contents.table.path}: the largest {symbol}"
@@ -371,7 +368,8 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
             plausible(where, unit, size, low, high)
             negative = (data < -NOISE * size) & (not either)
             contents.note_rows(negative, f"{symbol} is negative")
-    base = settings.get("base_temperature_K", _COLDEST_BASE_K)
+    # probe files take no colder base
+    base = settings.get("base_temperature_K", 250.0)
     for symbol in (each.symbol for each in FITTED.values() if each.unit == "K"):
         contents.note_rows(
             colder_than_base(values[symbol], values["d" + symbol], base),
@@ -404,6 +402,6 @@ def _likely_mistakes(bias: Array, current: Array, series_kohm: float) -> str:
         "is the unit of V_b wrong (V labelled mV)?": 1000.0 * kohm - series_kohm,
         "is the unit of R_s wrong (ohm labelled kOhm)?": kohm - series_kohm / 1000.0,
     }
-    low, high = _LEVER_KOHM
+    low, high = 0.1, 60.0  # of levers, cold and hot
     questions = [ask for ask, of in lever_kohm.items() if low < of.min() and of.max() < high]
     return f": {' or: '.join(questions)}" if questions else ""

@@ -21,16 +21,8 @@ from hotlever.types import Array, Mask
 if TYPE_CHECKING:
     import xarray as xr
 
-#: The time, in files of what was measured in time.
-TIME = "t"
-#: The voltage over the lever, from which the bias follows.
-LEVER = "V_l"
 #: The columns that a measurement keeps: the bias, observables and standard errors.
-MEASURED = [measurand for symbol, measurand in MEASURANDS.items() if symbol not in (TIME, LEVER)]
-#: The distance of the apex to the sample, by which the rows of one lever differ.
-DISTANCE = "D"
-#: mbar; between these the pressure is no matter to a lever without a temperature jump.
-_DENSE_MBAR = 700.0, 1200.0
+MEASURED = [measurand for symbol, measurand in MEASURANDS.items() if symbol not in ("t", "V_l")]
 
 
 @dataclass(frozen=True)
@@ -270,7 +262,8 @@ def with_measured_circuit(
     names = ["series_resistance_ohm", "base_temperature_K"]
     if changes["medium"] == measured_in == "air":
         names.append("gas_conductivity")
-        low, high = _DENSE_MBAR
+        # between these the pressure is no matter to a lever without a temperature jump
+        low, high = 700.0, 1200.0
         if probe.surroundings.accommodation is not None:
             names.append("pressure_mbar")
         elif not low <= (measurement.pressure_mbar or low) <= high:
@@ -313,7 +306,7 @@ def check_sample(measurement: Measurement, probe: Probe) -> list[str]:
             )
         for wrong, expected in (
             (values <= base_K, f"more than the base temperature, {base_K:g} K"),
-            (np.isfinite(values) & measurement.out_of_contact, f"{DISTANCE} of 0, in contact"),
+            (np.isfinite(values) & measurement.out_of_contact, "D of 0, in contact"),
         ):
             if wrong.any():
                 row = int(np.argmax(wrong))
@@ -324,9 +317,9 @@ def check_sample(measurement: Measurement, probe: Probe) -> list[str]:
     if measurement.distance_um is None or np.isnan(measurement.distance_um).all():
         return []
     if measurement.time_us is not None:
-        raise InputError(f"{where}: {DISTANCE} counts at rest only, expected no column of the time")
+        raise InputError(f"{where}: D counts at rest only, expected no column of the time")
     if probe.contact is None:
-        return [f"{DISTANCE}: the probe has no [contact], so that distances do not count"]
+        return ["D: the probe has no [contact], so that distances do not count"]
     return []
 
 

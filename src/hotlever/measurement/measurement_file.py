@@ -29,11 +29,8 @@ from hotlever.measurement.columns import (
 from hotlever.measurement.compliance import without_rows_at_compliance
 from hotlever.measurement.contents import NOISE, Contents, Settings, check
 from hotlever.measurement.data import (
-    DISTANCE,
-    LEVER,
     MEASURED,
     OPTIONAL,
-    TIME,
     Measurement,
     noise_about_neighbours,
 )
@@ -43,9 +40,6 @@ from hotlever.quantities import FITTED, MEASURANDS
 from hotlever.tables import groups_in
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS, name_and_unit
-
-#: What changes its sign with the polarity.
-_TURNED = ("V_b", LEVER, "I_h", "V_r", "V_bridge")
 
 
 @dataclass(frozen=True)
@@ -105,52 +99,52 @@ def find_bias(
     if waveform is not None:
         if "V_b" in columns:
             contents.note("V_b is not used beside the wave form that was given")
-        before = values[TIME] < 0.0
-        contents.refuse(before, "times from 0 on, where the wave form begins", TIME)
-        values["V_b"] = waveform.bias(values[TIME])
+        before = values["t"] < 0.0
+        contents.refuse(before, "times from 0 on, where the wave form begins", "t")
+        values["V_b"] = waveform.bias(values["t"])
         contents.origin["V_b"] = "the wave form"
     elif "V_b" in columns:
         contents.refuse(np.isnan(values["V_b"]), "a bias", "V_b")
-    elif (bias := constant_bias(contents.table)) is not None and LEVER not in columns:
+    elif (bias := constant_bias(contents.table)) is not None and "V_l" not in columns:
         values["V_b"] = np.full_like(values["V_b"], bias)
         contents.origin["V_b"] = "a comment, the same for all rows"
     else:
         _bias_of_lever_voltage(contents, circuit, options)
-    if LEVER in columns and TIME in columns and "I_h" not in columns:
+    if "V_l" in columns and "t" in columns and "I_h" not in columns:
         _current_of_voltages(contents, circuit)
-    elif LEVER in columns and "V_b" in columns and waveform is None:
+    elif "V_l" in columns and "V_b" in columns and waveform is None:
         _compare_voltages(contents, options)
 
 
 def _bias_of_lever_voltage(
     contents: Contents, circuit: Circuit | None, options: BiasOptions
 ) -> None:
-    lever, current = contents.values[LEVER], contents.values["I_h"]
-    for symbol, missing in ((LEVER, np.isnan(lever)), ("I_h", np.isnan(current))):
-        contents.refuse(missing, f"a number, since V_b follows from {LEVER}", symbol)
-    kohm = _series_kohm(contents, circuit, f"{LEVER} without R_s, from which the bias follows")
+    lever, current = contents.values["V_l"], contents.values["I_h"]
+    for symbol, missing in (("V_l", np.isnan(lever)), ("I_h", np.isnan(current))):
+        contents.refuse(missing, "a number, since V_b follows from V_l", symbol)
+    kohm = _series_kohm(contents, circuit, "V_l without R_s, from which the bias follows")
     more = _telling_kohm(lever, current, kohm, options)
-    if TIME not in contents.columns and more > kohm:
+    if "t" not in contents.columns and more > kohm:
         contents.note(
             f"V_b = V_l + R_s I_h with R_s = {1000.0 * kohm:g} ohm does not tell the points beyond "
             f"the knee apart; {more:g} kOhm are reckoned with instead, which changes nothing that "
             "a lever shows"
         )
         kohm = more
-        what = f"the resistance that {LEVER} over I_h asks for"
+        what = "the resistance that V_l over I_h asks for"
         _put_resistance(contents, 1000.0 * kohm, what, "reckoned with")
     bias = contents.values["V_b"] = lever + kohm * current
-    contents.refuse(np.abs(bias) > MOST_BIAS, f"a bias of at most {MOST_BIAS:g} V", LEVER)
-    contents.origin["V_b"] = f"{LEVER} + R_s I_h"
+    contents.refuse(np.abs(bias) > MOST_BIAS, f"a bias of at most {MOST_BIAS:g} V", "V_l")
+    contents.origin["V_b"] = "V_l + R_s I_h"
 
 
 def _current_of_voltages(contents: Contents, circuit: Circuit | None) -> None:
-    how = f"I_h follows from V_b - {LEVER} and R_s"
+    how = "I_h follows from V_b - V_l and R_s"
     kohm = _series_kohm(contents, circuit, f"{how} alone")
     if kohm == 0.0:
         raise InputError(f"{contents.table.path}: {how}, which is 0 ohm, expected more")
-    contents.values["I_h"] = (contents.values["V_b"] - contents.values[LEVER]) / kohm
-    contents.origin["I_h"] = f"(V_b - {LEVER}) / R_s"
+    contents.values["I_h"] = (contents.values["V_b"] - contents.values["V_l"]) / kohm
+    contents.origin["I_h"] = "(V_b - V_l) / R_s"
     contents.note(f"{how} = {1000.0 * kohm:g} ohm, which counts as known")
 
 
@@ -190,22 +184,22 @@ def _compare_voltages(contents: Contents, options: BiasOptions) -> None:
     """Take R_s from bias and lever voltage, or check that the one given agrees with them."""
     path, values = contents.table.path, contents.values
     settings = contents.settings.values
-    behind, current = values["V_b"] - values[LEVER], values["I_h"]
+    behind, current = values["V_b"] - values["V_l"], values["I_h"]
     warm = np.abs(current) > options.cold * np.nanmax(np.abs(current), initial=0.0)
     warm &= np.isfinite(behind)
     if not warm.any():
-        contents.note(f"{LEVER} is not used beside V_b without I_h")
+        contents.note("V_l is not used beside V_b without I_h")
         return
     kohm = float(np.median(behind[warm] / current[warm]))
     ohm = settings.get("series_resistance_ohm", 1000.0 * kohm)
     off = np.abs(behind[warm] - ohm / 1000.0 * current[warm])
     if kohm < 0.0 or np.median(off) > options.agreement * np.abs(values["V_b"]).max():
         raise InputError(
-            f"{path}: V_b - {LEVER} is {kohm:.4g} kOhm times I_h, expected R_s = "
+            f"{path}: V_b - V_l is {kohm:.4g} kOhm times I_h, expected R_s = "
             f"{ohm:.4g} ohm; is a unit wrong?"
         )
     if "series_resistance_ohm" not in settings:
-        origin = f"V_b - {LEVER} over I_h"
+        origin = "V_b - V_l over I_h"
         _put_resistance(contents, float(f"{1000.0 * kohm:.4g}"), origin, origin)
 
 
@@ -221,13 +215,15 @@ def mirror(contents: Contents) -> None:
     sign = np.where(values["V_b"] < 0.0, -1.0, 1.0)
     if (sign > 0.0).all():
         return
-    bias = "V_b" if "V_b" in contents.columns else LEVER
-    for symbol in _TURNED:
+    bias = "V_b" if "V_b" in contents.columns else "V_l"
+    # what changes its sign with the polarity
+    turned = ("V_b", "V_l", "I_h", "V_r", "V_bridge")
+    for symbol in turned:
         values[symbol] = sign * values[symbol]
         size = np.nanmax(np.abs(values[symbol]), initial=0.0)
         if not MEASURANDS[symbol].signed:
             contents.refuse(values[symbol] < -NOISE * size, "the same sign", bias, symbol)
-    others = " and ".join(symbol for symbol in _TURNED[2:] if symbol in contents.columns)
+    others = " and ".join(symbol for symbol in turned[2:] if symbol in contents.columns)
     contents.note_rows(sign < 0.0, f"V_b is negative, and counts as positive with {others}")
 
 
@@ -239,18 +235,18 @@ def check_times(contents: Contents) -> None:
     InputError
         If there are some, or there are fewer than two.
     """
-    times = contents.values[TIME]
-    contents.refuse(np.isnan(times), "a time", TIME)
+    times = contents.values["t"]
+    contents.refuse(np.isnan(times), "a time", "t")
     falls = np.diff(times, prepend=-np.inf) <= 0.0
-    above = contents.cell(TIME, int(np.argmax(falls)) - 1)
-    contents.refuse(falls, f"a time after that above, '{above}'", TIME)
+    above = contents.cell("t", int(np.argmax(falls)) - 1)
+    contents.refuse(falls, f"a time after that above, '{above}'", "t")
     if times.size < 2:
         raise InputError(f"{contents.table.path}: found one row, expected two or more times")
 
 
 def leave_out_jumps(contents: Contents, waveform: Waveform, options: BiasOptions) -> None:
     """Leave out what was measured when the bias jumps: nobody can tell if before or behind."""
-    times, values = contents.values[TIME], contents.values
+    times, values = contents.values["t"], contents.values
     same = options.same_time
     pieces = waveform.pieces(float(times[-1]) * (1.0 + same) + same)
     jumps = np.array([piece.start for piece in pieces if piece.jumps])
@@ -268,7 +264,7 @@ def find_waveform(contents: Contents, options: BiasOptions) -> Waveform:
     InputError
         If these lines are too many, or times before 0 show a lever that is not cold.
     """
-    table, times, bias = contents.table, contents.values[TIME], contents.values["V_b"]
+    table, times, bias = contents.table, contents.values["t"], contents.values["V_b"]
     largest = float(np.abs(bias).max())
     noise = noise_about_neighbours(bias) if bias.size > 4 else 0.0
     scatter = min(options.deviations * noise, options.noise * largest)
@@ -280,7 +276,7 @@ def find_waveform(contents: Contents, options: BiasOptions) -> Waveform:
             "of a lever that is cold, or times that count from where it is switched on"
         )
     if not begins_on:
-        times = contents.values[TIME] = times - times[0]
+        times = contents.values["t"] = times - times[0]
     corners = _corners(times, bias, tolerance, options.most_lines)
     if corners is None:
         raise InputError(
@@ -332,11 +328,6 @@ def _corners(times: Array, bias: Array, tolerance: float, most_lines: int) -> Ar
     return np.array(sorted(corners))
 
 
-_MOST_NOTES = 20
-#: Cells of a column that are shown, and columns.
-_CELLS, _MOST = 3, 60
-
-
 def read_measurement(
     path: str | os.PathLike[str],
     columns: Mapping[str, str] | None = None,
@@ -357,8 +348,7 @@ def read_measurement(
     negative bias are mirrored: lever and circuit are symmetric, but for held supplies.
 
     A table with a column ``time (us)``, in any unit of time, is of what was measured in time if it
-    lasts `hotlever.measurement.columns.BRIEF` at most, or a wave form or the column are
-    told of; it begins with a cold lever.
+    lasts 10 ms at most, or a wave form or the column are told of; it begins with a cold lever.
 
     Parameters
     ----------
@@ -389,7 +379,7 @@ def read_measurement(
         for line, text in table.remarks
     )
     contents = Contents(table, quantities, settings, [*settings.notes, *remarks])
-    if TIME in quantities:
+    if "t" in quantities:
         waveform, order = _complete_in_time(contents, circuit, waveform)
     else:
         signed = signed or (circuit is not None and not circuit.starts_cold)
@@ -404,16 +394,17 @@ def read_measurement(
         *contents.notes,
         *note_on_bias(table, quantities, assigned),
     ]
-    more = len(notes) - _MOST_NOTES
+    most = 20
+    more = len(notes) - most
     if more > 0:
-        notes[_MOST_NOTES:] = [f"{path}: {more} more such notes"]
+        notes[most:] = [f"{path}: {more} more such notes"]
     rows: dict[str, Any] = {column.name: contents.values[column.symbol] for column in MEASURED}
     absent = [name for name in OPTIONAL if np.isnan(rows[name]).all()]
     rows |= dict.fromkeys(absent)
     measurement = Measurement(
         **rows,
         **settings.values,
-        time_us=contents.values[TIME] if TIME in quantities else None,
+        time_us=contents.values["t"] if "t" in quantities else None,
         waveform=waveform,
         path=table.path,
         sha256=table.sha256,
@@ -455,7 +446,7 @@ def _complete_at_rest(
     order = described(bias, sweeps)
     if len(sweeps) > 1:
         contents.note(f"{len(sweeps)} sweeps, all of them used: {order}")
-    if len(sweeps) > 1 and DISTANCE not in contents.columns:
+    if len(sweeps) > 1 and "D" not in contents.columns:
         data = {column.symbol: contents.values[column.symbol] for column in FITTED.values()}
         for text in disagreements(bias, sweeps, data, symmetric):
             contents.note(text)
@@ -583,9 +574,9 @@ def file_columns(
                 symbols[table.index(each.heading)] = each.symbol or ""
     headings = [name.casefold() for name in table.names]
     shown_columns = []
-    for index, heading in enumerate(table.names[:_MOST]):
+    for index, heading in enumerate(table.names[:60]):
         is_alone = bool(heading) and headings.count(heading.casefold()) == 1 and "=" not in heading
-        cells = tuple(excerpt(row[index]) for row in table.rows[:_CELLS])
+        cells = tuple(excerpt(row[index]) for row in table.rows[:3])
         name = heading if is_alone and not heading.isdecimal() else str(index + 1)
         unit = name_and_unit(heading)[1] or ""
         shown_columns.append(FileColumn(heading, unit, name, cells, symbols.get(index, "")))
