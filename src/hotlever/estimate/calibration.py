@@ -60,11 +60,11 @@ def calibrated(
     """
     probe, reason = estimate.probe, estimate.reason
     circuit, medium, at_V = probe.circuit, probe.surroundings.medium, options.at_V
-    tip = tip_by_bias(solution, options.samples, at_V, progress)
-    notes = [*estimate.notes, *what_data_lack(measured, circuit, tip.table.tip_K.values)]
-    notes += [tip.asymmetry] if tip.asymmetry and not reason else []
-    notes += [jump.note for jump in tip.jumps]
-    notes += [] if reason else what_spectra_would_do(solution, tip.table)
+    table, jumps, asymmetry = tip_by_bias(solution, options.samples, at_V, progress)
+    notes = [*estimate.notes, *what_data_lack(measured, circuit, table.tip_K.values)]
+    notes += [asymmetry] if asymmetry and not reason else []
+    notes += [jump.note for jump in jumps]
+    notes += [] if reason else what_spectra_would_do(solution, table)
     notes += outlier_notes(solution.residuals, solution.prediction.values, robust=True)
     own, vacuum = solution.branch, _hotter(solution, "vacuum")
     # beyond the measured range a coarse lever says where the knee is
@@ -91,16 +91,16 @@ def calibrated(
             "[contact] would give it one"
         )
     notes += _of_exact_edges(probe, estimate.priors)
-    bias = tip.table.bias_V.values
-    row = int(np.nanargmax(tip.table.tip_K) if at_V is None else np.searchsorted(bias, at_V))
-    at_row = tip.table.isel(bias=slice(row, row + 1))
+    bias = table.bias_V.values
+    row = int(np.nanargmax(table.tip_K) if at_V is None else np.searchsorted(bias, at_V))
+    at_row = table.isel(bias=slice(row, row + 1))
     if by_power:
         law, residual = law_of_model(vacuum, None if threshold is None else threshold.power_mW)
     return replace(
         estimate,
         measurement=measured,
         notes=notes,
-        table=tip.table,
+        table=table,
         gum=budget_of_estimate(solution, at_row, options.budget_of),
         route=route,
         power_law=law,

@@ -22,30 +22,6 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
 
-@dataclass(frozen=True)
-class KneeOptions:
-    """How the knee is found among measured points.
-
-    Attributes
-    ----------
-    neighbourhood : float
-        Points whose power is within this factor of the highest lever voltage's are used.
-    fewest, fewest_beside : int
-        Points near the knee, and on either side of it.
-    range : float
-        The knee is sought within this factor of the highest measured lever voltage's power.
-    powers, samples : int
-        At how many powers it is sought, and how many smooth curves tell its error.
-    """
-
-    neighbourhood: float = 1.8
-    fewest: int = 6
-    fewest_beside: int = 2
-    range: float = 1.35
-    powers: int = 151
-    samples: int = 300
-
-
 class KneePoint(NamedTuple):
     """Where an I-V curve has its highest lever voltage."""
 
@@ -84,7 +60,7 @@ class IVCurve:
                 f"{circuit.series_resistance_ohm:g} ohm, expected positive ones"
             )
         curve = curve.rows(~lost)
-        fewest = KneeOptions.fewest
+        fewest = 6
         if curve.bias_V.size < fewest:
             raise InputError(
                 f"{counted(curve.bias_V.size, 'point')} with bias and current, expected at least "
@@ -165,7 +141,15 @@ class KneeOutsideError(InputError):
 
 
 def find_knee(
-    curve: IVCurve, like: Branch | None = None, options: KneeOptions | None = None
+    curve: IVCurve,
+    like: Branch | None = None,
+    *,
+    neighbourhood: float = 1.8,
+    fewest: int = 6,
+    fewest_beside: int = 2,
+    search: float = 1.35,
+    powers: int = 151,
+    samples: int = 300,
 ) -> Knee:
     """Find the knee in a measured I-V curve.
 
@@ -178,7 +162,14 @@ def find_knee(
         scaled to the measured knee, is used: the resistance is a smoother function of the
         temperature than of the power. Halves the bias; also says where the knee is to be
         expected when it is outside the range.
-    options : KneeOptions, optional
+    neighbourhood : float
+        Points whose power is within this factor of the highest lever voltage's are used.
+    fewest, fewest_beside : int
+        Points near the knee, and on either side of it.
+    search : float
+        The knee is sought within this factor of the highest measured lever voltage's power.
+    powers, samples : int
+        At how many powers it is sought, and how many smooth curves tell its error.
 
     Raises
     ------
@@ -192,30 +183,28 @@ def find_knee(
             "without a series resistance the lever jumps at its knee, so a measured curve ends "
             "there and does not show it; measure with one of some kΩ"
         )
-    options = options or KneeOptions()
-    factor, beside_knee = options.neighbourhood, options.fewest_beside
-    _check_sides(curve, like, beside_knee)
+    _check_sides(curve, like, fewest_beside)
     peak_mW = float(curve.power_mW[curve.peak])
-    near = curve.rows(np.abs(np.log(curve.power_mW / peak_mW)) < np.log(factor))
+    near = curve.rows(np.abs(np.log(curve.power_mW / peak_mW)) < np.log(neighbourhood))
     smooth = SmoothCurves(near, peak_mW, like)
     measured = smooth.points.power_mW
     beside = min((measured < peak_mW).sum(), (measured > peak_mW).sum())
-    if measured.size < options.fewest or beside < beside_knee:
+    if measured.size < fewest or beside < fewest_beside:
         raise InputError(
-            f"{counted(measured.size, 'point')} with {peak_mW / factor:.2f} to "
-            f"{peak_mW * factor:.2f} mW, near the knee, expected at least {options.fewest} with "
-            f"{beside_knee} on either side; measure more finely there"
+            f"{counted(measured.size, 'point')} with {peak_mW / neighbourhood:.2f} to "
+            f"{peak_mW * neighbourhood:.2f} mW, near the knee, expected at least {fewest} with "
+            f"{fewest_beside} on either side; measure more finely there"
         )
-    low = max(peak_mW / options.range, measured[0])
-    high = min(peak_mW * options.range, measured[-1])
-    power = np.linspace(low, high, options.powers)
+    low = max(peak_mW / search, measured[0])
+    high = min(peak_mW * search, measured[-1])
+    power = np.linspace(low, high, powers)
     likeliest = smooth.likeliest(power)
-    if likeliest.peak in (0, options.powers - 1):
+    if likeliest.peak in (0, powers - 1):
         raise KneeOutsideError(
             "the lever voltage is highest at the end of the points near the knee "
             f"({power[likeliest.peak]:.3f} mW): measure beyond it, and more finely"
         )
-    errors = np.std([sample.vertex for sample in smooth.samples(power, options.samples)], axis=0)
+    errors = np.std([sample.vertex for sample in smooth.samples(power, samples)], axis=0)
     values = [*likeliest.vertex, *errors.tolist(), smooth.current_noise, measured.size]
     return Knee(*values)
 
@@ -370,11 +359,12 @@ class Scale:
     power_stderr: float
 
 
-def scale_to(curve: IVCurve, like: Branch) -> Scale:
+def scale_to(curve: IVCurve, like: Branch, fewest: int = 2) -> Scale:
     """Stretch the resistance against power of one lever to the points of another.
 
     Uses every point up to the knee, and needs no knee: the resistance rises with the temperature,
-    so the power at which it has risen by as much tells the scale.
+    so the power at which it has risen by as much tells the scale. There are so many points below
+    the highest lever voltage at least.
 
     Raises
     ------
@@ -382,7 +372,7 @@ def scale_to(curve: IVCurve, like: Branch) -> Scale:
         If the points are so few, or so cold, that the resistance does not tell.
     """
     below = curve.rows(np.arange(curve.peak + 1))
-    if curve.peak < KneeOptions.fewest_beside:
+    if curve.peak < fewest:
         raise InputError(
             f"the lever voltage is highest at point {curve.peak + 1}: too few are below "
             "the knee to tell how much power the lever needs; measure from a lower bias"

@@ -33,38 +33,6 @@ if TYPE_CHECKING:
 LEVELS = (0.68, 0.95)
 
 
-@dataclass(frozen=True)
-class ProfileOptions:
-    """How far levers are moved for a profile of the tip temperature, and how well.
-
-    Attributes
-    ----------
-    rows : int
-        Biases, in the hotter half, at which the tip temperature is moved away.
-    distance : float
-        By how many standard errors.
-    most_solved : int
-        Levers that are solved on each side at most.
-    closeness : float
-        One is near enough if the moved estimate is no further from it than this share of the way
-        from the optimum: where levers were solved on until the sum of squares was known within 0.4,
-        the standard error changed by 3 % at most.
-    least_rise : float
-        A rise of the sum of squares below which a side is open.
-    narrowest : float
-        No side is narrower than this share of the linearised error. Near a fold the search for a
-        moved lever may end short of the nearest one, and its sum of squares rises by too much: one
-        of 200 levers of which little is known was eleven of its errors off, on a side of a seventh.
-    """
-
-    rows: int = 3
-    distance: float = 2.0
-    most_solved: int = 3
-    closeness: float = 0.3
-    least_rise: float = 0.25
-    narrowest: float = 0.6
-
-
 # --- the tip temperature ------------------------------------------------------------------------
 
 
@@ -101,7 +69,14 @@ class ErrorProfile:
 
 
 def profile_of_tip(
-    posterior: Posterior, experiment: Experiment, options: ProfileOptions | None = None
+    posterior: Posterior,
+    experiment: Experiment,
+    *,
+    distance: float = 2.0,
+    most_solved: int = 3,
+    closeness: float = 0.3,
+    least_rise: float = 0.25,
+    narrowest: float = 0.6,
 ) -> ErrorProfile:
     """Move the tip temperature of an estimate with priors away from its optimum.
 
@@ -109,30 +84,52 @@ def profile_of_tip(
     serves the other biases. What the optimum tells of levers so far away does not hold where
     parameters make up for each other along a bent valley. Where no such lever is found the
     linearised error is kept, and where nothing that is unknown moves the tip there is none.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    experiment : Experiment
+    distance : float
+        How far the tip temperature is moved, in standard errors.
+    most_solved : int
+        Levers that are solved on each side at most.
+    closeness : float
+        One is near enough if the moved estimate is no further from it than this share of the way
+        from the optimum: where levers were solved on until the sum of squares was known within 0.4,
+        the standard error changed by 3 % at most.
+    least_rise : float
+        A rise of the sum of squares below which a side is open.
+    narrowest : float
+        No side is narrower than this share of the linearised error. Near a fold the search for a
+        moved lever may end short of the nearest one, and its sum of squares rises by too much: one
+        of 200 levers of which little is known was eleven of its errors off, on a side of a seventh.
     """
-    options, objective, at = options or ProfileOptions(), posterior.objective, posterior.at
-    rows = hotter_rows(at, options.rows)
+    objective, at, rows = posterior.objective, posterior.at, hotter_rows(posterior.at)
     least = objective.squares(at)
     tips = {number: Quantity("tip", int(row)) for number, row in enumerate(rows)}
     moving = {number: tip for number, tip in tips.items() if posterior.of(tip)[1] > 0.0}
     sides = np.ones((2, rows.size))
     for side, way in enumerate((-1.0, 1.0) if moving else ()):
-        away = way * options.distance
+        away = way * distance
         penalised = [objective.penalised(_penalty(posterior, tip, away)) for tip in moving.values()]
-        near = _solved_near(penalised[-1], posterior, experiment, options)
+        near = _solved_near(penalised[-1], posterior, experiment, most_solved, closeness)
         if near is None:
             continue
         for pulled, (number, tip) in zip(penalised, moving.items(), strict=True):
             there, _ = near.of(pulled).minimum()
             value, stderr = posterior.of(tip)
             moved = abs(tip.value(near.values_at(there), there) - value)
-            rise = max(near.squares(there) - least, options.least_rise)
-            sides[side, number] = max(moved / (stderr * np.sqrt(rise)), options.narrowest)
+            rise = max(near.squares(there) - least, least_rise)
+            sides[side, number] = max(moved / (stderr * np.sqrt(rise)), narrowest)
     return ErrorProfile(at.values[TIP, rows], *sides)
 
 
 def _solved_near(
-    penalised: Objective, posterior: Posterior, experiment: Experiment, options: ProfileOptions
+    penalised: Objective,
+    posterior: Posterior,
+    experiment: Experiment,
+    most: int,
+    closeness: float,
 ) -> Subproblem | None:
     """Solve the lever that a pulled objective leads to, and return what is near it.
 
@@ -144,13 +141,13 @@ def _solved_near(
     # lengths in standard errors of the parameters
     errors = np.sqrt(np.diag(posterior.covariance)) / objective.coordinates.rates(optimum)
     near = Subproblem(objective, at)
-    for count in range(options.most_solved + 1):
+    for count in range(most + 1):
         there, _ = near.of(penalised).minimum()
         step_length = np.linalg.norm((there - near.origin) / errors)
         moved = np.linalg.norm((near.origin - optimum) / errors)
-        if count and step_length < options.closeness * moved:
+        if count and step_length < closeness * moved:
             return near
-        if count < options.most_solved:
+        if count < most:
             try:
                 solved = experiment.predict(objective.at(near.at.probe, there), near.at)
             except HotleverError:  # it melts below the highest bias, or cannot be drawn
@@ -168,7 +165,7 @@ def _penalty(posterior: Posterior, tip: Quantity, away: float) -> Penalty:
     return Penalty(tip, value + 2.0 * away * stderr, stderr)
 
 
-def hotter_rows(at: Prediction, count: int = ProfileOptions.rows) -> Index:
+def hotter_rows(at: Prediction, count: int = 3) -> Index:
     """Return the rows of the data at which limits are looked for, the hottest last."""
     order = np.argsort(at.values[TIP])
     return order[np.linspace(order.size / 2, order.size - 1, count).astype(int)]

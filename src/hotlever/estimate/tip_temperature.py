@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -52,32 +51,13 @@ OF_THE_MEASUREMENT = {
 }
 
 
-class TipByBias(NamedTuple):
-    """The tip temperature over the measured range.
-
-    Attributes
-    ----------
-    table : xarray.Dataset
-        At even biases, and more where the tip is steep, see `hotlever.estimate.tip_table`; the
-        limits are as far away as the errors say, unless these do not hold.
-    jumps : list of Jump
-        Between measured rows.
-    asymmetry : str
-        Where the limits are from, if not from the errors.
-    """
-
-    table: xr.Dataset
-    jumps: list[Jump]
-    asymmetry: str
-
-
 def tip_by_bias(
     solution: Solution,
     samples: int = 0,
     at_V: float | None = None,
     progress: Progress | None = None,
-) -> TipByBias:
-    """Return the tip temperature of an estimated lever with its error, by bias.
+) -> tuple[xr.Dataset, list[Jump], str]:
+    """Return the tip temperature of an estimated lever with its error, over the measured range.
 
     Parameters
     ----------
@@ -87,6 +67,16 @@ def tip_by_bias(
     at_V : float, optional
         A bias that has a row.
     progress : callable, optional
+
+    Returns
+    -------
+    table : xarray.Dataset
+        At even biases, and more where the tip is steep, see `hotlever.estimate.tip_table`; the
+        limits are as far away as the errors say, unless these do not hold.
+    jumps : list of Jump
+        Between measured rows.
+    asymmetry : str
+        Where the limits are from, if not from the errors.
 
     Raises
     ------
@@ -122,7 +112,7 @@ def tip_by_bias(
         held = spline_through(branch.u, branch.equations.power(branch.x) - swept)
         total = table.power_mW.values + held(branch.read(circuit, bias).u)
         table["total_power_mW"] = quantity("total_power_mW", "bias", total)
-    return TipByBias(table, jumps, asymmetry)
+    return table, jumps, asymmetry
 
 
 def tips_in_contact(solution: Solution) -> tuple[Array, Array]:

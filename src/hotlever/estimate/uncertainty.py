@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -21,16 +22,6 @@ from hotlever.probe.probe_parameters import parameters_of
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.text import BAND, aligned, with_unit
 from hotlever.types import Array, Progress
-
-
-@dataclass(frozen=True)
-class Marginal:
-    """What a posterior says of a quantity, as it stands in a fit file."""
-
-    mean: float
-    standard_deviation: float
-    quantiles: dict[str, float]
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -77,22 +68,22 @@ class Uncertainty:
         return texts
 
     @property
-    def quantities(self) -> dict[str, Marginal]:
-        """What the posterior says of each quantity, by name."""
-        quantities: dict[str, Marginal] = {}
+    def quantities(self) -> dict[str, dict[str, Any]]:
+        """What the posterior says of each quantity, by name, as it stands in a fit file."""
+        quantities: dict[str, dict[str, Any]] = {}
         if self.posterior is None:
             return quantities
         for name in self.posterior.quantity.values.tolist():
             samples = self.posterior[name]
             values = np.percentile(samples, BAND_QUANTILES).tolist()
-            quantities[name] = Marginal(
-                mean=samples.mean().item(),
-                standard_deviation=samples.std().item(),
-                quantiles={
+            quantities[name] = {
+                "mean": samples.mean().item(),
+                "standard_deviation": samples.std().item(),
+                "quantiles": {
                     f"{q:g}": value for q, value in zip(BAND_QUANTILES, values, strict=True)
                 },
-                unit=samples.attrs["units"],
-            )
+                "unit": samples.attrs["units"],
+            }
         return quantities
 
     def tables(self) -> Iterator[tuple[str, list[str], list[list[str]]]]:
@@ -109,10 +100,10 @@ class Uncertainty:
             yield "Confidence intervals of the profile likelihoods.", columns, rows
         if self.posterior is not None:
             quantities = self.quantities
-            levels = next(iter(quantities.values())).quantiles
+            levels = next(iter(quantities.values()))["quantiles"]
             columns = ["posterior", *(f"{level} %" for level in levels)]
             rows = [
-                [heading(name), *_cells(quantity.quantiles.values(), name)]
+                [heading(name), *_cells(quantity["quantiles"].values(), name)]
                 for name, quantity in quantities.items()
             ]
             count, worth = self.posterior.sizes["draw"], self.posterior.effective_sample_size.item()
@@ -133,7 +124,7 @@ class Uncertainty:
                 "seed": self.posterior.attrs["seed"],
                 "noise": self.posterior.attrs["noise"],
                 "effective_sample_size": round(self.posterior.effective_sample_size.item(), 1),
-                "quantities": {name: vars(quantity) for name, quantity in self.quantities.items()},
+                "quantities": self.quantities,
             }
         if self.band is not None:
             content["posterior"]["band"] = {

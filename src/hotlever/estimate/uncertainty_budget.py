@@ -403,10 +403,11 @@ def budget_of_estimate(solution: Solution, row: xr.Dataset, of: BudgetOf) -> Tem
         curved = CurvedQuantity(solution.posterior, surrogate, observable)
     except (ComputationError, np.linalg.LinAlgError):
         return replace(temperature_budget, monte_carlo=failed)
-    errors = _Errors(curved, solution.posterior.influences, free)
+    random = np.random.default_rng(0)
+    errors = _drawing_errors(random, curved, solution.posterior.influences, free)
 
     def draw(count: int) -> Array:
-        return value + curved.changes(errors.draw(count)) + other * errors.random.normal(size=count)
+        return value + curved.changes(errors(count)) + other * random.normal(size=count)
 
     interval = propagate(draw, budget.tolerance)
     # of what is hotter no lever was solved, and it may melt
@@ -457,36 +458,35 @@ def _rows_of_fit(
     return rows, covariance / np.outer(spread, spread)
 
 
-class _Errors:
-    """Errors of an estimate along the axes of a quantity, drawn from the distributions of a budget.
+def _drawing_errors(
+    random: np.random.Generator,
+    curved: CurvedQuantity,
+    influences: Mapping[str, Array],
+    dof: Mapping[str, float],
+) -> Callable[[int], Array]:
+    """Return what draws so many errors of an estimate along the axes of a quantity, (n, p).
 
     What is of Type A has the tails of a Student's t of its degrees of freedom (JCGM 101, 6.4.9):
     all data of an observable share their scatter.
     """
+    projections = [
+        (curved.axes_of(influences[name]), free) for name, free in dof.items() if np.isfinite(free)
+    ]
+    shares = [(projection @ projection.T, free) for projection, free in projections]
+    axes = np.eye(len(next(iter(influences.values()))))
+    rest = axes - sum(share for share, _ in shares)
+    roots = [(_root(share), free) for share, free in [*shares, (rest, np.inf)]]
 
-    def __init__(
-        self, curved: CurvedQuantity, influences: Mapping[str, Array], dof: Mapping[str, float]
-    ) -> None:
-        self.random = np.random.default_rng(0)
-        projections = {
-            name: curved.axes_of(influences[name]) for name in dof if np.isfinite(dof[name])
-        }
-        shares = [
-            (projection @ projection.T, dof[name]) for name, projection in projections.items()
-        ]
-        axes = np.eye(len(next(iter(influences.values()))))
-        rest = axes - sum(share for share, _ in shares)
-        self._roots = [(_root(share), free) for share, free in [*shares, (rest, np.inf)]]
-
-    def draw(self, count: int) -> Array:
-        """Return errors along the axes, (count, p)."""
-        errors = np.zeros((count, len(self._roots[0][0])))
-        for root, free in self._roots:
-            normal = self.random.normal(size=errors.shape) @ root
+    def draw(count: int) -> Array:
+        errors = np.zeros((count, len(axes)))
+        for root, free in roots:
+            normal = random.normal(size=errors.shape) @ root
             if np.isfinite(free):
-                normal *= np.sqrt(free / self.random.chisquare(free, size=(count, 1)))
+                normal *= np.sqrt(free / random.chisquare(free, size=(count, 1)))
             errors += normal
         return errors
+
+    return draw
 
 
 def _root(covariance: Array) -> Array:

@@ -10,9 +10,7 @@ import io
 import logging
 import re
 import struct
-from collections.abc import Callable
 from contextlib import redirect_stdout
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,15 +23,6 @@ from hotlever.units import LARGEST_NUMBER, ZERO_CELSIUS_K
 logging.getLogger("spc_io").addHandler(logging.NullHandler())
 
 
-@dataclass(frozen=True)
-class Format:
-    """A maker's format, and who reads it."""
-
-    name: str
-    read: Callable[[bytes], list[Spectrum]]
-    package: str = ""  #: an optional library that `read` imports
-
-
 def read_makers(kind: str, file: Path, raw: bytes) -> list[Spectrum]:
     """Read a file of one of the formats in `MAKERS`: every spectrum that it holds.
 
@@ -42,9 +31,9 @@ def read_makers(kind: str, file: Path, raw: bytes) -> list[Spectrum]:
     InputError
         If its library is missing, or it cannot be read.
     """
-    maker = MAKERS[kind]
+    name, read, package = MAKERS[kind]
     try:
-        spectra = maker.read(raw)
+        spectra = read(raw)
         for spectrum in spectra:
             _require_numbers(spectrum)
         if all(np.ptp(spectrum.y) == 0.0 for spectrum in spectra):
@@ -52,12 +41,12 @@ def read_makers(kind: str, file: Path, raw: bytes) -> list[Spectrum]:
         return spectra
     except ImportError as error:
         raise InputError(
-            f"{file}: reading {file.suffix or 'this format'} needs the package {maker.package}; "
+            f"{file}: reading {file.suffix or 'this format'} needs the package {package}; "
             "install it with: pip install 'hotlever[raman]'"
         ) from error
     except Exception as error:
         reason = excerpt(" ".join(str(error).split()), 160) or type(error).__name__
-        raise InputError(f"{file}: not a readable {maker.name} file ({reason})") from error
+        raise InputError(f"{file}: not a readable {name} file ({reason})") from error
 
 
 def _require_numbers(spectrum: Spectrum) -> None:
@@ -251,9 +240,9 @@ def refuse_labspec(file: Path, suffix: str, raw: bytes, is_text: bool) -> None:
         raise InputError(f"{file}: {what}, expected text: save the spectrum as .txt in LabSpec")
 
 
-#: By suffix.
+#: By suffix: a maker's format, what reads it, and the optional library that this imports.
 MAKERS = {
-    ".wdf": Format("WiRE", read_wdf),
-    ".spc": Format("SPC", _spc, "spc-io"),
-    ".jdx": Format("JCAMP-DX", _jcamp, "jcamp"),
+    ".wdf": ("WiRE", read_wdf, ""),
+    ".spc": ("SPC", _spc, "spc-io"),
+    ".jdx": ("JCAMP-DX", _jcamp, "jcamp"),
 }
