@@ -137,6 +137,19 @@ def _options(values: Any, check: ValidatorFunctionWrapHandler, info: ValidationI
 
 # A row of numbers, NaN where there is nothing.
 Vector = Annotated[Array, stored_as(list[Number])]
+# Columns of a table, of which files hold the rows.
+Columns = Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)]
+Correlations = Annotated[Array, stored_as(list[list[Number]], _correlations)]
+Counts = Annotated[
+    Array,
+    stored_as(
+        list[Annotated[float, Field(ge=1, multiple_of=1)]],
+        write=lambda counts: counts.astype(int).tolist(),
+    ),
+]
+BudgetRow = Annotated[
+    InputQuantity, PlainSerializer(lambda row: asdict(row) | {"contribution_K": row.contribution})
+]
 # What is not written where there is none.
 IF_ANY: Any = Field(None, exclude_if=lambda value: value is None)
 
@@ -181,16 +194,7 @@ class MeasurementSection(Section):
     pressure_mbar: float | None = None
     raman_scale: float | None = IF_ANY
     columns: dict[str, Vector]
-    rows: (
-        Annotated[
-            Array,
-            stored_as(
-                list[Annotated[float, Field(ge=1, multiple_of=1)]],
-                write=lambda counts: counts.astype(int).tolist(),
-            ),
-        ]
-        | None
-    ) = IF_ANY
+    rows: Counts | None = IF_ANY
     time_us: Annotated[Array, stored_as(list[float])] | None = IF_ANY
     waveform: Polyline | Sine | None = IF_ANY
 
@@ -242,7 +246,7 @@ class CorrelationSection(Section):
     """The correlation of the parameters that were varied."""
 
     names: list[str]
-    matrix: Annotated[Array, stored_as(list[list[Number]], _correlations)]
+    matrix: Correlations
 
 
 @dataclass(frozen=True)
@@ -287,7 +291,7 @@ class PulseSection(Section):
 
     length_us: float
     period_us: float | None = None
-    table: Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)]
+    table: Columns
     budget_K: dict[str, Vector]
 
     @classmethod
@@ -339,23 +343,13 @@ class TipFields(Section):
     tip_temperature_uncertainty_K: StandardError = np.nan
     uncertainty_budget_K: dict[str, Number] = Field(default_factory=dict)
     base_temperature_K: Number = np.nan
-    table: (
-        Annotated[dict[str, Array], stored_as(list[dict[str, Number]], _columns, _rows)] | None
-    ) = None
+    table: Columns | None = None
     budget_K: dict[str, Vector] = Field(default_factory=dict)
     apex_budget_K: dict[str, Vector] | None = IF_ANY
     measured_rms_K: Number = np.nan
     pulse: PulseSection | None = IF_ANY
-    gum: (
-        list[
-            Annotated[
-                InputQuantity,
-                PlainSerializer(lambda row: asdict(row) | {"contribution_K": row.contribution}),
-            ]
-        ]
-        | None
-    ) = IF_ANY
-    gum_correlation: Annotated[Array, stored_as(list[list[Number]], _correlations)] | None = IF_ANY
+    gum: list[BudgetRow] | None = IF_ANY
+    gum_correlation: Correlations | None = IF_ANY
     gum_bias_V: float | None = IF_ANY
     gum_of: BudgetOf | None = IF_ANY
     effective_dof: Number | None = IF_ANY

@@ -313,7 +313,7 @@ class GaussianProcess:
 
     def _factorised(self, length: float, amplitude: float, noise_factor: float) -> tuple:
         covariance = _covariance(self._x, self._x, length, amplitude)
-        # rounding leaves the covariance of the points positive
+        # so that rounding leaves the covariance of the points positive
         variance = (noise_factor * self._noise) ** 2 + 1e-11
         return cho_factor(covariance + np.diag(variance), lower=True)
 
