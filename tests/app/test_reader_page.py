@@ -38,7 +38,7 @@ def test_reader_shows_the_numbers_and_notes_of_the_command(
         if float(row["surface_gap_um"]) == pytest.approx(DISTANCE)
     )
     assert f"at a bias of {BIAS:g} V the voltage has an extremum between " in err
-    monkeypatch.setattr(reader, "_DISTANCES", 4)
+    monkeypatch.setattr(reader.ReaderPage, "distances", 4)
 
     async def story(user: User, session: Session) -> None:
         session.probe = "long.toml"

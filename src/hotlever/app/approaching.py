@@ -33,14 +33,8 @@ from hotlever.tasks.surfaces import jumping_at_tip, over_a_surface, reader_noise
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
-#: Levers kept, and pieces of the drawn lever.
-_CACHE_SIZE, _PIECES = 3, 80
-#: The nearest and the farthest distance (µm), and the least below any part of the lever.
-_NEAREST_UM, _FARTHEST_UM, _CLEAR_UM = 0.2, 5.0, 0.1
 #: What is read off by the distance.
 _READ = tuple(name for name in Signal._fields if not name.startswith(("source", "crosstalk")))
-#: What is drawn by the distance.
-_CURVES = ("reader_V", "dlnR_dz_per_um", "noise_V_per_rtHz", "resolution_nm_per_rtHz", "tip_K")
 
 
 def described(report: Report, name: str, tilt_deg: float | None) -> dict[str, Any]:
@@ -51,11 +45,12 @@ def described(report: Report, name: str, tilt_deg: float | None) -> dict[str, An
     line = _Line(probe.layout())
     beyond = (line.end if tilt > 0 else line.start) - line.tip
     height = 0.0 if probe.tip is None else probe.tip.height_um
-    clear = max(height, math.tan(math.radians(tilt)) * beyond) + _CLEAR_UM
-    nearest = max(_NEAREST_UM, float(f"{1.05 * clear:.2g}"))
+    # the surface stays clear of every part of the lever
+    clear = max(height, math.tan(math.radians(tilt)) * beyond) + 0.1
+    nearest = max(0.2, float(f"{1.05 * clear:.2g}"))
     return {
         "nearest_um": nearest,
-        "farthest_um": max(_FARTHEST_UM, 4.0 * nearest),
+        "farthest_um": max(5.0, 4.0 * nearest),
         "tilt_deg": around.surface_tilt_deg,
         "accommodation": around.with_jump.accommodation,
     }
@@ -136,9 +131,10 @@ def _moving(
     nearest = min(states, key=lambda at: abs(math.log(at / distance)))
     hottest, line = _hottest(*states[nearest]), _Line(probe.layout())
     base, around = probe.circuit.base_temperature_K, probe.surroundings
+    drawn = ("reader_V", "dlnR_dz_per_um", "noise_V_per_rtHz", "resolution_nm_per_rtHz", "tip_K")
     return {
         "now": {"bias_V": bias, "surface_gap_um": distance, **_at(distance, z, columns)},
-        "curves": {"surface_gap_um": z, **{name: columns[name] for name in _CURVES}},
+        "curves": {"surface_gap_um": z, **{name: columns[name] for name in drawn}},
         "colours": coloured(hottest, base, max(float(hottest.max()), base + 1.0)),
         "ends": (line.start, line.tip, line.end),
         "thickness_um": probe.layout().thickest_um,
@@ -149,12 +145,12 @@ def _moving(
     }
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=3)
 def _coarse(probe: Probe) -> Lever:
     return Lever(probe, COARSE)
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=3)
 def _levers(report: Report, probe: Probe, distances: tuple[float, ...]) -> list[Lever]:
     """Return coarse levers at some distances (µm)."""
     lever = Lever(probe, COARSE)
@@ -185,30 +181,30 @@ def _at(distance: float, z: Array, columns: dict[str, Array]) -> dict[str, float
     return now
 
 
-def _hottest(lever: Lever, branch: Branch, u: float) -> Array:
-    """Return the highest temperature (K) in each of the pieces in which a lever is drawn."""
+def _hottest(lever: Lever, branch: Branch, u: float, pieces: int = 80) -> Array:
+    """Return the highest temperature (K) in each of the `pieces` in which a lever is drawn."""
     x = branch.equations.space.expanded(branch.states(np.array([u])))
     rises = lever.circuit.end_rises()
     T = lever.space.nodal(x[:, 0], branch.base_temperature_K, rises)[0]
-    piece, cells = _cells(lever.probe.shape, lever.space.elements)
-    hottest = np.full(_PIECES, -np.inf)
+    piece, cells = _cells(lever.probe.shape, lever.space.elements, pieces)
+    hottest = np.full(pieces, -np.inf)
     np.maximum.at(hottest, piece, cells @ T)
     met = np.flatnonzero(np.isfinite(hottest))
-    return np.interp(np.arange(_PIECES), met, hottest[met])
+    return np.interp(np.arange(pieces), met, hottest[met])
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
-def _cells(shape: Shape, elements: FiniteElements) -> tuple[Index, Any]:
+@lru_cache(maxsize=3)
+def _cells(shape: Shape, elements: FiniteElements, pieces: int) -> tuple[Index, Any]:
     """Return cells of a grid inside a lever: the piece that each is of, and what reads it off."""
     layout, line = shape.layout(), _Line(shape.layout())
     low, high = layout.box
-    step = float(max(high - low)) / (2 * _PIECES)
+    step = float(max(high - low)) / (2 * pieces)
     points = np.stack(
         np.meshgrid(*(np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True))),
         axis=-1,
     ).reshape(-1, 2)
     points = points[layout.contains(points)]
-    edges = np.linspace(line.start, line.end, _PIECES + 1)
+    edges = np.linspace(line.start, line.end, pieces + 1)
     return np.searchsorted(edges[1:-1], line.of(points)), elements.basis.probes(points.T)
 
 

@@ -20,16 +20,6 @@ from hotlever.probe import Probe
 from hotlever.tasks.commands import COMMANDS, run_command, written_by
 from hotlever.tasks.common_steps import read_surrounded_probe
 
-Standing = Literal["running", "done", "failed", "cancelled"]
-
-#: Notes kept of a task, and jobs of a page.
-_MOST_NOTES, _MOST_JOBS = 200, 50
-#: Seconds that a task has to turn off what it turned on, and between two looks whether it has.
-_TURN_OFF_S, _LOOK_S = 30.0, 0.1
-_STUCK = "it did not end by itself and was killed: see whether the output of the instrument is off"
-#: Share of the work from which on it tells how long the rest takes: it may begin slowly.
-_TELLING = 0.03
-
 
 @dataclass(frozen=True)
 class Task:
@@ -128,7 +118,7 @@ class Job:
     """
 
     task: Task
-    standing: Standing = "running"
+    standing: Literal["running", "done", "failed", "cancelled"] = "running"
     message: str = ""
     notes: list[str] = field(default_factory=list)
     label: str = ""
@@ -147,7 +137,8 @@ class Job:
     def left_s(self) -> float | None:
         """Seconds that it may still take, by what it took so far."""
         share = self.share
-        if share is None or share < _TELLING or self.standing != "running":
+        # before that it tells nothing: work may begin slowly
+        if share is None or share < 0.03 or self.standing != "running":
             return None
         return (time.time() - self.began) * (1.0 - share) / share
 
@@ -156,14 +147,14 @@ class Job:
         if kind == "progress":
             self.label, self.done, self.total = content
         elif kind == "note":
-            self.notes = [*self.notes, content][-_MOST_NOTES:]
+            self.notes = [*self.notes, content][-200:]
         elif kind == "failure":
             self.message = content
         else:
             self.contents[kind] = content
         self.version += 1
 
-    def end(self, standing: Standing, message: str = "") -> None:
+    def end(self, standing: Literal["done", "failed", "cancelled"], message: str = "") -> None:
         """Note how it ended, for good."""
         if self.standing == "running":
             self.standing, self.message = standing, message or self.message
@@ -189,7 +180,7 @@ class Jobs:
         """Count a job to a page."""
         jobs = self._by_page.setdefault(page, [])
         jobs.insert(0, job)
-        del jobs[_MOST_JOBS:]
+        del jobs[50:]
         return job
 
     def of(self, page: str) -> list[Job]:
@@ -251,11 +242,16 @@ class Jobs:
         job, worker = self.of(page)[0], self._workers[page]
         job.hear("progress", ("stopping", 0, 0))
         worker.interrupt()
-        for _ in range(int(_TURN_OFF_S / _LOOK_S)):
+        # half a minute to turn off what it turned on
+        for _ in range(300):
             if job.standing != "running":
                 return
-            await asyncio.sleep(_LOOK_S)
-        job.end("failed", _STUCK)
+            await asyncio.sleep(0.1)
+        job.end(
+            "failed",
+            "it did not end by itself and was killed: see whether the output of the instrument is "
+            "off",
+        )
         worker.kill()
 
 

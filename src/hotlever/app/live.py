@@ -41,20 +41,6 @@ from hotlever.tasks.common_steps import make_lever
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
-#: Biases of a curve, cells of the temperature map along its longer side, points of the profile.
-_POINTS, _CELLS, _PROFILE = 121, 360, 361
-#: Steps of the highest temperature (K) that the colours of the map reach, and the colours.
-_SCALE_K = 100.0
-_COLOURS = colormaps[HEAT](np.linspace(0.0, 1.0, 256), bytes=True)
-#: Share of the branch at which it is nearly cold.
-_COLD = 0.02
-#: How much making reduced levers steps back behind other work.
-_NICE = 10
-#: Levers kept for sliders that go back and forth.
-_CACHE_SIZE = 3
-#: What a model is called on the page.
-FULL, REDUCED, COARSE_MODEL = "full lever", "reduced lever", "coarse lever"
-
 
 class _Map:
     """Temperatures of a lever on a grid of cells, and along the current through the tip.
@@ -65,7 +51,7 @@ class _Map:
     def __init__(self, space: FullSpace, potential: Array) -> None:
         layout = space.mesh.layout
         low, high = layout.box
-        step = float(max(high - low)) / _CELLS
+        step = float(max(high - low)) / 360  # so many cells along the longer side
         self.x, self.y = (np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True))
         half = step / 2
         ends = self.x[0] - half, self.x[-1] + half, self.y[0] - half, self.y[-1] + half
@@ -75,7 +61,7 @@ class _Map:
         self._cells = space.elements.basis.probes(points[self._inside].T)
         self.outline = layout.outline
         path, along = current_path(space, potential)
-        self.along = np.linspace(0.0, along[-1], _PROFILE)
+        self.along = np.linspace(0.0, along[-1], 361)
         points = np.stack([np.interp(self.along, along, axis) for axis in path.T], axis=-1)
         elements, self._shares, _ = space.elements.at_points(points)
         self._on_path = space.elements.dofs[elements]
@@ -100,7 +86,8 @@ class _Map:
 def coloured(T: ArrayLike, low: float, high: float) -> Array:
     """Return temperatures as colours from `low` to `high` (K): four bytes each."""
     shares = np.clip((np.asarray(T) - low) / (high - low), 0.0, 1.0)
-    return np.asarray(_COLOURS[(shares * (len(_COLOURS) - 1)).astype(np.intp)])
+    colours = colormaps[HEAT](np.linspace(0.0, 1.0, 256), bytes=True)
+    return np.asarray(colours[(shares * (len(colours) - 1)).astype(np.intp)])
 
 
 #: Maps by mesh; those of one shape share it.
@@ -119,7 +106,7 @@ class LiveLever:
     @cached_property
     def curves(self) -> dict[str, Any]:
         """I-V curve, temperature by power and the knee, by the tip temperature of the branch."""
-        u = np.linspace(0.0, self.branch.end_u, _POINTS)
+        u = np.linspace(0.0, self.branch.end_u, 121)
         observables = self.branch.electrical_outputs(u)
         knee = self.branch.knee
         return {
@@ -135,10 +122,10 @@ class LiveLever:
         """How its states are drawn, and those of all levers of this mesh."""
         number = id(self.space.mesh)
         if number not in _maps:
-            if len(_maps) >= _CACHE_SIZE:
+            if len(_maps) >= 3:
                 _maps.clear()
             # where it is nearly cold the path of the current is that of the shape
-            x = self.branch.states(np.array([_COLD * self.branch.end_u]))
+            x = self.branch.states(np.array([0.02 * self.branch.end_u]))
             x = self.branch.equations.space.expanded(x)[:, 0]
             potential = self.space.nodal(x, self.branch.base_temperature_K)[1]
             # the mesh is kept, so that no other gets its number
@@ -168,8 +155,8 @@ class LiveLever:
         x = self.branch.equations.space.expanded(self.branch.states(reading.u))
         low, knee = self.branch.base_temperature_K, self.branch.knee
         drawn, T = self.map, self.space.nodal(x[:, 0], low, self.circuit.end_rises())[0]
-        # in steps, so that colours stay the same while the lever gets a little hotter
-        high = _SCALE_K * np.ceil(max(float(T.max()), low + 1.0) / _SCALE_K)
+        step_K = 100.0
+        high = step_K * np.ceil(max(float(T.max()), low + 1.0) / step_K)
         return {
             **observables,
             "bias_V": bias,
@@ -212,7 +199,7 @@ def answer(
     """
     probe, most = surrounded_probe(report, arguments_of(task.words)), max(most, bias)
     live = _quick(probe, most, reduced) if quick else _full(report, probe, most)
-    if live.model == REDUCED and not live.reaches(bias):
+    if live.model == "reduced lever" and not live.reaches(bias):
         live = _quick(probe, most, False)
     drawn = live.map
     return {
@@ -229,7 +216,7 @@ def answer(
 def prepare(report: Report, task: Task) -> bool:
     """Make the reduced lever of a task's probe, if it can have one; return whether it has."""
     with suppress(OSError, AttributeError):
-        os.nice(_NICE)  # sliders come first
+        os.nice(10)  # sliders come first
     probe = surrounded_probe(report, arguments_of(task.words))
     if not _can_be_reduced(probe):
         return False
@@ -278,13 +265,13 @@ def described(report: Report, name: str) -> dict[str, Any]:
     }
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=3)
 def _full(report: Report, probe: Probe, most: float) -> LiveLever:
     lever = make_lever(report, probe)
-    return LiveLever(FULL, lever.space, lever.circuit, _branch(lever, most))
+    return LiveLever("full lever", lever.space, lever.circuit, _branch(lever, most))
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=3)
 def _quick(probe: Probe, most: float, is_reduced: bool) -> LiveLever:
     """Return the reduced lever of a probe, or else a coarse one."""
     reduced = _reduced(_geometry(probe)) if is_reduced else None
@@ -292,11 +279,11 @@ def _quick(probe: Probe, most: float, is_reduced: bool) -> LiveLever:
         full, small = reduced
         try:
             branch = small.branch(probe, Reach(probe.circuit, most))
-            return LiveLever(REDUCED, full.space, probe.circuit, branch)
+            return LiveLever("reduced lever", full.space, probe.circuit, branch)
         except HotleverError:
             pass  # beyond what it is made for
     lever = Lever(probe, COARSE)
-    return LiveLever(COARSE_MODEL, lever.space, probe.circuit, _branch(lever, most))
+    return LiveLever("coarse lever", lever.space, probe.circuit, _branch(lever, most))
 
 
 def _can_be_reduced(probe: Probe) -> bool:
@@ -312,7 +299,7 @@ def _geometry(probe: Probe) -> Probe:
     return probe.model_copy(update=same)
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=3)
 def _reduced(probe: Probe) -> tuple[Lever, ReducedLever] | None:
     """Return the full and the reduced lever of a geometry."""
     lever = Lever(probe)

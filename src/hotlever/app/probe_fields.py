@@ -36,28 +36,18 @@ from hotlever.probe.drawing.sheet import read_sheet
 from hotlever.probe.file_sections import file_text, read_sections
 from hotlever.probe.shapes import DRAWING, EDGE_BIAS, PARAMETRIC, SHAPE_SECTIONS
 
-# Sections of a probe file by name, and the names of a section and of those that it is in.
+# Sections of a probe file by name.
 Sections = dict[str, Any]
-Place = tuple[str, ...]
 
-#: What layers of a drawing may be beside films and parts, which have names of their own.
-BODIES, HEATER, FILM = ("silicon", "body"), "heater", "film"
-TERMINALS = ("supply", "ground", "reader")
-#: Numbers of other sections that can be set: keys, in the order in which they are shown.
-_OF_A_DRAWING = ("thickness_um", "tip_um")
-_OF_THE_CIRCUIT = ("series_resistance_ohm", "base_temperature_K")
-_TITLES = {"probe": "The lever", "circuit": "Circuit"}
-_LAST = ("heat_capacity", "heat_capacity_scale", "emissivity", "melting_point_K")
-#: Layers of a drawing that are listed.
-_MOST_LAYERS = 40
-#: No part of a drawing of a probe lies beyond (µm).
-_DRAWABLE_UM = 1e5
+#: What a layer of a drawing may be, in words; films and parts have names of their own.
+ROLES = {"": "not used", "body": "outline of the lever", "heater": "heater", "film": "film or part"}
+ROLES |= {name: f"terminal: {name}" for name in ("supply", "ground", "reader")}
 
 
 # --- it with something set ------------------------------------------------------------------------
 
 
-def with_value(sections: Sections, place: Place, key: str, value: Any) -> Sections:
+def with_value(sections: Sections, place: tuple[str, ...], key: str, value: Any) -> Sections:
     """Return sections with a value set, or with None taken out.
 
     Examples
@@ -76,7 +66,7 @@ def with_value(sections: Sections, place: Place, key: str, value: Any) -> Sectio
     return changed
 
 
-def has_section(sections: Sections, place: Place) -> bool:
+def has_section(sections: Sections, place: tuple[str, ...]) -> bool:
     """Return whether there is a section."""
     inside: Any = sections
     for name in place:
@@ -141,8 +131,8 @@ class LayerRow:
     @property
     def role(self) -> str:
         """What it is, in one word."""
-        if self.part == "layers" and self.name != HEATER:
-            return "body" if self.name in BODIES else FILM
+        if self.part == "layers" and self.name != "heater":
+            return "body" if self.name in ("silicon", "body") else "film"
         return self.name
 
 
@@ -172,21 +162,21 @@ def with_layer(sections: Sections, row: LayerRow, role: str, material: str) -> S
         materials[material] = {"kind": kind} | ({"preset": preset} if preset else {})
     of_before = before if isinstance(before, dict) else {}
     if role == "body":
-        for body in BODIES:
+        for body in ("silicon", "body"):
             layers.pop(body, None)
         name = "body" if material else "silicon"
-    elif role == HEATER:
-        layers.pop(HEATER, None)
-        name = HEATER
-    elif role == FILM:
+    elif role == "heater":
+        layers.pop("heater", None)
+        name = "heater"
+    elif role == "film":
         former = of_before.get("material", "")
         # a name of its own stays, one after what it was made of does not
-        named = was_layer and name not in (*BODIES, HEATER)
+        named = was_layer and name not in ("silicon", "body", "heater")
         if not (named and bool(former) == bool(material)) or (former and name.startswith(former)):
             name = _free(material or "low-doped", layers)
     elif role:
-        terminals[role if role in TERMINALS else name] = row.drawn
-    if role in ("body", HEATER, FILM):
+        terminals[role if role in ROLES else name] = row.drawn
+    if role in ("body", "heater", "film"):
         # a film stays one of another material; edges of a metal have no shift
         stays = {"thickness_um": material and role != "body"}
         stays[EDGE_BIAS] = of_before.get("material", "") == material
@@ -318,7 +308,8 @@ def _impossible(values: Mapping[str, Any], fault: str) -> Figure:
     if not words & set(shape.model_fields):
         raise ValueError(fault)
     regions = shape.model_construct(**values).layout().regions
-    if not np.abs([region.rings[0] for region in regions]).max() < _DRAWABLE_UM:
+    # no part of a drawing of a probe lies beyond (µm)
+    if not np.abs([region.rings[0] for region in regions]).max() < 1e5:
         raise ValueError(fault)
     parts = {word.partition("_")[0] for word in words}
     wrong = next((region for region in regions if region.name.partition(" ")[0] in parts), None)
@@ -366,7 +357,7 @@ def _rows(sections: Mapping[str, Any]) -> list[LayerRow]:
             rows += [LayerRow(name, name) for name in _layers(*arguments) if name not in used]
         except InputError:
             pass  # the drawing of the probe says what is wrong
-    return sorted(rows, key=lambda row: row.part or "z")[:_MOST_LAYERS]
+    return sorted(rows, key=lambda row: row.part or "z")[:40]
 
 
 @lru_cache(maxsize=8)
@@ -388,11 +379,11 @@ def _others(shape: str) -> Iterator[tuple[str, dict[str, str]]]:
     """Give the sections that are no material, with what their numbers are, for a kind of shape."""
     if shape == DRAWING:
         meanings = DrawnShape.description()
-        yield "probe", {key: meanings[key] for key in _OF_A_DRAWING}
+        yield "probe", {key: meanings[key] for key in ("thickness_um", "tip_um")}
     elif shape in PARAMETRIC:
         yield "probe", PARAMETRIC[shape].description()
     meanings = Circuit.description()
-    yield "circuit", {key: meanings[key] for key in _OF_THE_CIRCUIT}
+    yield "circuit", {key: meanings[key] for key in ("series_resistance_ohm", "base_temperature_K")}
 
 
 def _other(name: str, section: Mapping[str, Any], meanings: Mapping[str, str]) -> dict[str, Any]:
@@ -402,10 +393,11 @@ def _other(name: str, section: Mapping[str, Any], meanings: Mapping[str, str]) -
         unit, default = parameter_named(key).unit, _number(getattr(Circuit(), key, ""))
         own = _field((name,), key, section, default, f"{label(key)}: {words} ({unit})")
         fields.append({**own, "label": f"{label(key)} ({unit})"})
-    return {"place": (name,), "title": _TITLES[name], "fields": fields}
+    title = "Circuit" if name == "circuit" else "The lever"
+    return {"place": (name,), "title": title, "fields": fields}
 
 
-def _card(place: Place, section: Mapping[str, Any]) -> dict[str, Any]:
+def _card(place: tuple[str, ...], section: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parameters of a material: of its kind, and those that formulas name."""
     kind = KINDS.get(str(section.get("kind")))
     words = [str(section.get(key)).replace("-", " ") for key in ("kind", "preset")]
@@ -422,7 +414,8 @@ def _card(place: Place, section: Mapping[str, Any]) -> dict[str, Any]:
     useless = kind.without_use({**usual, **values})
     fields = []
     # what every material has counts least
-    for key in sorted(kind.model_fields, key=lambda own: own in _LAST):
+    last = ("heat_capacity", "heat_capacity_scale", "emissivity", "melting_point_K")
+    for key in sorted(kind.model_fields, key=lambda own: own in last):
         if key in ("kind", "preset"):
             continue
         field = kind.model_fields[key]
@@ -436,7 +429,7 @@ def _card(place: Place, section: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _field(
-    place: Place, key: str, section: Mapping[str, Any], default: str, meaning: str
+    place: tuple[str, ...], key: str, section: Mapping[str, Any], default: str, meaning: str
 ) -> dict[str, Any]:
     value = section.get(key)
     if isinstance(value, list):

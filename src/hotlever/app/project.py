@@ -12,22 +12,11 @@ from hotlever.files import TABLE, output_folder, whole_file, write_text
 
 #: Bytes that a dropped file may have.
 LARGEST_FILE = 64 * 2**20
-#: Characters of a file name.
-_LONGEST = 100
-#: Files that are listed of a kind, and bytes read of one to tell what it is.
-_MOST, _BEGINNING = 500, 2**22
 
 DATA = (".csv", ".txt", ".tsv", ".dat", ".lvm", ".tdms", ".ibw", ".asc")
 DRAWINGS = (".gds", ".gds2", ".gdsii", ".oas", ".oasis", ".dxf")
 #: What a fit is called that the app writes, and corrections of spectra; see also `files`.
 FIT, CORRECTIONS = ".fit.json", ".corrections.csv"
-#: Folders of the fits and of the calibrations of many levers; they may end with a number.
-FITS, CALIBRATIONS = "fits", "calibrations"
-#: Endings of tables that commands write: no measurements.
-_WRITTEN = (
-    *(TABLE, CORRECTIONS, ".raman.csv", ".sweep.csv", ".pulse.csv", ".spectrum.csv"),
-    *(".design.csv", ".contact.csv", ".reader.csv", ".next.csv"),
-)
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
@@ -43,8 +32,9 @@ def safe_name(name: str) -> str:
     file_name = "".join(mark if mark.isalnum() or mark in " ._-+()=,µΩ°" else "_" for mark in last)
     file_name = file_name.lstrip(" .-").rstrip(" .")
     stem, dot, suffix = file_name.rpartition(".")
-    if len(file_name) > _LONGEST:
-        file_name = f"{stem[: _LONGEST - len(suffix) - 1]}{dot}{suffix}"[:_LONGEST]
+    most = 100
+    if len(file_name) > most:
+        file_name = f"{stem[: most - len(suffix) - 1]}{dot}{suffix}"[:most]
     return file_name or "file"
 
 
@@ -111,7 +101,7 @@ class Project:
             for path in self.folder.glob("[!.]*")
             if path.name.lower().endswith(suffixes) and path.is_file()
         ]
-        return [name for _, name in sorted(files)[:_MOST]]
+        return [name for _, name in sorted(files)[:500]]
 
     @property
     def probes(self) -> list[str]:
@@ -126,17 +116,22 @@ class Project:
     @property
     def data(self) -> list[str]:
         """Files that may be measurements."""
-        return [name for name in self.names(*DATA) if not name.endswith(_WRITTEN)]
+        # tables that commands write are no measurements
+        written = (
+            *(TABLE, CORRECTIONS, ".raman.csv", ".sweep.csv", ".pulse.csv", ".spectrum.csv"),
+            *(".design.csv", ".contact.csv", ".reader.csv", ".next.csv"),
+        )
+        return [name for name in self.names(*DATA) if not name.endswith(written)]
 
     @property
     def fits(self) -> list[str]:
         """Fit files, those of many levers too."""
-        return self._with_keys({"correlation"}, FITS)
+        return self._with_keys({"correlation"}, "fits")
 
     @property
     def calibrations(self) -> list[str]:
         """Calibration files, those of many levers too."""
-        return self._with_keys({"route"}, CALIBRATIONS)
+        return self._with_keys({"route"}, "calibrations")
 
     @property
     def laws(self) -> list[str]:
@@ -152,13 +147,14 @@ class Project:
         """Return the JSON files with one of some keys, and all in folders of a name."""
         alone = [name for name in self.names(".json") if keys & self._keys(name)]
         among = sorted(self.folder.glob(f"{folder}*/*.json")) if folder else []
-        return [*alone, *(path.relative_to(self.folder).as_posix() for path in among[:_MOST])]
+        return [*alone, *(path.relative_to(self.folder).as_posix() for path in among[:500])]
 
     def _keys(self, name: str) -> set[str]:
         """Return the keys of a JSON file; none of one that is too large or damaged."""
         path = self.folder / name
         try:
-            if path.stat().st_size > _BEGINNING:
+            # what is larger is no result of ours
+            if path.stat().st_size > 2**22:
                 return set()
             content = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError):

@@ -28,39 +28,6 @@ from hotlever.errors import InputError
 from hotlever.memory import give_back
 
 #: The address that is served, and the names that a browser may have for it.
-HOST, _NAMES = "127.0.0.1", ("127.0.0.1", "localhost")
-#: Seconds after which the memory of pages that were closed is given back, again and again.
-_GIVE_BACK_S = 20.0
-#: Messages kept for a page whose connection was lost, pictures of the map among them; with more it
-#: is opened anew.
-_MESSAGES = 100
-#: Seconds after which a page is shown with what it has by then.
-_SOON_S = 1.0
-#: Seconds that a busy machine may take to build a page; an error is shown then in its place.
-_LATE_S = 60.0
-_PAGES = (
-    *(StartPage, LeverPage, SimulatePage, ContactPage, ReaderPage, RamanPage),
-    MeasurementsPage,
-)
-#: What a page may load and talk to: this server, nothing else. NiceGUI's Vue compiles templates.
-_POLICY = (
-    "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
-    "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
-    "connect-src 'self' ws: wss:; object-src 'none'; frame-ancestors 'none'; base-uri 'self'; "
-    "form-action 'self'"
-)
-_HEADERS = (
-    (b"content-security-policy", _POLICY.encode()),
-    (b"x-content-type-options", b"nosniff"),
-    (b"referrer-policy", b"no-referrer"),
-    (b"cross-origin-resource-policy", b"same-origin"),
-)
-#: Bytes that the rest of a form takes beside its file.
-_FORM = 2**16
-_REFUSED = (
-    "This page needs the whole address that `hotlever app` printed, its token included. "
-    "Please open that one."
-)
 
 
 def serve(
@@ -88,20 +55,24 @@ def serve(
     InputError
         If the port is taken.
     """
-    port = _free(port)
+    host = "127.0.0.1"
+    port = _free(host, port)
     token = secrets.token_urlsafe(24)
-    address = f"http://{HOST}:{port}/?token={token}"
+    address = f"http://{host}:{port}/?token={token}"
     session = Session(project)
     app.on_startup(session.start)
     app.on_startup(lambda: say(address))
-    app.on_startup(lambda: app.timer(_GIVE_BACK_S, give_back))
+    # pages that were closed leave memory behind
+    app.on_startup(lambda: app.timer(20.0, give_back))
     # told in one line, and kept in a file, as by any command
     logging.getLogger("nicegui").setLevel(logging.CRITICAL + 1)
     app.on_exception(failed)
     add_pages(session)
     app.add_middleware(Access, token=token, largest=LARGEST_FILE)
+    # kept for a page whose connection was lost, pictures of the map among them; with more it is
+    # opened anew
     ui.run(
-        host=HOST,
+        host=host,
         port=port,
         title="hotlever",
         favicon="🌡",
@@ -110,15 +81,17 @@ def serve(
         show=f"/?token={token}" if browser else False,
         show_welcome_message=False,
         reconnect_timeout=30.0,
-        message_history_length=_MESSAGES,
+        message_history_length=100,
     )
 
 
 def add_pages(session: Session) -> None:
     """Make all pages."""
     serve_pictures()
-    for kind in _PAGES:
-        ui.page(f"/{kind.name}", response_timeout=_LATE_S)(_page(session, kind.fill))
+    live = SimulatePage, ContactPage, ReaderPage
+    for kind in (StartPage, LeverPage, *live, RamanPage, MeasurementsPage):
+        # a busy machine may take long to build a page; an error is shown then in its place
+        ui.page(f"/{kind.name}", response_timeout=60.0)(_page(session, kind.fill))
 
 
 def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
@@ -136,17 +109,17 @@ def _page(session: Session, fill: Callable[[Session], Awaitable[None]]) -> Any:
 
         # what waits for a busy process comes later: a page that is late is none
         task = background_tasks.create(filled(), name="page")
-        await asyncio.wait({task}, timeout=_SOON_S)
+        await asyncio.wait({task}, timeout=1.0)
 
     return page
 
 
-def _free(port: int) -> int:
+def _free(host: str, port: int) -> int:
     """Return the port to serve at."""
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind((HOST, port))
+            probe.bind((host, port))
             return int(probe.getsockname()[1])
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
@@ -188,7 +161,7 @@ class Access:
         """Return the answer to a request that is not let through."""
         host = request.headers.get("host", "")
         # against pages elsewhere that make a browser ask for another name
-        if (urlsplit(f"//{host}").hostname or "").lower() not in _NAMES:
+        if (urlsplit(f"//{host}").hostname or "").lower() not in ("127.0.0.1", "localhost"):
             return PlainTextResponse("This is not the address that `hotlever app` printed.", 421)
         origin = request.headers.get("origin", "")
         if origin and urlsplit(origin).netloc != host:
@@ -196,14 +169,19 @@ class Access:
         if "transfer-encoding" in request.headers:
             return PlainTextResponse("A request must say how long it is.", 411)
         length = request.headers.get("content-length", "0")
-        if not length.isdigit() or int(length) > self._largest + _FORM:
+        # beside its file a form has some text
+        if not length.isdigit() or int(length) > self._largest + 2**16:
             megabytes = self._largest // 2**20
             return PlainTextResponse(f"A file may have {megabytes} MB at most.", 413)
         if _same(request.cookies.get(self._cookie, ""), self._token):
             return None
         if _same(request.query_params.get("token", ""), self._token):
             return self._let_in(request.scope["path"])
-        return PlainTextResponse(_REFUSED, 401)
+        return PlainTextResponse(
+            "This page needs the whole address that `hotlever app` printed, its token included. "
+            "Please open that one.",
+            401,
+        )
 
     def _let_in(self, path: str) -> Response:
         # with Strict a redirect from elsewhere would not carry the cookie: a page of ours does;
@@ -219,9 +197,23 @@ def _same(secret: str, expected: str) -> bool:
 
 
 def _with_headers(send: Any) -> Any:
+    # a page may load and talk to this server, nothing else; NiceGUI's Vue compiles templates
+    policy = (
+        b"default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
+        b"style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
+        b"connect-src 'self' ws: wss:; object-src 'none'; frame-ancestors 'none'; base-uri 'self'; "
+        b"form-action 'self'"
+    )
+    headers = (
+        (b"content-security-policy", policy),
+        (b"x-content-type-options", b"nosniff"),
+        (b"referrer-policy", b"no-referrer"),
+        (b"cross-origin-resource-policy", b"same-origin"),
+    )
+
     async def sent(message: Any) -> None:
         if message["type"] == "http.response.start":
-            message = {**message, "headers": [*message.get("headers", []), *_HEADERS]}
+            message = {**message, "headers": [*message.get("headers", []), *headers]}
         await send(message)
 
     return sent

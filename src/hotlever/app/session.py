@@ -11,9 +11,6 @@ from hotlever.app.jobs import Jobs
 from hotlever.app.project import Project
 from hotlever.app.workers import Heard, Worker
 
-#: Seconds after which a process is made ready for the first task: the page comes first.
-_LATER_S = 1.5
-
 
 class Session:
     """One user, one folder, any number of tabs and reloads.
@@ -72,7 +69,8 @@ class Session:
     async def _prepare(self) -> None:
         self._worker("full")
         self._worker("quick")
-        await asyncio.sleep(_LATER_S)
+        # the page comes first
+        await asyncio.sleep(1.5)
         self.jobs.prepare()
 
     def _worker(self, name: str) -> Worker:

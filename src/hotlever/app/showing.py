@@ -52,15 +52,6 @@ from hotlever.tasks.reporter import Silence
 from hotlever.tasks.spectra import ThermometerOptions, set_up
 from hotlever.types import Array
 
-#: Kinds of results.
-FIT, CALIBRATION = "fit", "calibration"
-#: Results kept, whose figures may be asked for as files.
-_CACHE_SIZE = 4
-#: Points of a measurement that are shown, and of the curve that is fitted to a spectrum.
-_POINTS, _FINE = 1000, 800
-#: Names of columns that all tables have which hotlever writes of levers.
-_OF_RESULTS = {"bias_V", "current_mA", "lever_V", "tip_K", "power_mW"}
-
 
 def understood(report: Report, name: str, metadata: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a measurement file was understood as, in its circuit, as it is fitted in.
@@ -77,7 +68,7 @@ def understood(report: Report, name: str, metadata: Mapping[str, Any]) -> dict[s
     measured_probe, differences = with_measured_circuit(probe, measurement, asked)
     data = measurement.dataset(measured_probe.circuit)
     (along,) = data.sizes
-    data = data.isel({along: slice(None, None, data.sizes[along] // _POINTS + 1)})
+    data = data.isel({along: slice(None, None, data.sizes[along] // 1000 + 1)})
     in_time = {"time_us": data.time.values.tolist()} if along == "time" else {}
     columns_shown = ["bias_V", "lever_V", *(column.name for column in FITTED.values())]
     head, *rows = measurement.understood
@@ -107,8 +98,10 @@ def _is_measurement(path: Path, stamp: float) -> bool:
         read_measurement(path)
     except InputError:
         return False
+    # all tables have these columns which hotlever writes of levers
+    of_results = {"bias_V", "current_mA", "lever_V", "tip_K", "power_mW"}
     with path.open(encoding="utf-8", errors="replace") as file:
-        return not set(file.readline().strip().split(",")) >= _OF_RESULTS
+        return not set(file.readline().strip().split(",")) >= of_results
 
 
 def columns(report: Report, name: str, metadata: Mapping[str, Any]) -> list[FileColumn]:
@@ -129,7 +122,7 @@ def result(report: Report, name: str) -> dict[str, Any]:
     """Return what a fit or a calibration file says: its kind, data, doubt and page."""
     path, stamp = Path(name), file_stamp(Path(name))
     estimate, shown = _estimate(path, stamp), _page(path, stamp)
-    kind = CALIBRATION if estimate.route else FIT
+    kind = "calibration" if estimate.route else "fit"
     blocks = [
         {**block, "figure": svg(block["figure"])} if block["kind"] == "figure" else block
         for block in shown.blocks
@@ -247,7 +240,7 @@ def spectrum(
     low, high = line.window
     curves, heights = [(x, y), *[(x[:0], y[:0])] * 3], _with_room(y)
     if line.peak is not None:
-        fine = np.linspace(max(low, x[0]), min(high, x[-1]), _FINE)
+        fine = np.linspace(max(low, x[0]), min(high, x[-1]), 800)
         model = line.peak.model(fine)
         # a cosmic ray may be many times higher than the line
         heights = _with_room(np.append(model, np.percentile(y, (1, 99))))
@@ -297,7 +290,7 @@ def _estimate(path: Path, stamp: float) -> Estimate:
     return read_calibration(path) if "route" in read_json(path) else read_fit(path)
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=4)
 def _page(path: Path, stamp: float) -> Page:
     return estimate_page(_estimate(path, stamp))
 

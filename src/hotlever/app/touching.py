@@ -28,13 +28,6 @@ from hotlever.tasks.common_steps import make_lever
 from hotlever.tasks.surfaces import contact_notes, in_contact
 from hotlever.threads import one_blas_thread
 
-#: Biases of the curves, and levers kept.
-_POINTS, _CACHE_SIZE = 41, 3
-#: What is touched where a probe file says nothing; any sample does for a tip out of contact.
-_SAMPLE, _ANY = "polymer, 100nm, silicon", "silicon"
-_CURVES = ("bias_V", "tip_K", "apex_K", "sample_mW", "beside_mW", "current_change_mA")
-
-
 #: By lever out of contact the last state in contact, from which the next one is solved.
 _near: WeakKeyDictionary[Lever, State] = WeakKeyDictionary()
 
@@ -46,7 +39,7 @@ def described(report: Report, name: str) -> dict[str, Any]:
     return {
         "radius_nm": 1e3 * (probe.tip or EXAMPLE).apex_radius_um,
         "interface": 0.0 if contact is None else 1e3 * contact.interface_K_per_mW,
-        "sample": _SAMPLE if contact is None else contact.sample,
+        "sample": "polymer, 100nm, silicon" if contact is None else contact.sample,
     }
 
 
@@ -96,25 +89,26 @@ def answer(report: Report, task: Task, bias: float, most: float, quick: bool) ->
 
 def _out_of_contact(report: Report, probe: Probe, quick: bool, most: float) -> Lever:
     """Return a lever whose tip is just above the sample, solved up to a bias, or to its end."""
-    free = probe.with_(**{"sample": _ANY, INTERFACE: OUT_OF_CONTACT})
+    # any sample does for a tip out of contact
+    free = probe.with_(**{"sample": "silicon", INTERFACE: OUT_OF_CONTACT})
     return _solved(report, free, quick, most)
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=3)
 def _solved(report: Report, probe: Probe, quick: bool, most: float) -> Lever:
     lever = Lever(probe, COARSE) if quick else make_lever(report, probe)
     lever.read(np.array([most]))
     return lever
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=3)
 def _touching(report: Report, probe: Probe, most: float) -> tuple[Lever, Lever]:
     """Return the full lever out of contact and in contact."""
     free = _out_of_contact(report, probe, False, most)
     return free, free.with_probe(probe)
 
 
-@lru_cache(maxsize=_CACHE_SIZE)
+@lru_cache(maxsize=3)
 def _curves(report: Report, probe: Probe, most: float) -> dict[str, Any]:
     """Return the columns of a sweep up to a bias, or as far as both levers go."""
     levers = _touching(report, probe, most)
@@ -122,5 +116,8 @@ def _curves(report: Report, probe: Probe, most: float) -> dict[str, Any]:
         branch, *_ = lever.read(np.array([most]))
         most = branch.highest_bias(lever.circuit, most)
     free, lever = levers
-    data = sweep_in_contact(lever, np.linspace(0.0, most, _POINTS), free=free, sensitivities=False)
-    return {name: data[name].values for name in _CURVES}
+    data = sweep_in_contact(lever, np.linspace(0.0, most, 41), free=free, sensitivities=False)
+    return {
+        name: data[name].values
+        for name in ("bias_V", "tip_K", "apex_K", "sample_mW", "beside_mW", "current_change_mA")
+    }

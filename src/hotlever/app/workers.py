@@ -29,16 +29,6 @@ from hotlever.errors import HotleverError, unforeseen_error
 from hotlever.memory import give_back
 from hotlever.types import Progress
 
-#: Number of what a process says of no call.
-_ANY = 0
-#: Seconds that a process has to end by itself, tidying up, before it is killed.
-_TIDY_S = 0.6
-#: Seconds without a call after which a process gives back the memory that its last calls freed.
-_REST_S = 1.0
-_LOST = (
-    "the process that worked on this died (too little memory?); what was written before is there, "
-    "please try again"
-)
 #: Hears what a call tells: of which kind it is, and what.
 Heard = Callable[[str, Any], None]
 
@@ -47,6 +37,12 @@ _alive: weakref.WeakSet[Worker] = weakref.WeakSet()
 
 class WorkerLostError(HotleverError):
     """The process died, or was ended, before it had an answer."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "the process that worked on this died (too little memory?); what was written before is "
+            "there, please try again"
+        )
 
 
 class Worker:
@@ -63,7 +59,7 @@ class Worker:
         self._turn = asyncio.Lock()
         self._answer: asyncio.Future[Any] | None = None
         self._heard: Heard | None = None
-        self._number = _ANY
+        self._number = 0
         _alive.add(self)
         self._start()
 
@@ -107,7 +103,7 @@ class Worker:
                 self._connection.send((self._number, function, arguments))
                 return await self._answer
             except OSError:
-                raise WorkerLostError(_LOST) from None
+                raise WorkerLostError from None
             finally:
                 self._answer = self._heard = None
 
@@ -119,20 +115,21 @@ class Worker:
                 message = connection.recv()
             except (EOFError, OSError):
                 lost = self.lost = True
-                message = (_ANY, "lost", _LOST)
+                message = (0, "lost", None)
             if self._loop is not None:
                 with suppress(RuntimeError):  # the loop is closed
                     self._loop.call_soon_threadsafe(self._take, *message)
 
     def _take(self, number: int, kind: str, content: Any) -> None:
-        if self._answer is None or self._answer.done() or number not in (_ANY, self._number):
+        # 0 is of no call
+        if self._answer is None or self._answer.done() or number not in (0, self._number):
             return  # of a call that nobody waits for any more
         if kind == "done":
             self._answer.set_result(content)
         elif kind == "failed":
             self._answer.set_exception(HotleverError(content))
         elif kind == "lost":
-            self._answer.set_exception(WorkerLostError(content))
+            self._answer.set_exception(WorkerLostError())
         elif self._heard is not None:
             self._heard(kind, content)
 
@@ -144,7 +141,8 @@ class Worker:
     async def end(self) -> None:
         """End the process and all that it started."""
         self._signal(signal.SIGTERM)
-        for _ in range(int(_TIDY_S / 0.05)):
+        # it may end by itself, tidying up, before it is killed
+        for _ in range(12):
             if not self._process.is_alive():
                 break
             await asyncio.sleep(0.05)
@@ -182,7 +180,7 @@ class Report:
     """
 
     def __init__(self, connection: Connection) -> None:
-        self._connection, self.number = connection, _ANY
+        self._connection, self.number = connection, 0
 
     def send(self, kind: str, content: Any) -> None:
         """Send something of what is worked on, or the answer."""
@@ -224,15 +222,11 @@ class Report:
         self.send("progress", (label, int(done), int(total)))
 
 
-#: A call: its number, the function, and its arguments.
-_Call = tuple[int, Callable[..., Any], tuple[Any, ...]]
-
-
 def serve(connection: Connection, folder: Path) -> None:
     """Answer calls in a folder until the app is gone, or says that this ends."""
     _quiet()
     os.chdir(folder)
-    calls: queue.Queue[_Call] = queue.Queue()
+    calls: queue.Queue[Any] = queue.Queue()
     threading.Thread(target=_listen, args=(connection, calls), daemon=True).start()
     with suppress(KeyboardInterrupt):
         _import_all()
@@ -265,10 +259,10 @@ def _answer(
         )
 
 
-def _next(calls: queue.Queue[_Call]) -> _Call:
-    """Wait for a call; give memory back while there is none."""
+def _next(calls: queue.Queue[Any]) -> Any:
+    """Wait for a number, a function and its arguments; give memory back while there are none."""
     with suppress(queue.Empty):
-        return calls.get(timeout=_REST_S)
+        return calls.get(timeout=1.0)
     gc.collect()
     give_back()
     return calls.get()
@@ -291,7 +285,7 @@ def _stop(*_: Any) -> NoReturn:
     raise KeyboardInterrupt
 
 
-def _listen(connection: Connection, calls: queue.Queue[_Call]) -> None:
+def _listen(connection: Connection, calls: queue.Queue[Any]) -> None:
     try:
         while True:
             calls.put(connection.recv())

@@ -125,6 +125,12 @@ def written_by(command: Command) -> dict[str, Written]:
     }
 
 
+def defaults_of(command: Command) -> dict[str, str]:
+    """Return what options of a command are if left out, where that is a text, by their names."""
+    parameters = inspect.signature(command).parameters.items()
+    return {name: own.default for name, own in parameters if isinstance(own.default, str)}
+
+
 def check_files(command: Command, values: Mapping[str, Any]) -> None:
     """Check the files and folders that a command writes, none of which it reads.
 

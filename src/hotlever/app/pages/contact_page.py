@@ -14,60 +14,13 @@ from hotlever.app import touching
 from hotlever.app.jobs import Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import caption, flat_button
-from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage, slider
+from hotlever.app.pages.live_page import LivePage, slider
 from hotlever.app.pages.task_page import MEDIA
 from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 from hotlever.errors import InputError
 from hotlever.materials.catalogue import sample_names
 from hotlever.probe.tip import parsed_layers
-
-#: Biases of a table that is written.
-_BIASES = 25
-#: Sliders: what is chosen, in words, ends, unit, and the name in files.
-_OF_THE_CONTACT = (
-    ("radius_nm", "radius of the contact", (1.0, 1000.0), "nm", "apex_radius_um: of the flat end"),
-    (
-        "interface",
-        "resistance of the interface",
-        (1e4, 1e10),
-        "K/W",
-        "interface_K_per_mW: thermal resistance between apex and sample, a thousandth of this",
-    ),
-)
-_RESISTANCES = {
-    "tip_K_per_mW": "cone",
-    "interface_K_per_mW": "interface",
-    "spreading_K_per_mW": "spreading in the sample",
-}
-_MOVING = (
-    "moving: coarse lever, within some 2 K, 10 K near the knee; changes within some 10 % unless "
-    "they are about to turn"
-)
-_AT_REST = "full lever: the numbers of hotlever contact"
-_ABOUT = (
-    "Heights and radii in proportion near the contact, by decades away from it. Under the contact "
-    "the temperature is that along its axis."
-)
-#: Heat (mW) that is none but for rounding.
-_NONE_MW = 1e-9
-#: Plots by bias: title, and for each line its column, factor, colour and name.
-_CURVES: tuple[tuple[str, tuple[tuple[str, float, str, str], ...]], ...] = (
-    (
-        "temperature (K)",
-        (("tip_K", 1.0, VERMILION, "tip at the lever"), ("apex_K", 1.0, PURPLE, "apex")),
-    ),
-    (
-        "heat into the sample (µW)",
-        (
-            ("sample_mW", 1e3, VERMILION, "through the contact"),
-            ("beside_mW", 1e3, BLUE, "through air"),
-        ),
-    ),
-    ("change of I<sub>h</sub> (µA)", (("current_change_mA", 1e3, BLUE, "change of I_h"),)),
-)
-#: Thicknesses of the slider of a layer (nm), and that of a layer that is added.
-_THINNEST, _THICKEST, _NEW = 1.0, 1e4, 100.0
 
 
 class ContactPlots:
@@ -91,11 +44,26 @@ class ContactPlots:
         # the axis of the picture is drawn for what has values on it
         nothing = {"type": "scatter", "x": [None], "y": [None], "hoverinfo": "skip"}
         self._picture = plots.plotted([nothing, *along], layout, alt)
-        caption(_ABOUT)
-        self._by_bias: list[ui.plotly] = []
+        caption(
+            "Heights and radii in proportion near the contact, by decades away from it. Under "
+            "the contact the temperature is that along its axis."
+        )
+        # by title the lines: column, factor, colour and name
+        curves = {
+            "temperature (K)": (
+                ("tip_K", 1.0, VERMILION, "tip at the lever"),
+                ("apex_K", 1.0, PURPLE, "apex"),
+            ),
+            "heat into the sample (µW)": (
+                ("sample_mW", 1e3, VERMILION, "through the contact"),
+                ("beside_mW", 1e3, BLUE, "through air"),
+            ),
+            "change of I<sub>h</sub> (µA)": (("current_change_mA", 1e3, BLUE, "change of I_h"),),
+        }
+        self._by_bias: list[tuple[ui.plotly, Any]] = []
         with plots.side_by_side():
-            for title, lines in _CURVES:
-                layout = plots.axes(plots.BIAS, title, 240, normal="y")
+            for title, lines in curves.items():
+                layout = plots.axes(plots.title_of("bias_V"), title, 240, normal="y")
                 if len(lines) > 1:
                     above = {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom"}
                     layout |= {"showlegend": True, "legend": above}
@@ -104,15 +72,16 @@ class ContactPlots:
                 for _, _, colour, name in lines:
                     data.append(plots.line(colour) | {"name": name})
                     data.append(plots.dots(colour, 10) | {"name": name, "showlegend": False})
-                self._by_bias.append(plots.plotted(data, layout, f"{title} by bias"))
+                self._by_bias.append((plots.plotted(data, layout, f"{title} by bias"), lines))
 
     def show(self, answer: dict[str, Any]) -> None:
         """Draw an answer; one while sliders move has no curves, and those of before go."""
         self._draw(answer["picture"], answer["colours"], answer["now"], answer["base_K"])
         curves, now = answer["curves"] or {}, answer["now"]
-        for plot, (_, lines) in zip(self._by_bias, _CURVES, strict=True):
+        for plot, lines in self._by_bias:
             for number, (key, factor, _, _) in enumerate(lines):
-                visibility = {"visible": key != "beside_mW" or now[key] > _NONE_MW}
+                # less heat (mW) is none but for rounding
+                visibility = {"visible": key != "beside_mW" or now[key] > 1e-9}
                 for place, columns in enumerate((curves, now)):
                     values = factor * np.asarray(columns.get(key, ()))
                     drawn = plots.points(columns.get("bias_V", ()), values)
@@ -193,7 +162,7 @@ class SampleLayers:
                 flat_button("", remove, icon="close", label=f"Remove {where}")
         if not last:
             words = f"thickness of {where}"
-            field = slider(words, thickness, _THINNEST, _THICKEST, "nm", by_decades=True)
+            field = slider(words, thickness, 1.0, 1e4, "nm", by_decades=True)
             field.on_value_change(lambda event: self._set(number, thickness=event.value))
 
     def _set(
@@ -204,7 +173,7 @@ class SampleLayers:
         self._changed(self._text())
 
     def _add(self) -> None:
-        self._layers.insert(0, (self._layers[0][0], _NEW))
+        self._layers.insert(0, (self._layers[0][0], 100.0))
         self._changed(self._text())
         self.show(self._text())
 
@@ -248,10 +217,15 @@ class ContactPage(LivePage):
 
     def show_sliders(self) -> None:
         """Show bias, radius, interface, and the layers of the sample."""
-        self.slider_of_bias(LEAST_BIAS_V)
-        for key, words, ends, unit, hint in _OF_THE_CONTACT:
-            zero = key == "interface"
-            self.slider(key, words, *ends, unit, hint, by_decades=True, from_zero=zero)
+        self.slider_of_bias(0.1)
+        hint = "apex_radius_um: of the flat end"
+        words = "radius of the contact"
+        self.slider("radius_nm", words, 1.0, 1000.0, "nm", hint, by_decades=True)
+        hint = (
+            "interface_K_per_mW: thermal resistance between apex and sample, a thousandth of this"
+        )
+        how: dict[str, Any] = {"by_decades": True, "from_zero": True}
+        self.slider("interface", "resistance of the interface", 1e4, 1e10, "K/W", hint, **how)
         ui.label("Sample, from the top").classes("text-bold")
         SampleLayers(partial(self.set_value, "sample")).show(self.value("sample"))
         flat_button("All as in the probe file", self._reset, icon="restart_alt")
@@ -274,13 +248,24 @@ class ContactPage(LivePage):
     def of_table(self, kind: str) -> dict[str, Any]:
         """Return the biases of a table."""
         most = self.chosen["most"]
-        return {"bias": f"{most / _BIASES:.12g}:{most:.12g}:{_BIASES}"}
+        return {"bias": f"{most / 25:.12g}:{most:.12g}:25"}
 
     def model_and_remark(self, answer: dict[str, Any], quick: bool) -> tuple[str, str]:
         """Return whose numbers these are, and the resistances."""
         now = answer["now"]
-        resistances = (f"{words} {_per_watt(now[key])}" for key, words in _RESISTANCES.items())
-        return _MOVING if quick else _AT_REST, f"Thermal resistances: {', '.join(resistances)}"
+        names = {
+            "tip_K_per_mW": "cone",
+            "interface_K_per_mW": "interface",
+            "spreading_K_per_mW": "spreading in the sample",
+        }
+        resistances = (f"{words} {_per_watt(now[key])}" for key, words in names.items())
+        model = "full lever: the numbers of hotlever contact"
+        if quick:
+            model = (
+                "moving: coarse lever, within some 2 K, 10 K near the knee; changes within some "
+                "10 % unless they are about to turn"
+            )
+        return model, f"Thermal resistances: {', '.join(resistances)}"
 
 
 def _per_watt(resistance_K_per_mW: float) -> str:

@@ -27,14 +27,6 @@ PAGES = {
     "raman": ("Raman", "thermostat"),
     "measurements": ("Measurements", "query_stats"),
 }
-#: Types of files that figures leave as.
-FIGURE_FILES = (".svg", ".png", ".pdf")
-#: Refused files that are named.
-_REFUSED = 5
-#: A cell that is a button.
-_CHOICE = """<q-td :props="props"><q-btn flat dense no-caps color="primary" :label="props.value"
-    @click="$parent.$emit('chosen', props.value)" /></q-td>"""
-_STYLE = Path(__file__).with_name("style.css")
 
 
 def look_alike() -> None:
@@ -54,7 +46,7 @@ def framed(session: Session, page: str) -> Iterator[ErrorBanner]:
     title, _ = PAGES[page]
     look_alike()
     ui.page_title(f"{title} · hotlever")
-    ui.add_css(_STYLE)
+    ui.add_css(Path(__file__).with_name("style.css"))
     ui.colors(primary="#0072B2")
     dark = ui.dark_mode(session.dark)
 
@@ -167,8 +159,9 @@ async def say_refused(
 ) -> None:
     """Say which of some files are no measurements, or no spectra; they stay in the folder."""
     lines = await session.ask("full", showing.refused, names, spectra)
-    more = f"\nand {len(lines) - _REFUSED} more such files" if len(lines) > _REFUSED else ""
-    banner.say("\n".join(lines[:_REFUSED]) + more)
+    named = 5
+    more = f"\nand {len(lines) - named} more such files" if len(lines) > named else ""
+    banner.say("\n".join(lines[:named]) + more)
 
 
 async def hand_over(pending_content: Awaitable[bytes], name: str) -> None:
@@ -263,7 +256,11 @@ def table(
     body = [{"id": number, **dict(zip(names, row, strict=True))} for number, row in enumerate(rows)]
     element = ui.table(columns=head, rows=body, row_key="id", **options)
     if chosen is not None:
-        element.add_slot("body-cell-0", _CHOICE)
+        element.add_slot(
+            "body-cell-0",
+            '<q-td :props="props"><q-btn flat dense no-caps color="primary" :label="props.value" '
+            "@click=\"$parent.$emit('chosen', props.value)\" /></q-td>",
+        )
         element.on("chosen", lambda event: chosen(event.args))
     return element.classes("w-full").props("dense flat bordered")
 

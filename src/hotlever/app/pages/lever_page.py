@@ -13,7 +13,6 @@ from nicegui import ui
 from hotlever.app import probe_fields
 from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
-    FIGURE_FILES,
     ErrorBanner,
     caption,
     drop_zone,
@@ -27,11 +26,8 @@ from hotlever.app.pages.frame import (
 )
 from hotlever.app.pages.task_page import JobView, TaskPage
 from hotlever.app.probe_fields import (
-    FILM,
-    HEATER,
-    TERMINALS,
+    ROLES,
     LayerRow,
-    Place,
     Sections,
     has_section,
     typed,
@@ -42,22 +38,7 @@ from hotlever.app.probe_fields import (
 from hotlever.app.project import DATA, DRAWINGS, safe_name
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
-
-_FILE = "a probe file or a drawing"
-#: Pages that go on with the probe.
-_ON = {"simulate": "tune", "measurements": "query_stats"}
-_DROP = "Drop a drawing here (GDSII, OASIS, DXF) or a probe file, and tables of materials"
-_SAVED = (
-    "What is set is saved as a new file; comments of the file that was opened are not in it. Other "
-    "pages take the lever as its file says."
-)
-_ROLES = {"": "not used", "body": "outline of the lever", HEATER: "heater", FILM: "film or part"}
-_ROLES |= {name: f"terminal: {name}" for name in TERMINALS}
-_SILICON = "silicon of [material]"
-_LAWS = (
-    "A property is a number, a formula of T in K such as 0.032*(T/300)**-1.2, or the name of a "
-    "table (CSV) in the folder; drop tables above. Grey: what counts where nothing is said."
-)
+from hotlever.files import FIGURE_TYPES
 
 
 class LeverPage(TaskPage):
@@ -76,7 +57,13 @@ class LeverPage(TaskPage):
         self._held_for = ""
         with two_columns("live") as (left, right):
             with left:
-                drop_zone(session, banner, _DROP, self._dropped)
+                drop_zone(
+                    session,
+                    banner,
+                    "Drop a drawing here (GDSII, OASIS, DXF) or a probe file, and tables of "
+                    "materials",
+                    self._dropped,
+                )
                 self.lever_choice()
                 self._drawings = ui.select([], label="Propose a probe for the drawing")
                 self._drawings.classes("w-full").on_value_change(self._drawing_chosen)
@@ -98,12 +85,15 @@ class LeverPage(TaskPage):
         with ui.row().classes("items-center w-full"):
             self._name = ui.input("Save as", on_change=self.show_command)
             ui.button("Save", icon="save", on_click=self._save)
-            for page, icon in _ON.items():
+            for page, icon in {"simulate": "tune", "measurements": "query_stats"}.items():
                 go = ui.button(page.capitalize(), icon=icon)
                 go.props("outline").on_click(partial(self._go_on, page))
-            for suffix in FIGURE_FILES:
+            for suffix in FIGURE_TYPES:
                 flat_button(suffix[1:].upper(), partial(self._give, suffix))
-        caption(_SAVED)
+        caption(
+            "What is set is saved as a new file; comments of the file that was opened are not "
+            "in it. Other pages take the lever as its file says."
+        )
         self._edited = ui.label().classes("remark").props("role=status")
         self.command()
 
@@ -205,7 +195,9 @@ class LeverPage(TaskPage):
             await self._draw()
             self.banner.say(f"{names[-1]}: kept in the folder; a material's property may name it")
         else:
-            raise InputError(f"{names[-1]}: unknown type of file, expected {_FILE}")
+            raise InputError(
+                f"{names[-1]}: unknown type of file, expected a probe file or a drawing"
+            )
 
     def _take(self, name: str) -> None:
         """Have another lever, on all pages."""
@@ -286,8 +278,8 @@ class ProbeFields:
         self._sections: Sections = {}
         self._turn = 0
         self._built: Any = None
-        self._inputs: dict[tuple[Place, str], ui.input] = {}
-        self._cards: dict[Place, ui.element] = {}
+        self._inputs: dict[tuple[tuple[str, ...], str], ui.input] = {}
+        self._cards: dict[tuple[str, ...], ui.element] = {}
         self._column = ui.column().classes("w-full gap-1")
 
     def clear(self) -> None:
@@ -325,7 +317,10 @@ class ProbeFields:
         with self._column:
             if rows:
                 ui.label("Layers of the drawing").classes("text-bold")
-            materials = {"": _SILICON, **{name: name for name in settable.get("materials", [])}}
+            materials = {
+                "": "silicon of [material]",
+                **{name: name for name in settable.get("materials", [])},
+            }
             for row in rows:
                 self._row(row, materials | settable["new"])
             for card in settable.get("cards", []):
@@ -337,12 +332,16 @@ class ProbeFields:
                         flat_button("", rename, icon="edit", label=f"Rename {name}")
                 self._cards[card["place"]] = ui.element("div").classes("w-full fields")
             if settable.get("materials"):
-                caption(_LAWS)
+                caption(
+                    "A property is a number, a formula of T in K such as 0.032*(T/300)**-1.2, or "
+                    "the name of a table (CSV) in the folder; drop tables above. Grey: what counts "
+                    "where nothing is said."
+                )
 
     def _row(self, row: LayerRow, materials: dict[str, str]) -> None:
         """Show what a layer is, what it is made of, and how thick it is if it lies on the body."""
         with ui.row().classes("w-full items-center gap-1"):
-            roles = _ROLES if row.role in _ROLES else {**_ROLES, row.role: row.role}
+            roles = ROLES if row.role in ROLES else {**ROLES, row.role: row.role}
             role = ui.select(roles, label=f"layer {row.label}", value=row.role)
             role.classes("col min-w-36")
             role.on_value_change(lambda event: self._set_layer(row, event.value, row.material))
@@ -351,9 +350,9 @@ class ProbeFields:
             options = materials if row.role else {**materials, "": "–"}
             made_of = ui.select(options, label="made of", value=row.material, with_input=True)
             made_of.classes("col min-w-36").props(f'aria-label="layer {row.label} is made of"')
-            role_then = row.role or FILM
+            role_then = row.role or "film"
             made_of.on_value_change(lambda event: self._set_layer(row, role_then, event.value))
-            if row.role in (HEATER, FILM) and row.material:
+            if row.role in ("heater", "film") and row.material:
                 thickness = self._sections["layers"][row.name].get("thickness_um")
                 key, words = "thickness_um", f"{row.label}: thickness (µm)"
                 shown = "" if thickness is None else f"{thickness:.12g}"
@@ -392,7 +391,9 @@ class ProbeFields:
         elif field["default"]:
             own.props(f'placeholder="{field["default"]}" stack-label')
 
-    def _input(self, place: Place, key: str, label: str, meaning: str, value: str) -> ui.input:
+    def _input(
+        self, place: tuple[str, ...], key: str, label: str, meaning: str, value: str
+    ) -> ui.input:
         files = self._session.project.data if place[0] == "materials" else None
         field = ui.input(label, value=value, autocomplete=files)
         field.props(f'debounce=300 hide-bottom-space aria-label="{meaning}"')
@@ -401,7 +402,7 @@ class ProbeFields:
         self._inputs[place, key] = field
         return field
 
-    def _typed(self, place: Place, key: str, event: Any) -> Awaitable[None] | None:
+    def _typed(self, place: tuple[str, ...], key: str, event: Any) -> Awaitable[None] | None:
         if len(place) > 1 and not has_section(self._sections, place):
             return None  # it went meanwhile with the layer or the material that it was of
         value = typed(key, event.value or "")

@@ -19,15 +19,6 @@ from hotlever.app.pages.task_page import JobView, TaskPage
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
-#: The least bias (V) of pages that show what is of a current.
-LEAST_BIAS_V = 0.1
-#: Seconds that sliders rest before what follows is asked in full.
-_REST_S = 0.35
-#: Steps of a slider.
-_STEPS = 400
-# Title of a number, its form, and a factor; a form may name others of the same answer.
-Numbers = Mapping[str, tuple[str, str, float]]
-
 
 def slider(
     words: str,
@@ -64,7 +55,7 @@ def slider(
             number = ui.number(value=value, format="%.4g").classes("w-36 shrink-0")
             number.props(remove="outlined").props(f'aria-label="{words}"')
             number.props(f'borderless suffix="{unit}" input-class=text-right')
-        step = (ends[1] - ends[0]) / _STEPS
+        step = (ends[1] - ends[0]) / 400
         bar = ui.slider(min=ends[0], max=ends[1], step=step, value=position(value))
         bar.props(f'dense aria-label="{words}"')
 
@@ -96,7 +87,7 @@ class LivePage(TaskPage):
     #: The module that answers, what draws the answers, and what is shown of ``now`` in them.
     live: ClassVar[ModuleType]
     plots_of: ClassVar[type[Any]]
-    numbers: ClassVar[Numbers]
+    numbers: ClassVar[Mapping[str, tuple[str, str, float]]]
     #: What is chosen of a state, beside the task, in the order in which it is asked for.
     state: ClassVar[tuple[str, ...]]
     #: Whether a lever that was solved in full answers at once at any state.
@@ -306,7 +297,9 @@ class LivePage(TaskPage):
         self._drawn.set_visibility(False)
 
 
-def texts_of(now: Mapping[str, Any], numbers: Numbers) -> dict[str, str]:
+def texts_of(
+    now: Mapping[str, Any], numbers: Mapping[str, tuple[str, str, float]]
+) -> dict[str, str]:
     """Return the texts of numbers of an answer.
 
     Examples
@@ -365,7 +358,7 @@ class _Follower:
         def is_wanted() -> bool:
             return self.last == (lever, at)
 
-        await asyncio.sleep(_REST_S)
+        await asyncio.sleep(0.35)
         if self._page.is_gone or not is_wanted():
             return
         if await self._page.show(lever, at, False, is_wanted):

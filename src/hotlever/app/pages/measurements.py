@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,6 @@ from nicegui import ui
 
 from hotlever.app import showing
 from hotlever.app.jobs import Job, Task
-from hotlever.app.pages.column_choice import ColumnPicker
 from hotlever.app.pages.frame import (
     ErrorBanner,
     caption,
@@ -22,46 +21,30 @@ from hotlever.app.pages.frame import (
     say_refused,
     small_button,
     table,
+    text_shown,
     two_columns,
 )
-from hotlever.app.pages.instrument import MeasureCard
-from hotlever.app.pages.plots import MeasuredPlots
+from hotlever.app.pages.plots import MeasuredPlots, RampPlots
 from hotlever.app.pages.results import show_result
 from hotlever.app.pages.task_page import MEDIA, JobView, TaskPage, several
-from hotlever.app.project import CALIBRATIONS, DATA, EXAMPLES, FIT, FITS
+from hotlever.app.project import DATA, EXAMPLES, FIT
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import CALIBRATION, TABLE
 from hotlever.measurement import FileColumn
-from hotlever.quantities import FITTED
-
-#: What is shown where there is no measurement.
-_EXAMPLE = "lever-a.csv"
-_UNDERSTOOD, _OF_EXAMPLE = "What was understood", f"An example, {_EXAMPLE}, and what it holds"
-_DROP = "Drop measurements here (bias, current and what else there is), or press +"
-#: What is made, in words; by command.
-_MADE = {"calibrate": "Calibrate", "fit": "Fit"}
-_MEANING = (
-    "Calibrate: what to set for a temperature, and how sure that is. Fit: what it is made of."
-)
-#: What a calibration rests on, and the option that says so; without one it is the lever.
-_RESTS = {"fit": "fit", "law": "power_law"}
-_FLAGS = {
-    "robust": ("robust", "Lessen the weight of points far off the others"),
-    "profiles": ("profiles", "Profile the likelihood of each parameter (some 10 s, on a page)"),
-    "posterior": ("posterior", "Sample the posterior (half a minute, on a page of its own)"),
-}
-_PULSE = "Pulse of a file in time (10V,20us)"
-_OF_FOLDER = (
-    "A result of the folder, made of {data}: it holds its own lever and options, whatever is "
-    "chosen here."
-)
+from hotlever.measurement.columns import GROUP, UNUSED, quantity_of
+from hotlever.quantities import FITTED, MEASURANDS
+from hotlever.tasks.commands import defaults_of
+from hotlever.tasks.measuring import TWIN, measure_lever
+from hotlever.units import name_and_unit
 
 
 class MeasurementsPage(TaskPage):
     """One tab of the page."""
 
     name = "measurements"
+    #: What is shown where there is no measurement.
+    example = "lever-a.csv"
     first: ClassVar = {
         "kind": "calibrate",
         "data": None,
@@ -85,9 +68,14 @@ class MeasurementsPage(TaskPage):
         self.observables: list[str] = []
         self._reads = self._shows = 0
         self._read_of: Any = None
-        with two_columns() as (left, right):
+        with two_columns("measured") as (left, right):
             with left:
-                drop_zone(session, banner, _DROP, self._dropped)
+                drop_zone(
+                    session,
+                    banner,
+                    "Drop measurements here (bias, current and what else there is), or press +",
+                    self._dropped,
+                )
                 self._try = small_button("Try the example", self._example, icon="science")
                 data, offered = self.chosen["data"] or [], session.project.data
                 self._select = ui.select(
@@ -117,7 +105,7 @@ class MeasurementsPage(TaskPage):
                 JobView(session, self.name, self._ended, during=self._follow, notes=False)
                 self._result = ui.column().classes("w-full gap-2")
                 self._columns = ColumnPicker(partial(self._tell, "columns"))
-                opened = ui.expansion(_UNDERSTOOD, value=True)
+                opened = ui.expansion("What was understood", value=True)
                 self._understood = opened.props("header-class=text-bold")
                 with self._understood, ui.column().classes("w-full gap-2"):
                     self._plots = MeasuredPlots()
@@ -128,8 +116,13 @@ class MeasurementsPage(TaskPage):
     def _show_options(self) -> None:
         """Ask what is made, and what is known beforehand."""
         project = self.session.project
-        kind = ui.toggle(_MADE, value=self.chosen["kind"], on_change=self._keep("kind"))
-        kind.props('aria-label="What is made"').tooltip(_MEANING)
+        kinds = {"calibrate": "Calibrate", "fit": "Fit"}
+        kind = ui.toggle(kinds, value=self.chosen["kind"], on_change=self._keep("kind"))
+        meaning = (
+            "Calibrate: what to set for a temperature, and how sure that is. Fit: what it is made "
+            "of."
+        )
+        kind.props('aria-label="What is made"').tooltip(meaning)
         self.choice("medium", "Medium", MEDIA)
         self.text("priors", "Known beforehand (n_d=3.3e17±15%)")
         with ui.column().classes("w-full gap-3") as of_calibration:
@@ -138,6 +131,11 @@ class MeasurementsPage(TaskPage):
             rests |= {f"law:{name}": f"power law of {name}" for name in project.laws}
             self._rests = self.choice("rests", "Rests on", rests)
             self.text("pulses", "For pulses too (5us or 5us,100us)")
+        flags = {
+            "robust": "Lessen the weight of points far off the others",
+            "profiles": "Profile the likelihood of each parameter (some 10 s, on a page)",
+            "posterior": "Sample the posterior (half a minute, on a page of its own)",
+        }
         with ui.column().classes("w-full gap-1") as of_fit:
             ui.label("Fitted").classes("text-sm text-bold")
             self._boxes = {}
@@ -145,11 +143,13 @@ class MeasurementsPage(TaskPage):
                 label, fitted = f"{name} {measurand.symbol}", name not in self.chosen["without"]
                 self._boxes[name] = ui.checkbox(label, value=fitted, on_change=self._pick)
             with ui.expansion("More"):
-                for name, (label, meaning) in _FLAGS.items():
-                    self.checkbox(name, label, meaning)
+                for name, meaning in flags.items():
+                    self.checkbox(name, name, meaning)
                 self.text("fixed", "Hold (n_d=3.3e17, p)")
                 self.text("free", "Vary too (film.tcr)")
-                self._waveform = ui.input(_PULSE, on_change=self._tell_pulse)
+                self._waveform = ui.input(
+                    "Pulse of a file in time (10V,20us)", on_change=self._tell_pulse
+                )
                 self._waveform.classes("w-full").props("debounce=600")
         of_calibration.bind_visibility_from(kind, "value", value="calibrate")
         of_fit.bind_visibility_from(kind, "value", value="fit")
@@ -203,11 +203,14 @@ class MeasurementsPage(TaskPage):
     def changed(self) -> Awaitable[None] | None:
         """Read the measurement anew if it, or what it is read with, is another one."""
         self._instrument.show_command()
-        self._button.set_text(_MADE[self.chosen["kind"]] + (" all" if len(self.data) > 1 else ""))
+        self._name_button()
         if self._asked == self._read_of:
             self.show_command()
             return None
         return self.read()
+
+    def _name_button(self) -> None:
+        self._button.set_text(self.chosen["kind"].capitalize() + " all" * (len(self.data) > 1))
 
     @property
     def _asked(self) -> Any:
@@ -233,9 +236,10 @@ class MeasurementsPage(TaskPage):
             "medium": chosen["medium"],
             "prior": several(chosen["priors"]),
         }
+        options_of = {"fit": "fit", "law": "power_law"}
         if kind == "calibrate":
             rests, _, name = chosen["rests"].partition(":")
-            options |= {_RESTS[rests]: name, "probe": ""} if rests else {}
+            options |= {options_of[rests]: name, "probe": ""} if rests else {}
             options["pulse"] = chosen["pulses"].replace(" ", "")
         else:
             fitted = [name for name in self.observables if name not in chosen["without"]]
@@ -246,15 +250,11 @@ class MeasurementsPage(TaskPage):
                 "robust": chosen["robust"],
             }
         if not self.single:
-            folder = FITS if kind == "fit" else CALIBRATIONS
+            folder = "fits" if kind == "fit" else "calibrations"
+            output = project.free(folder, "")
+            files = {"report": f"{output}-report", "output": output}
             return self._goes_on(Task(kind, tuple(data), options)) or Task(
-                kind,
-                tuple(data),
-                {
-                    **options,
-                    "report": f"{project.free(folder, '')}-report",
-                    "output": project.free(folder, ""),
-                },
+                kind, tuple(data), {**options, **files}
             )
         stem = Path(self.single).stem
         if kind == "fit":
@@ -307,7 +307,7 @@ class MeasurementsPage(TaskPage):
 
     async def _example(self) -> None:
         with self.banner.caught():
-            await self._dropped([self.session.project.take_example(_EXAMPLE)])
+            await self._dropped([self.session.project.take_example(self.example)])
 
     async def read(self) -> None:
         """Read the measurement, and show what was understood, and what was made of it before."""
@@ -325,7 +325,7 @@ class MeasurementsPage(TaskPage):
                 columns = await self.session.ask("full", showing.columns, name, metadata)
         if name or not self.data:
             try:
-                file = name or str(EXAMPLES / _EXAMPLE)
+                file = name or str(EXAMPLES / self.example)
                 understood = await self.session.ask("full", showing.understood, file, metadata)
             except HotleverError as error:
                 if turn == self._reads:
@@ -338,8 +338,9 @@ class MeasurementsPage(TaskPage):
         for job in self.session.jobs.of(self.name)[:1]:
             self._follow(job)
         self._try.set_visibility(not self.data)
-        self._understood.props(f'label="{_UNDERSTOOD if name else _OF_EXAMPLE}"')
-        self._button.set_text(_MADE[self.chosen["kind"]] + (" all" if len(self.data) > 1 else ""))
+        what = "What was understood" if name else f"An example, {self.example}, and what it holds"
+        self._understood.props(f'label="{what}"')
+        self._name_button()
         self._button.set_enabled(len(self.data) > 1 or bool(name and understood))
         for own, box in self._boxes.items():
             box.set_visibility(own in self.observables or not name)
@@ -415,7 +416,11 @@ class MeasurementsPage(TaskPage):
             if turn == self._shows and not container.is_deleted:
                 with container:
                     if self.chosen["opened"]:
-                        ui.label(_OF_FOLDER.format(data=result["data"])).classes("remark")
+                        whence = (
+                            f"A result of the folder, made of {result['data']}: it holds its own"
+                        )
+                        own = f"{whence} lever and options, whatever is chosen here."
+                        ui.label(own).classes("remark")
                     await show_result(self.session, self.banner, name, result)
                     if result["kind"] == "fit":
                         on = ui.button("Calibrate with this fit", icon="straighten")
@@ -450,3 +455,204 @@ class MeasurementsPage(TaskPage):
         table(levers["head"], levers["rows"], show_lever)
         caption("A click on a lever shows it below.")
         page.move(target_index=-1)
+
+
+# --- a lever that is measured ---------------------------------------------------------------------
+
+
+class MeasureCard(TaskPage):
+    """What a lever is measured with, beside what is measured; `then` is told the file of rows."""
+
+    name = "measure"
+    #: What the fields ask, by option of `hotlever measure`; at first they have its defaults.
+    fields: ClassVar = {
+        "source": "Source meter (VISA name, or twin to try it)",
+        "reader": "Voltmeter at the reader (VISA name, or twin)",
+        "bias": "Biases (V), and most rows",
+        "settle": "Wait at each",
+        "stay_below": "The tip stays below",
+        "compliance": "Most current",
+    }
+    first: ClassVar = {
+        **dict.fromkeys(fields, ""),
+        **defaults_of(measure_lever),
+        # it is tried without an instrument, below a temperature that any tip bears
+        "source": TWIN,
+        "stay_below": "900K",
+        "propose": False,
+    }
+
+    def __init__(
+        self, session: Session, banner: ErrorBanner, then: Callable[[str], Awaitable[None]]
+    ) -> None:
+        super().__init__(session, banner)
+        self._then = then
+
+    def show_fields(self) -> None:
+        """Ask here how it is measured."""
+        with ui.expansion("Measure with a source meter", icon="bolt").classes("w-full"):
+            for name, label in self.fields.items():
+                self.text(name, label)
+            words = "Take the biases that tell most, from the fourth row on (--next)"
+            self.checkbox("propose", "Most telling biases", words)
+            self._button = ui.button("Measure", icon="play_arrow", on_click=self.start)
+            self._button.classes("w-full")
+            caption(
+                "Set the limits of the instrument itself first: it keeps its output on when the "
+                "line breaks. Before each bias the rows so far say how hot the tip may get there."
+            ).classes("remark")
+            self.command()
+        self.show_command()
+
+    def show_rows(self) -> None:
+        """Draw here what is measured, while it is and after."""
+        with ui.column().classes("w-full gap-2 ramp") as self._all:
+            JobView(self.session, self.name, self._ended, during=self._follow, stops=True)
+            self._plots = RampPlots()
+            self._result = ui.column().classes("w-full gap-1")
+        self._all.set_visibility(bool(self.session.jobs.of(self.name)))
+
+    def task(self) -> Task:
+        """Return the task that measures, and writes the rows to a new file."""
+        chosen = {name: self.chosen[name].strip() for name in self.fields}
+        options = {**chosen, "next": self.chosen["propose"], "probe": self.probe}
+        stem = self.session.project.free(f"{self.stem}-iv", ".csv")
+        return Task("measure", (), {**options, "output": f"{stem}.csv"})
+
+    def run(self, task: Task) -> bool:
+        """Measure, and show the rows."""
+        self._all.set_visibility(True)
+        self._result.clear()
+        return super().run(task)
+
+    def _follow(self, job: Job) -> None:
+        if job.contents:
+            self._plots.show(job.contents.get("rows"))
+
+    async def _ended(self, job: Job) -> None:
+        with self._result:
+            text_shown(job.contents.get("result", ""))
+        self.show_command()
+        if self.written(job):
+            await self._then(Path(job.task.written).name)
+
+
+# --- columns of its file --------------------------------------------------------------------------
+
+
+class ColumnPicker:
+    """Which column is which; `tell` is told the words of ``--column`` for those that are picked.
+
+    Of a binary file of several groups that whose columns they are is picked first.
+
+    Fields stay while the file is read anew: the next one may be open meanwhile.
+    """
+
+    def __init__(self, tell: Callable[[list[str]], Any]) -> None:
+        self._tell = tell
+        #: What was told, a quantity and perhaps its unit, by the column.
+        self._assignments: dict[str, str] = {}
+        self._group: str | None = None
+        self._columns: dict[str, FileColumn] = {}
+        self._fields: dict[str, tuple[ui.select, ui.select]] = {}
+        opened = ui.expansion("Columns of the file").props("header-class=text-bold")
+        with opened as self._opened:
+            self._groups = ui.select([], label="Group of the file").classes("w-64")
+            self._groups.on_value_change(lambda event: self._pick_group(event.value))
+            caption("The first values of each, and what it is used as.")
+            self._rows = ui.column().classes("w-full gap-1")
+
+    def show(
+        self,
+        columns: list[FileColumn],
+        assignments: list[str],
+        is_understood: bool,
+        groups: list[str],
+    ) -> None:
+        """Show the columns of a file; they are open where the file is not understood."""
+        parts = [text.partition("=") for text in assignments]
+        self._assignments = {
+            name.strip(): quantity for quantity, _, name in parts if quantity.strip() != GROUP
+        }
+        self._group = next((name for quantity, _, name in parts if quantity.strip() == GROUP), None)
+        self._groups.set_visibility(len(groups) > 1)
+        self._groups.set_options(groups, value=self._group if self._group in groups else None)
+        self._opened.set_visibility(bool(columns) or len(groups) > 1)
+        if not is_understood:
+            self._opened.set_value(True)
+        before = [(column.name, column.heading, column.cells) for column in self._columns.values()]
+        self._columns = {column.name: column for column in columns}
+        if before != [(column.name, column.heading, column.cells) for column in columns]:
+            self._rows.clear()
+            with self._rows:
+                self._fields = {column.name: self._row(column) for column in columns}
+        # for a column whose heading has none
+        offered = {"V": ("V", "mV", "uV"), "mA": ("A", "mA", "uA", "nA"), "K": ("K", "degC")}
+        offered["us"] = ("s", "ms", "us", "ns")
+        for column in columns:
+            picked, unit = self._fields[column.name]
+            picked.set_value(column.symbol)
+            has_unit = bool(column.symbol and not column.unit)
+            unit.set_visibility(has_unit)
+            if has_unit:
+                assigned_unit = self._unit_of(column.name)
+                units = [
+                    *offered[MEASURANDS[column.symbol].typed_unit],
+                    *filter(None, [assigned_unit]),
+                ]
+                unit.set_options(list(dict.fromkeys(units)), value=assigned_unit)
+
+    def _row(self, column: FileColumn) -> tuple[ui.select, ui.select]:
+        """Show a column; return the fields of what it is, and of its unit."""
+        name = column.name
+        head = column.heading or f"column {name}"
+        with ui.row().classes("w-full items-center gap-2"):
+            with ui.column().classes("gap-0 col min-w-40"):
+                ui.label(head).classes("text-sm text-bold remark")
+                caption(", ".join(cell or "–" for cell in column.cells)).classes("remark")
+            options = {"": "not used"} | {
+                symbol: f"{symbol}: {'time' if symbol == 't' else measurand.meaning}"
+                for symbol, measurand in MEASURANDS.items()
+            }
+            picked = ui.select(options, value=column.symbol).classes("w-64")
+            picked.props(f'aria-label="Column {name} is"')
+            picked.on_value_change(lambda event: self._pick(name, event.value))
+            unit = ui.select([], label="in").classes("w-24")
+            unit.props(f'aria-label="Unit of column {name}"')
+            unit.on_value_change(lambda event: self._pick_unit(name, event.value))
+        return picked, unit
+
+    def _unit_of(self, name: str) -> str | None:
+        """Return the unit that was told of a column."""
+        return name_and_unit(self._assignments.get(name, ""))[1]
+
+    def _pick(self, name: str, symbol: str, unit: str | None = None) -> Any:
+        """Tell what a column is, and nothing else of it, nor of that quantity."""
+        column = self._columns[name]
+        if symbol == column.symbol and unit is None:
+            return None  # nobody picked it
+        # a unit is not guessed: the reader asks for one
+        own = f"{symbol} ({unit})" if unit else symbol
+        if not symbol and (
+            quantity_of(column.heading) is not None or name not in self._assignments
+        ):
+            # what was only told to be used is taken back; what the file itself says is not
+            own = UNUSED
+        # at once: the next may be picked before the file is read with this
+        self._assignments = {
+            heading: quantity
+            for heading, quantity in self._assignments.items()
+            if heading != name and quantity_of(quantity, assigned=True) != symbol
+        } | ({name: own} if own else {})
+        group = [f"{GROUP}={self._group}"] if self._group is not None else []
+        assigned = [f"{quantity}={heading}" for heading, quantity in self._assignments.items()]
+        return self._tell([*group, *assigned])
+
+    def _pick_group(self, group: str | None) -> Any:
+        """Tell which group is picked; another one may have other columns."""
+        is_new = group is not None and group != self._group
+        return self._tell([f"{GROUP}={group}"]) if is_new else None
+
+    def _pick_unit(self, name: str, unit: str | None) -> Any:
+        is_new = unit is not None and unit != self._unit_of(name)
+        return self._pick(name, self._columns[name].symbol, unit) if is_new else None

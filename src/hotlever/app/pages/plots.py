@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from collections.abc import Sequence
 from copy import deepcopy
@@ -13,13 +14,9 @@ from nicegui import ui
 
 from hotlever.app.pages.frame import caption
 from hotlever.colours import BLUE, HEAT, VERMILION
+from hotlever.quantities import OBSERVABLES, QUANTITIES
 
 INK, SHADE = "#8a8a8a", "rgba(128,128,128,{:.2f})"
-#: Beyond the data, as a share of what they extend over.
-_MARGIN = 0.07
-_LEVER_V, _CURRENT = "lever voltage V<sub>l</sub> (V)", "current I<sub>h</sub> (mA)"
-BIAS, _TIP = "bias V<sub>b</sub> (V)", "tip temperature (K)"
-_CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
 
 
 def axes(x: str, y: str, height: int, normal: str = "") -> dict[str, Any]:
@@ -43,6 +40,17 @@ def axes(x: str, y: str, height: int, normal: str = "") -> dict[str, Any]:
     return layout
 
 
+def title_of(name: str) -> str:
+    """Return what an axis is called along which a quantity is drawn.
+
+    Examples
+    --------
+    >>> title_of("lever_V")
+    'lever voltage V<sub>l</sub> (V)'
+    """
+    return re.sub(r"\$_\{?(\w+)\}?\$", r"<sub>\1</sub>", QUANTITIES[name].axis_label)
+
+
 def line(colour: str, **how: Any) -> dict[str, Any]:
     """Return a trace that is a line; `how` says how it is drawn, such as ``dash``."""
     return {"type": "scatter", "mode": "lines", "line": {"color": colour, "width": 2} | how}
@@ -55,7 +63,8 @@ def dots(colour: Any, size: int, **how: Any) -> dict[str, Any]:
 
 def plotted(data: list[dict[str, Any]], layout: dict[str, Any], alt: str) -> ui.plotly:
     """Show a plot of some traces; `alt` says what it shows."""
-    plot = ui.plotly({"data": deepcopy(data), "layout": layout, "config": _CONFIG})
+    config = {"displaylogo": False, "responsive": True, "displayModeBar": False}
+    plot = ui.plotly({"data": deepcopy(data), "layout": layout, "config": config})
     return plot.classes("w-full").props(f'role=img aria-label="{alt}"')
 
 
@@ -109,17 +118,6 @@ def _path(corners: Any, end: str = "Z") -> str:
     return "M" + "L".join(f"{x:.5g},{y:.5g}" for x, y in corners) + end
 
 
-#: Observables of a measurement: columns along both axes, and what those are called; what was
-#: measured in time has its times along the first.
-_MEASURED = {
-    "current": (("lever_V", _LEVER_V), ("current_mA", _CURRENT)),
-    "reader": (("bias_V", BIAS), ("reader_V", "reader voltage V<sub>r</sub> (V)")),
-    "bridge": (("bias_V", BIAS), ("bridge_output_V", "bridge voltage V<sub>bridge</sub> (V)")),
-    "tip": (("bias_V", BIAS), ("tip_K", _TIP)),
-}
-_TIME = ("time_us", "time (µs)")
-
-
 class MeasuredPlots:
     """A measurement, by observable, and a lever that is brought near to it."""
 
@@ -129,9 +127,9 @@ class MeasuredPlots:
         self._plots: dict[str, tuple[ui.element, ui.plotly]] = {}
         # once for all measurements: a browser takes long to make them
         with side_by_side():
-            for name, ((_, along), (_, title)) in _MEASURED.items():
+            for name in ("current", "reader", "bridge", "tip"):
                 with ui.element("div") as around:
-                    layout = axes(along, title, 240, normal="xy")
+                    layout = axes("", title_of(OBSERVABLES[name].name), 240, normal="xy")
                     plot = plotted([data, model], layout, f"Measured {name}, and the lever fitted")
                 self._plots[name] = around, plot
         self._legend = caption("")
@@ -141,13 +139,12 @@ class MeasuredPlots:
         for name, (around, plot) in self._plots.items():
             around.set_visibility(name in observables)
             if name in observables:
-                along, (y, _) = _MEASURED[name]
-                x, title = _TIME if "time_us" in data else along
+                x, y = self._along(name, data), OBSERVABLES[name].name
                 measured, model = plot.figure["data"]
                 measured |= points(data[x], data[y])
                 model |= points([], [])
                 layout = plot.figure["layout"]
-                layout["xaxis"]["title"]["text"] = title
+                layout["xaxis"]["title"]["text"] = title_of(x)
                 # of the data alone, so that the lever moves and not the axes
                 layout["xaxis"]["range"] = _range(data[x])
                 layout["yaxis"]["range"] = _range(data[y])
@@ -158,11 +155,17 @@ class MeasuredPlots:
         """Draw the lever that was found so far."""
         for name, (around, plot) in self._plots.items():
             if around.visible:
-                (x, _), (y, _) = _MEASURED[name]
-                along = curve["time_us"] if "time_us" in curve else curve[x]
-                plot.figure["data"][1] |= points(along, curve[y])
+                x, y = self._along(name, curve), OBSERVABLES[name].name
+                plot.figure["data"][1] |= points(curve[x], curve[y])
                 plot.update()
         self._legend.set_text("Dots: measured. Line: the lever as the fit has it.")
+
+    @staticmethod
+    def _along(observable: str, columns: dict[str, list[float]]) -> str:
+        """Return by what an observable is drawn: what was measured in time by the time."""
+        if "time_us" in columns:
+            return "time_us"
+        return "lever_V" if observable == "current" else "bias_V"
 
 
 class RampPlots:
@@ -174,9 +177,9 @@ class RampPlots:
         before = dots(INK, 8, symbol="triangle-down-open") | {"name": "below with 99 %, foretold"}
         traces = [band, line(BLUE) | {"name": "tip"}, before, line(VERMILION, dash="dash")]
         with side_by_side():
-            layout = axes(BIAS, _CURRENT, 270)
+            layout = axes(title_of("bias_V"), title_of("current_mA"), 270)
             self._current = plotted([measured], layout, "Measured current against bias")
-            layout = axes(BIAS, _TIP, 270, normal="y")
+            layout = axes(title_of("bias_V"), title_of("tip_K"), 270, normal="y")
             self._tip = plotted(traces, layout, "Tip temperature with its band, and the limit")
         self._legend = caption("")
 
@@ -210,7 +213,7 @@ class RampPlots:
 def _range(values: list[float]) -> list[float]:
     """Return the ends of an axis that shows some values, and a little more."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    margin = _MARGIN * (high - low or abs(high) or 1.0)
+    margin = 0.07 * (high - low or abs(high) or 1.0)
     return [low - margin, high + margin]
 
 
@@ -219,12 +222,16 @@ def compare_histories(first: Path, second: Path) -> None:
     tables = [np.genfromtxt(path, delimiter=",", names=True) for path in (first, second)]
     lines = [line(BLUE), line(INK, dash="dash")]
     with side_by_side():
-        for name, title in (("tip_K", _TIP), ("current_mA", _CURRENT), ("lever_V", _LEVER_V)):
+        for name in ("tip_K", "current_mA", "lever_V"):
             drawn = [
                 how | points(table["time_us"], table[name])
                 for how, table in zip(lines, tables, strict=True)
             ]
-            plotted(drawn, axes(_TIME[1], title, 240, normal="y"), f"{name} of two levers")
+            plotted(
+                drawn,
+                axes(title_of("time_us"), title_of(name), 240, normal="y"),
+                f"{name} of two levers",
+            )
 
 
 class LivePlots:
@@ -242,12 +249,9 @@ class LivePlots:
         curves = [line(BLUE), knee, now, beside, beside_now]
         self._heat = _map_of_temperatures()
         with side_by_side():
-            layout, alt = (
-                axes(_LEVER_V, _CURRENT, 270),
-                "Current against lever voltage, with the knee",
-            )
-            current = plotted(curves, layout, alt)
-            layout = axes("power P<sub>l</sub> (mW)", _TIP, 270, normal="y")
+            layout = axes(title_of("lever_V"), title_of("current_mA"), 270)
+            current = plotted(curves, layout, "Current against lever voltage, with the knee")
+            layout = axes(title_of("power_mW"), title_of("tip_K"), 270, normal="y")
             tip = plotted(curves, layout, "Tip temperature against power")
             layout = axes("along the current (µm)", "temperature (K)", 270, normal="xy")
             alt = "Temperature along the current from the supply through the tip to the ground"

@@ -34,29 +34,13 @@ from hotlever.errors import HotleverError
 from hotlever.raman import Correction, read_corrections
 from hotlever.raman.spectrum_tables import corrections_text
 
-_TIP, _PLATE = "tip", "hot-plate"
-_LAWS = {"anharmonic": "anharmonic", "linear": "linear, as in the paper"}
-_SPECTRUM_ALT = "Counts of the spectrum, and the fitted line"
-_HELP = "Click where the line is, or type it. Drag across the part that is to be fitted."
-_FIELDS = {"start": "Line near", "low": "Fit from", "high": "Fit to"}
-#: Counts, fitted line, background, and cosmic rays.
-_QUIET = {"hoverinfo": "skip"}
-_TRACES = [
-    plots.dots(plots.INK, 4),
-    plots.line(BLUE) | _QUIET,
-    plots.line(GREEN, width=1, dash="dot") | _QUIET,
-    plots.dots(VERMILION, 8, symbol="x-thin-open") | _QUIET,
-]
-#: Over the whole height: what is not fitted, and the place of the line.
-_HIGH = {"yref": "paper", "y0": 0, "y1": 1}
-_SHADE = {"type": "rect", **_HIGH, "line": {"width": 0}, "fillcolor": plots.SHADE.format(0.25)}
-_PLACE = {"type": "line", **_HIGH, "line": {"color": VERMILION, "width": 1, "dash": "dash"}}
-
 
 class RamanPage(DrawnPage):
     """One tab of the page."""
 
     name = "raman"
+    #: The folders in which spectra are kept.
+    tip, plate = "tip", "hot-plate"
     alt = "Spectra by temperature, the calibration and its residuals"
     kinds: ClassVar = {kind: text for kind, text in DrawnPage.kinds.items() if kind != "NetCDF"}
     #: Corrections by the name of a spectrum, the file that they are in, and what that holds.
@@ -77,12 +61,15 @@ class RamanPage(DrawnPage):
             self._take_corrections(next(iter(project.names(CORRECTIONS)), ""))
         with two_columns() as (left, right):
             with left:
-                self._folder(_PLATE, "Drop the spectra of the hot plate here (temperatures known)")
-                self._folder(_TIP, "Drop the spectra to be measured here")
-                names = {"": f"the spectra in {_PLATE}"}
+                self._folder(
+                    self.plate, "Drop the spectra of the hot plate here (temperatures known)"
+                )
+                self._folder(self.tip, "Drop the spectra to be measured here")
+                names = {"": f"the spectra in {self.plate}"}
                 names |= {name: name for name in project.raman_calibrations}
                 self.choice("calibration", "Calibrated by", names)
-                self.choice("law", "Law", _LAWS)
+                laws = {"anharmonic": "anharmonic", "linear": "linear, as in the paper"}
+                self.choice("law", "Law", laws)
                 self._corrected_by = self.choice("corrected_by", "Corrected by hand in", {})
                 self._offer_corrections()
                 measure = ui.button("Measure", icon="thermostat", on_click=self.start)
@@ -94,7 +81,7 @@ class RamanPage(DrawnPage):
 
     async def open(self) -> None:
         """Show one of the spectra that are there."""
-        await self._spectrum.look([_PLATE, _TIP])
+        await self._spectrum.look([self.plate, self.tip])
 
     def _folder(self, folder: str, label: str) -> None:
         """Show where spectra are dropped, and how many there are."""
@@ -111,13 +98,13 @@ class RamanPage(DrawnPage):
 
         drop_zone(self.session, self.banner, label, dropped, folder)
         counted = ui.label().classes("text-sm")
-        if folder == _TIP and not self.session.project.spectra(_TIP):
+        if folder == self.tip and not self.session.project.spectra(self.tip):
             small_button("Try the example", self._example, icon="science")
         count()
 
     def _example(self) -> None:
         with self.banner.caught():
-            self.session.project.take_example_folders("raman", _PLATE, _TIP)
+            self.session.project.take_example_folders("raman", self.plate, self.tip)
             ui.navigate.reload()
 
     # --- corrections ------------------------------------------------------------------------------
@@ -139,7 +126,7 @@ class RamanPage(DrawnPage):
         """The file of the corrections, a new one if they have changed; empty without any."""
         if self.chosen["corrections"] == self.chosen["written"]:
             return str(self.chosen["corrected_by"] or "")
-        name = f"{self.session.project.free(_TIP, CORRECTIONS)}{CORRECTIONS}"
+        name = f"{self.session.project.free(self.tip, CORRECTIONS)}{CORRECTIONS}"
         return name if self.chosen["corrections"] else ""
 
     # --- what is asked ----------------------------------------------------------------------------
@@ -163,18 +150,18 @@ class RamanPage(DrawnPage):
             self.chosen["calibration"],
             self.chosen["law"],
         )
-        with_plate = not calibration and bool(project.spectra(_PLATE))
-        stem = project.free(_TIP, ".raman.csv", ".raman.svg", ".raman.json")
+        with_plate = not calibration and bool(project.spectra(self.plate))
+        stem = project.free(self.tip, ".raman.csv", ".raman.svg", ".raman.json")
         options = {
             "calibration": calibration,
-            "calibrate_from": [_PLATE] if with_plate else [],
+            "calibrate_from": [self.plate] if with_plate else [],
             "law": "" if law == "anharmonic" else law,
             "corrections": self._corrections_file,
             "save_calibration": f"{stem}.raman.json" if with_plate else "",
             "output": f"{stem}.raman.csv",
             "plot": f"{stem}.raman.svg",
         }
-        return Task("raman", (_TIP,), options)
+        return Task("raman", (self.tip,), options)
 
     def start(self) -> bool:
         """Write the corrections, if they are new, and measure."""
@@ -197,7 +184,7 @@ class RamanPage(DrawnPage):
             saved = job.task.options.get("save_calibration")
             if saved:
                 download_button(self.session, saved, "Calibration (JSON)")
-            table(head, rows, lambda name: self._spectrum.show(f"{_TIP}/{name}"), pagination=20)
+            table(head, rows, lambda name: self._spectrum.show(f"{self.tip}/{name}"), pagination=20)
             caption("A click on a name shows its spectrum above.")
 
 
@@ -210,6 +197,14 @@ class OneSpectrum:
     def __init__(self, page: RamanPage) -> None:
         self._page = page
         self._turn, self._quiet = 0, False
+        quiet = {"hoverinfo": "skip"}
+        # counts, fitted line, background, and cosmic rays
+        traces = [
+            plots.dots(plots.INK, 4),
+            plots.line(BLUE) | quiet,
+            plots.line(GREEN, width=1, dash="dot") | quiet,
+            plots.dots(VERMILION, 8, symbol="x-thin-open") | quiet,
+        ]
         with ui.card().classes("w-full gap-1").props("flat bordered") as self._all:
             with ui.row().classes("w-full items-center no-wrap"):
                 self._select = ui.select([], label="Spectrum", on_change=self._pick).classes("col")
@@ -218,19 +213,23 @@ class OneSpectrum:
                 flat_button("", after, icon="chevron_right", label="Next spectrum")
             layout = plots.axes("Raman shift (cm⁻¹)", "counts", 300, normal="xy")
             layout |= {"hovermode": "x", "dragmode": "select", "selectdirection": "h"}
-            self._plot = plots.plotted(_TRACES, layout, _SPECTRUM_ALT)
+            alt = "Counts of the spectrum, and the fitted line"
+            self._plot = plots.plotted(traces, layout, alt)
             self._plot.on("plotly_click", self._click, ["points"])
             self._plot.on("plotly_selected", self._drag, ["range"])
             self._text = ui.label().classes("remark").props("aria-live=polite data-spectrum=1")
             with ui.row().classes("w-full items-center"):
                 self._numbers = {}
-                for key, label in _FIELDS.items():
+                labels = {"start": "Line near", "low": "Fit from", "high": "Fit to"}
+                for key, label in labels.items():
                     number = ui.number(label, on_change=self._type, format="%.6g")
                     number.props("clearable suffix=cm⁻¹ debounce=600")
                     self._numbers[key] = number.classes("w-36")
                 self._out = ui.checkbox("Leave out", on_change=self._type)
                 flat_button("As found", self._reset, icon="restart_alt")
-            caption(_HELP)
+            caption(
+                "Click where the line is, or type it. Drag across the part that is to be fitted."
+            )
         # the frame's head covers the top of what is scrolled to
         self._all.style("scroll-margin-top: 4rem").set_visibility(False)
 
@@ -336,13 +335,17 @@ class OneSpectrum:
             trace |= plots.points(x, y)
         low, high = spectrum["ends"]
         first, last = spectrum["window"]
+        # over the whole height: what is not fitted, and the place of the line
+        tall = {"yref": "paper", "y0": 0, "y1": 1}
+        shade = {"type": "rect", **tall, "line": {"width": 0}, "layer": "below"}
         shapes: list[dict[str, Any]] = [
-            {**_SHADE, "layer": "below", "x0": x0, "x1": x1}
+            {**shade, "fillcolor": plots.SHADE.format(0.25), "x0": x0, "x1": x1}
             for x0, x1 in ((low, first), (last, high))
             if x1 > x0
         ]
-        if spectrum["centre"] is not None:
-            shapes.append({**_PLACE, "x0": spectrum["centre"], "x1": spectrum["centre"]})
+        if (centre := spectrum["centre"]) is not None:
+            dashed = {"color": VERMILION, "width": 1, "dash": "dash"}
+            shapes.append({"type": "line", **tall, "line": dashed, "x0": centre, "x1": centre})
         figure["layout"] |= {"shapes": shapes, "selections": []}
         figure["layout"]["xaxis"]["range"] = [low, high]
         figure["layout"]["yaxis"] |= {"range": spectrum["heights"], "autorange": False}

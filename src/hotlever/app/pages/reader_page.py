@@ -13,38 +13,8 @@ from hotlever.app import approaching
 from hotlever.app.jobs import Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import caption
-from hotlever.app.pages.live_page import LEAST_BIAS_V, LivePage
+from hotlever.app.pages.live_page import LivePage
 from hotlever.colours import BLUE, VERMILION
-
-#: Distances of a table that is written.
-_DISTANCES = 10
-#: What is chosen of the surface, in words, unit, and what it is.
-_OF_THE_SURFACE = (
-    ("tilt_deg", "Tilt", "°", "surface_tilt_deg: of the surface; positive: the base is farther"),
-    ("accommodation", "Accommodation", "", "for the temperature jump at surfaces, 0.01 to 1"),
-)
-_MOVING = (
-    "coarse lever, while the full one is solved; the air's temperature jumps as at the bias before"
-)
-_AT_REST = "full lever: the numbers of hotlever reader"
-#: Temperatures (K) as at which the air jumps alike: the voltage is the same within 0.1 %.
-_SAME_JUMP_K = 2.0
-#: What is said of the curves, which are of a coarse lever: how far they are off here.
-_OFF = {"reader_V": "voltage", "reader_ohm": "resistance", "dlnR_dz_per_um": "d ln R/dz"}
-_ABOUT = (
-    "From the side, heights to a scale of their own; each piece of the lever in the colour of its "
-    "hottest place. The dashed line is the distance."
-)
-#: Plots by distance: title, column, factor, and whether the axis is logarithmic.
-_CURVES = (
-    ("voltage (V)", "reader_V", 1.0, False),
-    ("|d ln R/dz| (10<sup>−4</sup>/nm)", "dlnR_dz_per_um", 10.0, True),
-    ("resolution (pm/√Hz)", "resolution_nm_per_rtHz", 1e3, True),
-)
-#: Values that are named on logarithmic axes.
-_TICKS = [float(f"{digit}e{power}") for power in range(-6, 7) for digit in (1, 2, 5)]
-#: Share of the lever's length, and of the height, that is shown around it.
-_AROUND, _ABOVE = 0.04, 0.25
 
 
 class ReaderPlots:
@@ -59,21 +29,32 @@ class ReaderPlots:
         alt = "The lever from the side, coloured by temperature, over the surface"
         traces = [plots.line(plots.INK), plots.line(VERMILION, dash="dash")]
         self._picture = plots.plotted(traces, layout, alt)
-        caption(_ABOUT)
-        self._curves: list[ui.plotly] = []
-        ticks = {"tickvals": _TICKS, "ticktext": [f"{value:g}" for value in _TICKS]}
+        caption(
+            "From the side, heights to a scale of their own; each piece of the lever in the "
+            "colour of its hottest place. The dashed line is the distance."
+        )
+        # title, column, factor, and whether the axis is logarithmic
+        curves = (
+            ("voltage (V)", "reader_V", 1.0, False),
+            ("|d ln R/dz| (10<sup>−4</sup>/nm)", "dlnR_dz_per_um", 10.0, True),
+            ("resolution (pm/√Hz)", "resolution_nm_per_rtHz", 1e3, True),
+        )
+        self._curves: list[tuple[ui.plotly, str, float, bool]] = []
+        values = [float(f"{digit}e{power}") for power in range(-6, 7) for digit in (1, 2, 5)]
+        ticks = {"tickvals": values, "ticktext": [f"{value:g}" for value in values]}
         with plots.side_by_side():
-            for title, _, _, by_decades in _CURVES:
+            for title, key, factor, by_decades in curves:
                 layout = plots.axes("distance to the surface (µm)", title, 250, normal="xy")
                 for axis in ("xaxis", "yaxis")[: 1 + by_decades]:
                     layout[axis] |= {"type": "log", **ticks}
                 traces = [plots.line(BLUE), plots.dots(VERMILION, 10)]
-                self._curves.append(plots.plotted(traces, layout, f"{title} by distance"))
+                plot = plots.plotted(traces, layout, f"{title} by distance")
+                self._curves.append((plot, key, factor, by_decades))
 
     def show(self, answer: dict[str, Any]) -> None:
         """Draw an answer."""
         self._draw(answer)
-        for plot, (_, key, factor, by_decades) in zip(self._curves, _CURVES, strict=True):
+        for plot, key, factor, by_decades in self._curves:
             for number, columns in enumerate((answer["curves"], answer["now"])):
                 values = factor * np.asarray(columns[key])
                 values = np.abs(values) if by_decades else values
@@ -95,18 +76,20 @@ class ReaderPlots:
             height, radius = answer["tip"]
             cone = [(at_tip - radius, 0.0), (at_tip + radius, 0.0), (at_tip, -height)]
             shapes.append(plots.filled(cone, plots.INK))
-        margin = _AROUND * (end - start)
+        margin = 0.04 * (end - start)
         sides = np.array([start - margin, end + margin])
         surface = -gap + answer["slope"] * (sides - at_tip)
         low = float(surface.min())
-        bottom = low - _ABOVE * (thick - low)
+        # share of the height that is shown around it
+        above = 0.25
+        bottom = low - above * (thick - low)
         corners = [*zip(sides.tolist(), surface.tolist(), strict=True)]
         below = [*corners, (sides[1], bottom), (sides[0], bottom)]
         shapes += [plots.filled(below, plots.SHADE.format(0.35)), plots.outlined(outline)]
         figure = self._picture.figure
         figure["layout"]["shapes"] = shapes
         figure["layout"]["xaxis"]["range"] = sides.tolist()
-        figure["layout"]["yaxis"]["range"] = [bottom, thick + _ABOVE * (thick - low)]
+        figure["layout"]["yaxis"]["range"] = [bottom, thick + above * (thick - low)]
         figure["data"][0] |= plots.points(sides, surface)
         figure["data"][1] |= plots.points([at_tip, at_tip], [0.0, -gap])
         self._picture.update()
@@ -117,6 +100,8 @@ class ReaderPage(LivePage):
 
     name, plots_of = "reader", ReaderPlots
     live: ClassVar = approaching
+    #: Distances of a table that is written.
+    distances = 10
     # each distance is another lever
     solved_once = False
     first: ClassVar = {
@@ -146,9 +131,12 @@ class ReaderPage(LivePage):
     def controls(self) -> None:
         """Ask for tilt and accommodation, of which each value needs other levers."""
         with ui.row().classes("w-full no-wrap gap-1"):
-            for key, words, unit, hint in _OF_THE_SURFACE:
-                field = self.number(key, words, unit, "as the file says")
-                field.classes("col", remove="w-36").tooltip(hint)
+            tilt = self.number("tilt_deg", "Tilt", "°", "as the file says")
+            tilt.tooltip("surface_tilt_deg: of the surface; positive: the base is farther")
+            share = self.number("accommodation", "Accommodation", "", "as the file says")
+            share.tooltip("for the temperature jump at surfaces, 0.01 to 1")
+            for field in (tilt, share):
+                field.classes("col", remove="w-36")
 
     async def described(self) -> dict[str, Any]:
         """Return which distances there are, and what the file says of the surroundings."""
@@ -164,7 +152,7 @@ class ReaderPage(LivePage):
         ends = self.of_file["nearest_um"], self.of_file["farthest_um"]
         below = "surface_gap_um: lower face of the lever to the surface, at the tip"
         self.slider("distance_um", "distance to the surface", *ends, "µm", below, by_decades=True)
-        self.slider_of_bias(LEAST_BIAS_V)
+        self.slider_of_bias(0.1)
         self.slider("amplifier_nV", "noise of the amplifier", 0.0, 20.0, "nV/√Hz")
         hooge = "of the silicon, for 1/f noise; none at the lowest"
         words = "Hooge's parameter"
@@ -178,7 +166,7 @@ class ReaderPage(LivePage):
         if accommodation is not None:
             changes["accommodation"] = accommodation
         options = {
-            "distance": f"{nearest:.12g}um:{farthest:.12g}um:{_DISTANCES}",
+            "distance": f"{nearest:.12g}um:{farthest:.12g}um:{self.distances}",
             "medium": "air",
             "set": [f"{name}={value:.12g}" for name, value in changes.items()],
             "amplifier": f"{self.chosen['amplifier_nV']:.12g}nV",
@@ -200,7 +188,8 @@ class ReaderPage(LivePage):
     async def follow_answer(self, at: list[float], quick: bool) -> None:
         """Have the curves follow, too, if the air jumps as at another temperature by now."""
         jump_K = self._full.get("jump_K")
-        if quick or jump_K is None or abs(jump_K - (self._jump_K or 0.0)) <= _SAME_JUMP_K:
+        # with a jump as at a temperature 2 K away the voltage is the same within 0.1 %
+        if quick or jump_K is None or abs(jump_K - (self._jump_K or 0.0)) <= 2.0:
             return
         self._jump_K, wanted = jump_K, (self.of_lever(), at)
         with self.banner.caught():
@@ -213,8 +202,13 @@ class ReaderPage(LivePage):
         """Return whose numbers these are, where they are read, and how far curves are off."""
         remark = "; ".join([f"Read at the terminal {answer['read_at']}", *answer["on_curves"]])
         if quick:
-            return _MOVING, remark
+            coarse_lever = "coarse lever, while the full one is solved"
+            return f"{coarse_lever}; the air's temperature jumps as at the bias before", remark
         self._full = {key: answer[key] for key in ("now", "jump_K", "read_at")}
         coarse, now = self._coarse["now"], answer["now"]
-        off = (f"{100 * (coarse[key] / now[key] - 1):+.2g} % in {_OFF[key]}" for key in _OFF)
-        return _AT_REST, f"{remark}; curves: coarse lever, here {', '.join(off)}"
+        shown = {"reader_V": "voltage", "reader_ohm": "resistance", "dlnR_dz_per_um": "d ln R/dz"}
+        off = (f"{100 * (coarse[key] / now[key] - 1):+.2g} % in {shown[key]}" for key in shown)
+        return (
+            "full lever: the numbers of hotlever reader",
+            f"{remark}; curves: coarse lever, here {', '.join(off)}",
+        )

@@ -12,7 +12,6 @@ from nicegui import ui
 from hotlever.app import showing
 from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import (
-    FIGURE_FILES,
     ErrorBanner,
     caption,
     download_button,
@@ -26,17 +25,9 @@ from hotlever.app.pages.frame import (
 from hotlever.app.pages.task_page import DrawnPage
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
+from hotlever.files import FIGURE_TYPES
 from hotlever.materials.parameters import sentence
 from hotlever.text import value_with_error
-
-#: What can be asked of a calibration: title, unit, and what is asked at first.
-_QUANTITIES = {
-    "tip_K": ("tip temperature", "K", 600.0),
-    "bias_V": ("bias", "V", 8.0),
-    "power_mW": ("power", "mW", 2.0),
-}
-#: What can be told: where the error counts, what the tip is to stay below, and what counts without.
-_TEMPERATURES = {"at": ("Sure at", "hottest measured"), "stay_below": ("Stay below", "what melts")}
 
 
 async def show_result(session: Session, banner: ErrorBanner, name: str, result: Any) -> None:
@@ -61,7 +52,7 @@ async def show_result(session: Session, banner: ErrorBanner, name: str, result: 
                 refusal = f"This calibration does not tell. {sentence(doubt)}"
                 ui.label(refusal).classes("remark").props("data-answer=none")
             else:
-                questions = [_Question(session, name, along) for along in _QUANTITIES]
+                questions = [_Question(session, name, along) for along in _Question.quantities]
         if questions:
             Proposals(session, banner, name, stem)
     for question in questions:
@@ -80,7 +71,7 @@ async def show_result(session: Session, banner: ErrorBanner, name: str, result: 
                     figure(block["figure"], block["caption"])
                     with ui.row().classes("items-center w-full no-wrap"):
                         caption(block["caption"]).classes("remark caption col")
-                        for suffix in FIGURE_FILES:
+                        for suffix in FIGURE_TYPES:
                             own, kind = block["name"], suffix[1:].upper()
                             click = partial(
                                 give, showing.drawn, f"{stem}-{own}{suffix}", own, suffix
@@ -91,10 +82,19 @@ async def show_result(session: Session, banner: ErrorBanner, name: str, result: 
 class _Question:
     """A number that is asked, and its answer from the calibration."""
 
+    #: What can be asked: title, unit, and what is asked at first.
+    quantities: ClassVar = {
+        "tip_K": ("tip temperature", "K", 600.0),
+        "bias_V": ("bias", "V", 8.0),
+        "power_mW": ("power", "mW", 2.0),
+    }
+
     def __init__(self, session: Session, name: str, along: str) -> None:
         self._session, self._name, self._along = session, name, along
-        self._targets = session.choices("asked", {key: at for key, (*_, at) in _QUANTITIES.items()})
-        title, unit, _ = _QUANTITIES[along]
+        self._targets = session.choices(
+            ("asked"), {key: at for key, (*_, at) in self.quantities.items()}
+        )
+        title, unit, _ = self.quantities[along]
         with ui.row().classes("w-full items-center"):
             value = self._targets[along]
             self._number = ui.number(f"For a {title} of", value=value, on_change=self.answer)
@@ -140,7 +140,12 @@ class Proposals(DrawnPage):
 
     alt = "Error by temperature now and after more measurements; tip temperature by bias"
     kinds: ClassVar = {kind: text for kind, text in DrawnPage.kinds.items() if kind != "NetCDF"}
-    first: ClassVar = dict.fromkeys(_TEMPERATURES)
+    #: Where the error counts, and what the tip is to stay below: what counts where nothing is said.
+    temperatures: ClassVar = {
+        "at": ("Sure at", "hottest measured"),
+        "stay_below": ("Stay below", "what melts"),
+    }
+    first: ClassVar = dict.fromkeys(temperatures)
 
     def __init__(self, session: Session, banner: ErrorBanner, calibration: str, stem: str) -> None:
         self.name, self._calibration, self._stem = f"next {calibration}", calibration, stem
@@ -148,7 +153,7 @@ class Proposals(DrawnPage):
         with ui.card().classes("w-full").props("flat bordered data-proposals"):
             ui.label("What do I measure next?").classes("text-bold")
             with ui.row().classes("w-full items-center"):
-                for key, (title, empty) in _TEMPERATURES.items():
+                for key, (title, empty) in self.temperatures.items():
                     self.number(key, title, "K", empty).classes("w-44", remove="w-36")
                 ui.space()
                 ui.button("Propose", icon="add_location_alt", on_click=self.start)
@@ -157,7 +162,7 @@ class Proposals(DrawnPage):
 
     def task(self) -> Task:
         """Return the task that writes the proposals as a table and a figure."""
-        temperatures = {key: self.chosen[key] for key in _TEMPERATURES}
+        temperatures = {key: self.chosen[key] for key in self.temperatures}
         kelvins = {key: "" if T is None else f"{T:.12g}K" for key, T in temperatures.items()}
         files = self.outputs(self._stem, "next", "SVG")
         return Task("next", (self._calibration,), {**kelvins, **files})

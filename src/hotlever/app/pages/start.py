@@ -28,21 +28,6 @@ from hotlever.app.project import DRAWINGS, EXAMPLES
 from hotlever.app.session import Session
 from hotlever.errors import HotleverError
 
-_SENTENCES = (
-    "hotlever tells how hot the tip of a Joule-heated cantilever is, and how sure that is.",
-    "Drop a measurement (bias and current, and what else you have) and press Calibrate or Fit; or "
-    "go to Simulate and move the sliders of the reference probe.",
-    "Everything lies as files in {folder}, and each page shows the command line that does the "
-    "same.",
-)
-_DROP = "Drop anything here: a measurement, a drawing (GDSII, OASIS, DXF), a probe file"
-#: Kinds of files of a project, and their titles.
-_KINDS = {"probes": "Levers", "data": "Measurements", "drawings": "Drawings"}
-_MOST_FILES = 12
-_SCRIPTS, _ADDRESS = EXAMPLES / "gallery", "/gallery"
-#: Pages on which all is as at first but what is set up, and how that is.
-_FIRST = {page.name: page.first for page in (SimulatePage, MeasurementsPage)}
-
 
 @dataclass(frozen=True)
 class Opened:
@@ -71,7 +56,9 @@ class Opened:
             session.project.take_example_folders(self.example, *folders)
         elif self.page == SimulatePage.name:
             session.choose_lever("")
-        first = _FIRST.get(self.page, {})
+        # on these pages all is as at first but what is set up
+        first_of = {page.name: page.first for page in (SimulatePage, MeasurementsPage)}
+        first = first_of.get(self.page, {})
         of_file = {"data"} if self.example else set()
         chosen = {key: value for key, value in first.items() if key not in of_file}
         session.choices(self.page, first).update({**chosen, **self.chosen})
@@ -97,18 +84,6 @@ def choose_file(session: Session, name: str) -> str:
     return MeasurementsPage.name
 
 
-_TRY = {
-    "A measured lever": (
-        "Bias, current, reader voltage, tip temperature",
-        Opened("measurements", example="lever-a.csv"),
-    ),
-    "A lever with a tip": (
-        "The same, of a lever that the model lacks",
-        Opened("measurements", example="lever-b.csv"),
-    ),
-    "A drawing": ("The reference lever as GDSII", Opened("lever", example="reference-probe.gds")),
-    "Raman spectra": ("A hot plate and a tip", Opened("raman", example="raman")),
-}
 #: Questions by the names of their scripts, in the order of the documentation; None has no page.
 QUESTIONS: dict[str, Opened | None] = {
     "knee": Opened("simulate", {"bias": 8.3}),
@@ -128,7 +103,7 @@ QUESTIONS: dict[str, Opened | None] = {
 
 def serve_pictures() -> None:
     """Have the server give the pictures of the questions."""
-    app.add_static_files(_ADDRESS, _SCRIPTS)
+    app.add_static_files("/gallery", EXAMPLES / "gallery")
 
 
 class StartPage(TaskPage):
@@ -136,14 +111,41 @@ class StartPage(TaskPage):
 
     def __init__(self, session: Session, banner: ErrorBanner) -> None:
         super().__init__(session, banner)
+        sentences = (
+            "hotlever tells how hot the tip of a Joule-heated cantilever is, and how sure that is.",
+            "Drop a measurement (bias and current, and what else you have) and press Calibrate or "
+            "Fit; or go to Simulate and move the sliders of the reference probe.",
+            "Everything lies as files in {folder}, and each page shows the command line that does "
+            "the same.",
+        )
+        to_try = {
+            "A measured lever": (
+                "Bias, current, reader voltage, tip temperature",
+                Opened("measurements", example="lever-a.csv"),
+            ),
+            "A lever with a tip": (
+                "The same, of a lever that the model lacks",
+                Opened("measurements", example="lever-b.csv"),
+            ),
+            "A drawing": (
+                "The reference lever as GDSII",
+                Opened("lever", example="reference-probe.gds"),
+            ),
+            "Raman spectra": ("A hot plate and a tip", Opened("raman", example="raman")),
+        }
         with ui.column().classes("w-full max-w-5xl mx-auto gap-4"):
-            for sentence in _SENTENCES:
+            for sentence in sentences:
                 words = sentence.format(folder=session.project.folder)
                 ui.label(words).classes("text-base remark")
-            drop_zone(session, banner, _DROP, self._sort)
+            drop_zone(
+                session,
+                banner,
+                "Drop anything here: a measurement, a drawing (GDSII, OASIS, DXF), a probe file",
+                self._sort,
+            )
             ui.label("Try it").classes("text-lg text-bold")
             with ui.row().classes("w-full gap-3"):
-                for title, (text, opened) in _TRY.items():
+                for title, (text, opened) in to_try.items():
                     with ui.card().props("flat bordered").classes("w-56 gap-1"):
                         ui.label(title).classes("text-bold")
                         ui.label(text).classes("text-sm opacity-70")
@@ -159,18 +161,20 @@ class StartPage(TaskPage):
 
     def _list_files(self) -> None:
         """Show what lies in the folder, each with the way to its page."""
+        titles = {"probes": "Levers", "data": "Measurements", "drawings": "Drawings"}
+        most = 12
         with ui.row().classes("w-full gap-8 items-start"):
-            for kind, title in _KINDS.items():
+            for kind, title in titles.items():
                 names = getattr(self.session.project, kind)
                 if not names:
                     continue
                 with ui.column().classes("gap-0"):
                     ui.label(title).classes("text-bold")
-                    for name in names[:_MOST_FILES]:
+                    for name in names[:most]:
                         go = flat_button(name, partial(self._open, name))
                         go.props("align=left")
-                    if len(names) > _MOST_FILES:
-                        caption(f"and {len(names) - _MOST_FILES} more")
+                    if len(names) > most:
+                        caption(f"and {len(names) - most} more")
 
     def _open(self, name: str) -> None:
         with self.banner.caught():
@@ -198,7 +202,7 @@ class StartPage(TaskPage):
 
     def _card(self, name: str, opened: Opened | None) -> None:
         """Show a question with its picture, the page that answers it, and its script."""
-        code = (_SCRIPTS / f"{name}.py").read_text(encoding="utf-8")
+        code = (EXAMPLES / "gallery" / f"{name}.py").read_text(encoding="utf-8")
         question = ast.get_docstring(ast.parse(code)) or name
         with ui.card().props("flat bordered").classes("w-56 gap-1 p-2"):
             with ui.element("div").classes("paper w-full p-1"):
@@ -215,7 +219,7 @@ class StartPage(TaskPage):
 
 def _picture(name: str, question: str) -> ui.element:
     image = ui.element("img").props("loading=lazy")
-    image.props["src"], image.props["alt"] = f"{_ADDRESS}/{name}.png", f"The figure of: {question}"
+    image.props["src"], image.props["alt"] = f"/gallery/{name}.png", f"The figure of: {question}"
     return image
 
 

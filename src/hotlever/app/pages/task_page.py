@@ -25,7 +25,6 @@ from hotlever.app.pages.frame import (
 from hotlever.app.session import Session
 from hotlever.errors import InputError
 
-REFERENCE = "reference probe"
 MEDIA = {
     "": "as the files say",
     "vacuum": "vacuum",
@@ -41,11 +40,6 @@ KINDS = {
     "PDF": "the figure",
     "VTU": "the fields, for ParaView",
 }
-FILM = {"film": "the temperature map in time (GIF)"}
-_TABLES = {"CSV": "csv", "NetCDF": "nc"}
-_OTHER = "Something else is chosen now; this is still the result of:"
-#: Seconds between two looks at the work that runs.
-_LOOK_S = 0.1
 
 
 class TaskPage:
@@ -111,7 +105,7 @@ class TaskPage:
         session, project = self.session, self.session.project
 
         def options() -> dict[str, str]:
-            probes = {"": REFERENCE} | {name: name for name in project.probes}
+            probes = {"": "reference probe"} | {name: name for name in project.probes}
             return _with_missing(probes, session.probe)
 
         def chosen(event: Any) -> Awaitable[None] | None:
@@ -222,7 +216,8 @@ class TaskPage:
 
     def result_of(self, job: Job) -> None:
         """Show here that what is below is of a job: its command line, and a mark once it is old."""
-        mark = ui.label(_OTHER).classes("banner w-full").props("role=status data-other=1")
+        mark = ui.label("Something else is chosen now; this is still the result of:")
+        mark.classes("banner w-full").props("role=status data-other=1")
         self._origin = job, mark
         with ui.element("pre").classes("command w-full"):
             ui.label(job.task.line).props("data-origin=1")
@@ -284,12 +279,13 @@ def outputs(stem: str, kind: str) -> dict[str, str]:
     >>> outputs("a", "PDF"), outputs("a", "VTU")
     ({'output': 'a.csv', 'plot': 'a.pdf'}, {'fields': 'a.fields'})
     """
-    if kind in FILM:
+    if kind == "film":
         return {"film": f"{stem}.gif"}
     if kind == "VTU":
         return {"fields": f"{stem}.fields"}
-    if kind in _TABLES:
-        return {"output": f"{stem}.{_TABLES[kind]}"}
+    tables = {"CSV": "csv", "NetCDF": "nc"}
+    if kind in tables:
+        return {"output": f"{stem}.{tables[kind]}"}
     return {"output": f"{stem}.csv", "plot": f"{stem}.{kind.lower()}"}
 
 
@@ -333,7 +329,7 @@ class JobView:
             self._notes.set_visibility(notes)
         self._reported_job = self._job if self._has_ended else None
         self._look()
-        ui.timer(_LOOK_S, self._tell)
+        ui.timer(0.1, self._tell)
 
     @property
     def _job(self) -> Job | None:
