@@ -68,7 +68,7 @@ def in_python(lever: Mapping[str, Any], last: str, *imports: str) -> str:
     return "\n".join([*heads, "", f"lever = Lever({probe})", last])
 
 
-# --- beside the lever that is chosen ------------------------------------------------------------------------------------
+# --- beside the lever that is chosen --------------------------------------------------------------
 
 
 def options_beside(probes: Iterable[str]) -> dict[str, str]:
@@ -150,8 +150,8 @@ class Pulses(DrawnPage):
                 ui.space()
                 ui.button("Follow", icon="timeline", on_click=self.start)
             with ui.row().classes("w-full items-center"):
-                for key, (label, unit, kinds, empty) in self.fields.items():
-                    field = self.number(key, label, unit, empty)
+                for key, (title, unit, kinds, empty) in self.fields.items():
+                    field = self.number(key, title, unit, empty)
                     field.bind_visibility_from(kind, "value", backward=partial(contains, kinds))
         JobView(session, "pulse-beside", self._beside_ended)
         self.show_result()
@@ -165,12 +165,12 @@ class Pulses(DrawnPage):
             If something is missing.
         """
         values = {}
-        for key, (label, _, kinds, placeholder) in self.fields.items():
+        for key, (title, _, kinds, placeholder) in self.fields.items():
             if self.chosen["kind"] in kinds:
                 if self.chosen[key] is not None:
                     values[key] = f"{self.chosen[key]:.12g}"
                 elif not placeholder:
-                    raise InputError(f"{label}: expected a number")
+                    raise InputError(f"{title}: expected a number")
         return values
 
     def task(self) -> Task:
