@@ -17,6 +17,7 @@ from typing import Any, Literal
 from hotlever.app.workers import Report, Worker
 from hotlever.errors import HotleverError
 from hotlever.probe import Probe
+from hotlever.tasks.arguments import LeverArguments
 from hotlever.tasks.commands import COMMANDS, run_command, written_by
 from hotlever.tasks.common_steps import read_surrounded_probe
 
@@ -271,8 +272,8 @@ def run(report: Report, task: Task) -> None:
 
 def surrounded_probe(report: Report, told: Mapping[str, Any], *, finds_air: bool = False) -> Probe:
     """Return the probe, in its medium, of a command whose arguments are given by name."""
-    around = told["medium"], told["set"], told["physics"]
-    return read_surrounded_probe(report, told["probe"], *around, finds_air=finds_air)
+    lever = LeverArguments(told["probe"], told["medium"], told["set"], told["physics"])
+    return read_surrounded_probe(report, lever, finds_air=finds_air)
 
 
 def probe_of(name: str) -> Probe:

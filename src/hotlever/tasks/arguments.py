@@ -1,7 +1,8 @@
-"""Arguments and options that several commands share, each declared once as the type of a parameter.
+"""Arguments and options that several commands share, each declared once.
 
-Beside what the command line says of it stands, with one that names what is written, what that is
-(`Written`). What several options tell together is settled here too.
+A single one is the type of a parameter; those that belong together are the fields of a dataclass,
+and a parameter of this type stands for all of them. Beside what the command line says of it stands,
+with one that names what is written, what that is (`Written`).
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from typer import Argument, Option
 
 from hotlever.errors import InputError, excerpt
 from hotlever.files import FIGURE_TYPES, FOLDER
+from hotlever.tasks.parsing import parse_priors
 
 if TYPE_CHECKING:
     from hotlever.lever.transient import Waveform
+    from hotlever.probe import Probe
 
 
 @dataclass(frozen=True)
@@ -36,16 +39,11 @@ class Written:
     types_of: Callable[[Mapping[str, Any]], tuple[str, ...]] | None = None
 
 
-# --- levers -------------------------------------------------------------------------------------
+# --- of several commands ------------------------------------------------------------------------
 
 ProbeFile = Annotated[
     Path | None,
     Argument(metavar="[PROBE.toml]", help="Probe file; the reference probe if left out."),
-]
-Medium = Annotated[str | None, Option(help="vacuum or air; what the files say if left out.")]
-Settings = Annotated[
-    list[str] | None,
-    Option("--set", metavar="NAME=VALUE", help="Change a value of the probe file."),
 ]
 Physics = Annotated[
     str | None,
@@ -55,16 +53,6 @@ Physics = Annotated[
         "what the probe file says if left out.",
     ),
 ]
-Bias = Annotated[
-    str | None,
-    Option(
-        metavar="START:STOP:COUNT",
-        help="In volts, ends included, or a single one; 1:11:25 if left out.",
-    ),
-]
-
-# --- what is written ----------------------------------------------------------------------------
-
 Plot = Annotated[
     Path | None, Option(help="Draw to this file: .png, .svg or .pdf."), Written(FIGURE_TYPES)
 ]
@@ -74,137 +62,154 @@ Table = Annotated[
     Written((".csv", ".nc")),
 ]
 
-# --- in time ------------------------------------------------------------------------------------
 
-Step = Annotated[str | None, Option(metavar="V", help="Switch the bias on, and leave it.")]
-Pulse = Annotated[str | None, Option(metavar="V,TIME", help="A pulse, such as 10V,5us.")]
-Period = Annotated[str | None, Option(metavar="TIME", help="Of pulses that are repeated.")]
-Count = Annotated[int | None, Option(metavar="N", help="Number of pulses.")]
-Ramp = Annotated[str | None, Option(metavar="V,TIME", help="Raise the bias, such as 8V,50us.")]
-Sine = Annotated[str | None, Option(metavar="V+V@FREQ", help="Such as 3V+0.5V@20kHz.")]
-WaveformFile = Annotated[
-    Path | None, Option(help="A table of times and biases, such as a supply takes.")
-]
-Until = Annotated[str | None, Option(metavar="TIME", help="When to stop.")]
-Times = Annotated[
-    str | None,
-    Option(metavar="TIME,...", help="Times to report; where the solver stepped if left out."),
-]
+@dataclass(frozen=True)
+class LeverArguments:
+    """A lever that is solved: a probe, and what is changed of it."""
 
-# --- measurements of levers ---------------------------------------------------------------------
+    probe: ProbeFile = None
+    medium: Annotated[str | None, Option(help="vacuum or air; what the files say if left out.")] = (
+        None
+    )
+    set: Annotated[
+        list[str] | None,
+        Option("--set", metavar="NAME=VALUE", help="Change a value of the probe file."),
+    ] = None
+    physics: Physics = None
 
-MeasuredProbe = Annotated[
-    Path | None,
-    Option(help="Probe file of levers like these; the reference probe if left out."),
-]
-MeasuredMedium = Annotated[
-    str | None,
-    Option(help="vacuum, air or unknown (both are tried); what the files say if left out."),
-]
-Column = Annotated[
-    list[str] | None,
-    Option(
-        metavar="'QUANTITY (UNIT)=NAME'",
-        help="Which column of the data is which quantity, as 'I_h (uA)=Current' or by its "
-        "number; or a file of such lines; repeated.",
-    ),
-]
-Priors = Annotated[
-    list[str] | None,
-    Option(
-        metavar="NAME=VALUE±SPREAD",
-        help="What is known beforehand, as n_d=3.3e17±15%, n_d=1e17×/3 (to a factor), "
-        "dimensions=±2%, usual (what a calibration takes) or none; repeated.",
-    ),
-]
-Laws = Annotated[
-    str | None,
-    Option(
-        metavar="paper|uncertain",
-        help="Whether laws of silicon hold to the letter or are as uncertain as published values "
-        "differ; left out: uncertain in a calibration, the paper's in a fit.",
-    ),
-]
-Data = Annotated[
-    list[Path], Argument(metavar="DATA.csv...", help="Measurement files, one for each lever.")
-]
-Results = Annotated[
-    Path | None,
-    Option("-o", "--output", help="Result file (JSON); a folder of them with several data files."),
-    Written(types_of=lambda values: FOLDER if len(values["data"]) > 1 else (".json",)),
-]
-Report = Annotated[Path | None, Option(help="Write a page with figures to this folder."), Written()]
-Processes = Annotated[
-    int | None,
-    Option(metavar="N", help="Local processes; one for each processor if left out."),
-]
-Scheduler = Annotated[
-    str | None,
-    Option(metavar="ADDRESS", help="Dask scheduler for several data files, as tls://HOST:8786."),
-]
 
-# --- spectra ------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class DriveOptions:
+    """A wave form of the bias."""
 
-Spectra = Annotated[
-    list[Path], Argument(metavar="FILE_OR_DIR...", help="Spectra, or folders of spectra.")
-]
-CalibrationName = Annotated[
-    str | None,
-    Option(
-        metavar="CAL.json",
-        help="A calibration that --save-calibration wrote, or 'published' for the published laws "
-        "(then --reference is needed).",
-    ),
-]
-CalibrateFrom = Annotated[
-    list[Path] | None,
-    Option(metavar="FILE_OR_DIR...", help="Hot-plate spectra to calibrate from; one or more."),
-]
-Temperatures = Annotated[
-    Path | None,
-    Option(
-        metavar="TABLE.csv",
-        help="Hot-plate temperatures: file name, temperature. Left out: header or file name.",
-    ),
-]
-Corrections = Annotated[
-    Path | None,
-    Option(
-        metavar="TABLE.csv",
-        help="By hand: file, start_cm-1 of the line, from_cm-1 and to_cm-1 of what is fitted, use.",
-    ),
-]
-Reference = Annotated[
-    list[Path] | None,
-    Option(
-        metavar="FILE_OR_DIR",
-        help="Spectrum at room temperature on the instrument as it is now; may be repeated.",
-    ),
-]
-CalibrationLaw = Annotated[str, Option(metavar="linear|anharmonic", help="Calibration law.")]
-LineShape = Annotated[
-    str | None,
-    Option(
-        metavar="lorentzian|voigt|fano",
-        help="Line shape; left out: that of the calibration, else lorentzian.",
-    ),
-]
-Resolution = Annotated[
-    float | None,
-    Option(
-        metavar="CM-1", help="FWHM of the spectrometer's response, for voigt; left out: fitted."
-    ),
-]
-LaserPower = Annotated[
-    float | None, Option(metavar="MW", help="Laser power on the lever, for its heating.")
-]
-ThermalResistance = Annotated[
-    float | None,
-    Option(metavar="K/MW", help="Thermal resistance of the lever, K per mW of heat."),
-]
-Stress = Annotated[
-    float, Option(metavar="MPA", help="Unknown stress in the silicon; enters the error.")
-]
+    step: Annotated[str | None, Option(metavar="V", help="Switch the bias on, and leave it.")] = (
+        None
+    )
+    pulse: Annotated[str | None, Option(metavar="V,TIME", help="A pulse, such as 10V,5us.")] = None
+    period: Annotated[str | None, Option(metavar="TIME", help="Of pulses that are repeated.")] = (
+        None
+    )
+    count: Annotated[int | None, Option(metavar="N", help="Number of pulses.")] = None
+    ramp: Annotated[
+        str | None, Option(metavar="V,TIME", help="Raise the bias, such as 8V,50us.")
+    ] = None
+    sine: Annotated[str | None, Option(metavar="V+V@FREQ", help="Such as 3V+0.5V@20kHz.")] = None
+    waveform: Annotated[
+        Path | None, Option(help="A table of times and biases, such as a supply takes.")
+    ] = None
+
+    def read(self) -> Waveform | None:
+        """Return the one wave form that is told by a text or in a file; None if none is.
+
+        Raises
+        ------
+        InputError
+            If several are told, or one cannot be understood.
+        """
+        from hotlever.lever.transient import read_waveform
+        from hotlever.lever.transient.waveform import waveform_from_text
+
+        told = {"step": self.step, "pulse": self.pulse, "ramp": self.ramp, "sine": self.sine}
+        at_most_one(**told, waveform=self.waveform)
+        if self.pulse is None:
+            refuse("goes with --pulse", period=self.period, count=self.count)
+        if self.waveform is not None:
+            return read_waveform(self.waveform)
+        for kind, text in told.items():
+            if text is not None:
+                return waveform_from_text(kind, text, self.period, self.count, mark="--")
+        return None
+
+
+@dataclass(frozen=True)
+class HistoryOptions(DriveOptions):
+    """A wave form, and the times that are reported."""
+
+    until: Annotated[str | None, Option(metavar="TIME", help="When to stop.")] = None
+    at: Annotated[
+        str | None,
+        Option(metavar="TIME,...", help="Times to report; where the solver stepped if left out."),
+    ] = None
+
+
+@dataclass(frozen=True)
+class LikeOptions:
+    """What is known beforehand of a lever that is measured."""
+
+    probe: Annotated[
+        Path | None,
+        Option(help="Probe file of levers like these; the reference probe if left out."),
+    ] = None
+    physics: Physics = None
+    prior: Annotated[
+        list[str] | None,
+        Option(
+            metavar="NAME=VALUE±SPREAD",
+            help="What is known beforehand, as n_d=3.3e17±15%, n_d=1e17×/3 (to a factor), "
+            "dimensions=±2%, usual (what a calibration takes) or none; repeated.",
+        ),
+    ] = None
+    laws: Annotated[
+        str | None,
+        Option(
+            metavar="paper|uncertain",
+            help="Whether laws of silicon hold to the letter or are as uncertain as published "
+            "values differ; left out: uncertain in a calibration, the paper's in a fit.",
+        ),
+    ] = None
+
+    def priors(self, probe: Probe) -> dict[str, str] | None:
+        """Return what is known of a probe like it, as `parse_priors` does."""
+        laws = [] if self.laws is None else [f"laws={self.laws}"]
+        return parse_priors([*(self.prior or []), *laws], probe)
+
+
+@dataclass(frozen=True)
+class MeasuredOptions(LikeOptions):
+    """The same, and what measurement files do not say themselves."""
+
+    medium: Annotated[
+        str | None,
+        Option(help="vacuum, air or unknown (both are tried); what the files say if left out."),
+    ] = None
+    column: Annotated[
+        list[str] | None,
+        Option(
+            metavar="'QUANTITY (UNIT)=NAME'",
+            help="Which column of the data is which quantity, as 'I_h (uA)=Current' or by its "
+            "number; or a file of such lines; repeated.",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class ManyArguments:
+    """Data files of one lever or several, where results go, and who works on them."""
+
+    data: Annotated[
+        list[Path], Argument(metavar="DATA.csv...", help="Measurement files, one for each lever.")
+    ]
+    output: Annotated[
+        Path | None,
+        Option(
+            "-o", "--output", help="Result file (JSON); a folder of them with several data files."
+        ),
+        Written(types_of=lambda values: FOLDER if len(values["data"]) > 1 else (".json",)),
+    ] = None
+    report: Annotated[
+        Path | None, Option(help="Write a page with figures to this folder."), Written()
+    ] = None
+    processes: Annotated[
+        int | None,
+        Option(metavar="N", help="Local processes; one for each processor if left out."),
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        Option(
+            metavar="ADDRESS", help="Dask scheduler for several data files, as tls://HOST:8786."
+        ),
+    ] = None
+
 
 # --- what options tell together -----------------------------------------------------------------
 
@@ -246,34 +251,3 @@ def check_medium(medium: str | None, *more: str) -> None:
     media = *get_args(Medium), *more
     if medium is not None and medium not in media:
         raise InputError(f"--medium {excerpt(medium)}: expected {' or '.join(media)}")
-
-
-def read_drive(
-    step: str | None,
-    pulse: str | None,
-    period: str | None,
-    count: int | None,
-    ramp: str | None,
-    sine: str | None,
-    waveform: Path | None,
-) -> Waveform | None:
-    """Return the one wave form that is told by a text or in a file; None if none is.
-
-    Raises
-    ------
-    InputError
-        If several are told, or one cannot be understood.
-    """
-    from hotlever.lever.transient import read_waveform
-    from hotlever.lever.transient.waveform import waveform_from_text
-
-    told = {"step": step, "pulse": pulse, "ramp": ramp, "sine": sine}
-    at_most_one(**told, waveform=waveform)
-    if pulse is None:
-        refuse("goes with --pulse", period=period, count=count)
-    if waveform is not None:
-        return read_waveform(waveform)
-    for kind, text in told.items():
-        if text is not None:
-            return waveform_from_text(kind, text, period, count, mark="--")
-    return None

@@ -1,9 +1,9 @@
 """The commands, and the command line made of them.
 
 A command is a function of what it tells (`hotlever.tasks.reporter.Reporter`) and of its arguments
-and options, whose types say what the command line has of them and whose docstring is the help. It
-returns an exit status, or nothing. What it computes with is imported when it is called, so that the
-command line answers at once.
+and options, whose types say what the command line has of them and whose docstring is the help; a
+parameter that is a dataclass stands for its fields. It returns an exit status, or nothing. What it
+computes with is imported when it is called, so that the command line answers at once.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from __future__ import annotations
 import inspect
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import typer
 import typer.core
@@ -60,20 +61,6 @@ COMMANDS: dict[str, Command] = {
     "validate": validate,
     "cache": show_cache,
 }
-#: What the commands are for whose names have a word in common.
-_GROUPS = {"probe": "Write, describe, draw and import probes."}
-_AT_REST = "no controller is followed in time; hotlever sweep --hold-resistance finds its states"
-#: Commands and options of version 2 that are gone, and what there is in their place.
-_GONE = {
-    "raman-check": "the check of the paper's linear law is a section of hotlever reproduce",
-    "fit --drift": "correct the zeros of the file; a note says where one seems to drift",
-    **{
-        f"pulse --{name}": _AT_REST
-        for name in ("controller", "hold-resistance", "filter", "limit", "gain-map")
-    },
-}
-#: The option that takes all paths up to the next option.
-_SPREAD = "--calibrate-from"
 
 
 def run_command(
@@ -91,7 +78,7 @@ def run_command(
 
     def call(command: Command, values: dict[str, Any]) -> int:
         check_files(command, values)
-        return command(reporter, **values) or 0
+        return command(reporter, **_grouped(command, values)) or 0
 
     return _parsed(words, call, reporter, commands or COMMANDS)
 
@@ -114,11 +101,40 @@ def arguments_of(words: Sequence[str]) -> dict[str, Any]:
     return arguments
 
 
+def parameters_of(command: Command) -> dict[str, inspect.Parameter]:
+    """Return what a command is told, by name: of a group of options each of them."""
+    told = dict[str, inspect.Parameter]()
+    _, *parameters = inspect.signature(command, eval_str=True).parameters.values()
+    for parameter in parameters:
+        if is_dataclass(parameter.annotation):
+            group: Any = parameter.annotation
+            types = get_type_hints(group, include_extras=True)
+            own = inspect.signature(group).parameters.values()
+            named = [each.replace(annotation=types[each.name]) for each in own]
+        else:
+            named = [parameter]
+        told |= {each.name: each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in named}
+    return told
+
+
+def _grouped(command: Command, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of options as a command takes them: those of a group as one."""
+    parameters = inspect.signature(command, eval_str=True).parameters.values()
+    groups: dict[str, Any] = {
+        each.name: each.annotation for each in parameters if is_dataclass(each.annotation)
+    }
+    inside = {name: [field.name for field in fields(group)] for name, group in groups.items()}
+    named = {name for names in inside.values() for name in names}
+    return {name: value for name, value in values.items() if name not in named} | {
+        name: group(**{key: values[key] for key in inside[name]}) for name, group in groups.items()
+    }
+
+
 def written_by(command: Command) -> dict[str, Written]:
     """Return what a command writes, by the parameters that name it."""
     return {
         name: mark
-        for name, parameter in inspect.signature(command, eval_str=True).parameters.items()
+        for name, parameter in parameters_of(command).items()
         if get_origin(parameter.annotation) is Annotated
         for mark in get_args(parameter.annotation)
         if isinstance(mark, Written)
@@ -127,7 +143,7 @@ def written_by(command: Command) -> dict[str, Written]:
 
 def defaults_of(command: Command) -> dict[str, str]:
     """Return what options of a command are if left out, where that is a text, by their names."""
-    parameters = inspect.signature(command).parameters.items()
+    parameters = parameters_of(command).items()
     return {name: own.default for name, own in parameters if isinstance(own.default, str)}
 
 
@@ -215,7 +231,8 @@ def command_line(
     for name, command in (chosen or there).items():
         group, _, last = name.rpartition(" ")
         if group not in groups:
-            groups[group] = typer.Typer(cls=_Commands, help=_GROUPS[group], rich_markup_mode=None)
+            words = {"probe": "Write, describe, draw and import probes."}[group]
+            groups[group] = typer.Typer(cls=_Commands, help=words, rich_markup_mode=None)
             app.add_typer(groups[group], name=group)
         groups[group].command(last, cls=_OneCommand)(_called(command, call))
     return typer.main.get_command(app)
@@ -228,16 +245,24 @@ def _called(command: Command, call: Call) -> Callable[..., None]:
     def run(**values: Any) -> None:
         raise typer.Exit(call(command, values))
 
-    signature = inspect.signature(command, eval_str=True)
-    _, *told = signature.parameters.values()
-    run.__signature__ = signature.replace(parameters=told)  # type: ignore[attr-defined]
+    parameters = list(parameters_of(command).values())
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     return run
 
 
 def _check_gone(words: str) -> None:
-    """Refuse a command, or an option after its command, that is gone."""
-    if words in _GONE:
-        raise InputError(f"{words}: gone since version 3.0; {_GONE[words]}")
+    """Refuse a command, or an option after its command, that version 2 had and that is gone."""
+    at_rest = "no controller is followed in time; hotlever sweep --hold-resistance finds its states"
+    instead = {
+        "raman-check": "the check of the paper's linear law is a section of hotlever reproduce",
+        "fit --drift": "correct the zeros of the file; a note says where one seems to drift",
+        **{
+            f"pulse --{name}": at_rest
+            for name in ("controller", "hold-resistance", "filter", "limit", "gain-map")
+        },
+    }
+    if words in instead:
+        raise InputError(f"{words}: gone since version 3.0; {instead[words]}")
 
 
 class _Commands(typer.core.TyperGroup):
@@ -267,8 +292,8 @@ class _OneCommand(typer.core.TyperCommand):
         options = [param for param in self.params if param.param_type_name == "option"]
         valued = [option for option in options if not getattr(option, "is_flag", False)]
         names = {name for option in valued for name in option.opts}
-        if _SPREAD in names:
-            args = spread_option(args, _SPREAD, names)
+        if "--calibrate-from" in names:
+            args = spread_option(args, "--calibrate-from", names)
         _, _, param_order = self.make_parser(ctx).parse_args(list(args))
         for option in param_order:
             if param_order.count(option) > 1 and not option.multiple:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.tasks.arguments import check_medium
+from hotlever.tasks.arguments import LeverArguments, check_medium
 from hotlever.tasks.parsing import parse_settings
 from hotlever.tasks.reporter import Reporter
 
@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
     from hotlever.lever import Lever
     from hotlever.probe import Probe
-
-#: A lever in its plane, or of its true thickness with the air around it.
-MODELS = ("flat", "full-3d")
 
 
 def read_probe(
@@ -58,13 +55,7 @@ def read_probe(
 
 
 def read_surrounded_probe(
-    reporter: Reporter,
-    path: Path | None,
-    medium: str | None,
-    settings: Sequence[str] | None,
-    physics: str | None,
-    *,
-    finds_air: bool = False,
+    reporter: Reporter, lever: LeverArguments, *, finds_air: bool = False
 ) -> Probe:
     """Read a probe as `read_probe` does, in a medium.
 
@@ -73,11 +64,11 @@ def read_surrounded_probe(
     """
     from hotlever.probe.file_sections import field_of
 
-    check_medium(medium)
-    probe = read_probe(reporter, path, settings, physics)
-    probe = probe if medium is None else probe.in_medium(medium)
+    check_medium(lever.medium)
+    probe = read_probe(reporter, lever.probe, lever.set, lever.physics)
+    probe = probe if lever.medium is None else probe.in_medium(lever.medium)
     if probe.surroundings.medium == "vacuum" and not finds_air:
-        for name, value in parse_settings(settings, probe).items():
+        for name, value in parse_settings(lever.set, probe).items():
             section, key, _ = field_of(probe, name)
             if section == "surroundings" and key != "medium" and value not in (None, False):
                 raise InputError(
@@ -88,15 +79,18 @@ def read_surrounded_probe(
 
 
 def make_lever(reporter: Reporter, probe: Probe, model: str = "flat") -> Lever:
-    """Mesh a probe, and make the air around it, for one of `MODELS`.
+    """Mesh a probe, and make the air around it.
+
+    Its `model` is ``flat``, a lever in its plane, or ``full-3d``, of its true thickness with the
+    air around it.
 
     Raises
     ------
     InputError
         If there is no such model.
     """
-    if model not in MODELS:
-        raise unknown_name("value", model, MODELS, "--model")
+    if model not in (models := ("flat", "full-3d")):
+        raise unknown_name("value", model, models, "--model")
     if model == "full-3d":
         from hotlever.lever3d import SolidLever
 
@@ -113,16 +107,6 @@ def notes_of(data: xr.Dataset) -> list[str]:
     return [note for note in data.attrs["notes"].split("\n") if note]
 
 
-def write_table(path: Path | None, data: xr.Dataset, columns: Sequence[str]) -> str:
-    """Write a table to a file, or return its text, for standard output, if none is named."""
-    from hotlever.datasets import csv_text, write_dataset
-
-    if path is None:
-        return csv_text(data, columns)
-    write_dataset(data, path, columns)
-    return ""
-
-
 def draw(path: Path | None, figure: Callable[[Any], Figure]) -> None:
     """Draw a figure to a file, if one is asked for.
 
@@ -132,3 +116,21 @@ def draw(path: Path | None, figure: Callable[[Any], Figure]) -> None:
         from hotlever import figures
 
         figures.save_figure(figure(figures), path)
+
+
+def give_table(
+    reporter: Reporter,
+    data: xr.Dataset,
+    columns: Sequence[str],
+    output: Path | None,
+    plot: Path | None,
+    figure: Callable[[Any], Figure],
+) -> None:
+    """Write a table to a file, or give its text where none is named, and `draw` a figure of it."""
+    from hotlever.datasets import csv_text, write_dataset
+
+    if output is not None:
+        write_dataset(data, output, columns)
+    draw(plot, figure)
+    if output is None:
+        reporter.give(csv_text(data, columns))

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from hotlever.probe import Probe, ProbeMesh
     from hotlever.probe.layout import Layout
 
-#: Shapes of new probe files.
-_NEW_PROBES = ("three-leg", "u-shape")
-
 
 def new_probe(
     reporter: Reporter,
@@ -29,13 +26,13 @@ def new_probe(
         Option("-o", "--output", help="File; standard output if left out."),
         Written((".toml",)),
     ] = None,
-    shape: Annotated[str, Option(help=f"One of: {', '.join(_NEW_PROBES)}.")] = "three-leg",
+    shape: Annotated[str, Option(help="One of: three-leg, u-shape.")] = "three-leg",
 ) -> None:
     """Write the reference probe as a commented file."""
     from hotlever.probe import Probe
 
-    if shape not in _NEW_PROBES:
-        raise unknown_name("shape", shape, _NEW_PROBES)
+    if shape not in (shapes := ("three-leg", "u-shape")):
+        raise unknown_name("shape", shape, shapes)
     probe = Probe.u_shape() if shape == "u-shape" else Probe.reference()
     if output is None:
         reporter.give(probe.to_toml())

@@ -18,10 +18,6 @@ from hotlever.tasks.reporter import Reporter
 if TYPE_CHECKING:
     from hotlever.probe import Probe
 
-_POWER_MW, _ANNEALING_MIN, _WORKING_POINT = 2.0, ANNEALING_S / 60.0, "700K"
-#: Numbers that are varied at once of which there are figures: a curve or a map.
-_DRAWN = 2
-
 
 def vary_design(
     reporter: Reporter,
@@ -37,14 +33,20 @@ def vary_design(
         ),
     ] = None,
     power: Annotated[
-        float, Option(help="Power (mW) in vacuum at which the tip temperature is given.")
-    ] = _POWER_MW,
+        float | None,
+        Option(help="Power (mW) in vacuum at which the tip temperature is given; 2 if left out."),
+    ] = None,
     annealing_K: Annotated[
-        float, Option("--annealing-K", help="Annealing (K) that the probe's delta is of.")
-    ] = ANNEALING_K,
+        float | None,
+        Option(
+            "--annealing-K",
+            help=f"Annealing (K) that the probe's delta is of; {ANNEALING_K:g} if left out.",
+        ),
+    ] = None,
     annealing_min: Annotated[
-        float, Option(help="Annealing (min) that the delta is of.")
-    ] = _ANNEALING_MIN,
+        float | None,
+        Option(help=f"Annealing (min) that the delta is of; {ANNEALING_S / 60.0:g} if left out."),
+    ] = None,
     air: Annotated[bool, Option(help="Solve in air too, for k.")] = True,
     minimise: Annotated[
         str | None,
@@ -63,9 +65,12 @@ def vary_design(
         ),
     ] = None,
     at: Annotated[
-        str,
-        Option(metavar="POINT", help="Working point: a tip temperature, or as 8V or 2mW."),
-    ] = _WORKING_POINT,
+        str | None,
+        Option(
+            metavar="POINT",
+            help="Working point: a tip temperature, or as 8V or 2mW; 700K if left out.",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         Option("-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."),
@@ -84,31 +89,35 @@ def vary_design(
 
     beside: dict[str, Any] = {
         "vary": vary,
-        "power": power != _POWER_MW,
-        "annealing_K": annealing_K != ANNEALING_K,
-        "annealing_min": annealing_min != _ANNEALING_MIN,
+        "power": power,
+        "annealing_K": annealing_K,
+        "annealing_min": annealing_min,
         "no_air": not air,
     }
     if minimise is not None or maximise is not None:
         at_most_one(minimise=minimise, maximise=maximise)
         refuse("does not go with --minimise or --maximise", **beside)
         changed = read_probe(reporter, probe, physics=physics)
-        _optimise(reporter, changed, minimise, maximise, within, at, output, plot)
+        _optimise(reporter, changed, minimise, maximise, within, at or "700K", output, plot)
         return
-    refuse("goes with --minimise or --maximise", within=within, at=at != _WORKING_POINT)
+    refuse("goes with --minimise or --maximise", within=within, at=at)
+    power_mW = 2.0 if power is None else power
+    annealed_K = ANNEALING_K if annealing_K is None else annealing_K
+    annealed_min = ANNEALING_S / 60.0 if annealing_min is None else annealing_min
     check_number("--power", power, 1e-3, 1000)
     check_number("--annealing-K", annealing_K, 700, 1700)
     check_number("--annealing-min", annealing_min, 1e-3, 1e5)
     varied = parse_varied(vary or [])
     if not varied:
         refuse("needs a sweep, --vary NAME=START:STOP:COUNT", plot=plot, output=output)
-    elif len(varied) > _DRAWN:
-        refuse(f"found {len(varied)} of --vary, expected at most {_DRAWN}", plot=plot)
-    start = study.Design(read_probe(reporter, probe, physics=physics), annealing_K, annealing_min)
+    elif len(varied) > 2:
+        # a figure is a curve or a map
+        refuse(f"found {len(varied)} of --vary, expected at most 2", plot=plot)
+    start = study.Design(read_probe(reporter, probe, physics=physics), annealed_K, annealed_min)
     if not varied:
         with reporter.progress("design") as update:
-            sensitivities = study.sensitivities(start, power_mW=power, air=air, progress=update)
-        reporter.note(study.mesh_note(start.probe, power))
+            sensitivities = study.sensitivities(start, power_mW=power_mW, air=air, progress=update)
+        reporter.note(study.mesh_note(start.probe, power_mW))
         reporter.give(study.sensitivity_text(sensitivities) + "\n")
         if start.probe.shape.shape == DRAWING:
             names = ", ".join(start.numbers)
@@ -117,8 +126,8 @@ def vary_design(
             )
         return
     with reporter.progress("design") as update:
-        data = study.vary(start, varied, power_mW=power, air=air, progress=update)
-    reporter.note(study.mesh_note(start.probe, power), *study.design_notes(data))
+        data = study.vary(start, varied, power_mW=power_mW, air=air, progress=update)
+    reporter.note(study.mesh_note(start.probe, power_mW), *study.design_notes(data))
     if output is not None and output.suffix.lower() == ".nc":
         write_dataset(data, output, ())
     elif output is not None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,35 +13,17 @@ from typer import Argument, Option
 from hotlever.errors import ComputationError, HotleverError, InputError, quoted, unknown_name
 from hotlever.files import FOLDER, TABLE, check_outputs, write_text
 from hotlever.tasks.arguments import (
-    Column,
-    Count,
-    Data,
-    Laws,
-    MeasuredMedium,
-    MeasuredProbe,
-    Period,
-    Physics,
+    DriveOptions,
+    ManyArguments,
+    MeasuredOptions,
     Plot,
-    Priors,
-    Processes,
-    Pulse,
-    Ramp,
-    Report,
-    Results,
-    Scheduler,
-    Sine,
-    Step,
-    WaveformFile,
     Written,
     at_most_one,
     check_medium,
-    read_drive,
     refuse,
 )
 from hotlever.tasks.common_steps import draw, read_probe
 from hotlever.tasks.parsing import (
-    MOST_PROPOSALS,
-    USUAL,
     check_number,
     parse_bias,
     parse_costs,
@@ -49,11 +31,9 @@ from hotlever.tasks.parsing import (
     parse_noise,
     parse_number,
     parse_pairs,
-    parse_priors,
     parse_setting,
     parse_temperature,
     parse_timing,
-    with_laws,
 )
 from hotlever.tasks.reporter import Reporter
 from hotlever.units import setting
@@ -65,37 +45,14 @@ if TYPE_CHECKING:
     from hotlever.estimate.many import Batch
     from hotlever.estimate.uncertainty import Uncertainty
     from hotlever.measurement import Measurement
-    from hotlever.probe import Probe
-
-#: Points of a curve that is shown while a fit goes on.
-_DRAWN = 200
-#: The tables of many levers, in the folders of their fits or calibrations.
-LEVERS_TABLE, CALIBRATIONS_TABLE = "levers.csv", "calibrations.csv"
-#: Samples of a posterior, where nothing is said.
-_SAMPLES = 2_000
-#: Proposals, unless kinds of measurement are limited.
-_PROPOSALS = 5
-#: What the rows of a table for an instrument are even in, where nothing is said.
-_EVEN_IN = "temperature"
 
 
 def fit_files(
     reporter: Reporter,
-    data: Data,
+    levers: ManyArguments,
     *,
-    probe: MeasuredProbe = None,
-    medium: MeasuredMedium = None,
-    physics: Physics = None,
-    column: Column = None,
-    prior: Priors = None,
-    laws: Laws = None,
-    step: Step = None,
-    pulse: Pulse = None,
-    period: Period = None,
-    count: Count = None,
-    ramp: Ramp = None,
-    sine: Sine = None,
-    waveform: WaveformFile = None,
+    beforehand: MeasuredOptions,
+    drive: DriveOptions,
     observables: Annotated[
         str | None,
         Option(help="Some of current,reader,tip,bridge; all that the file has if left out."),
@@ -122,14 +79,12 @@ def fit_files(
         bool,
         Option("--posterior", help="Sample the posterior; predict the tip with its band."),
     ] = False,
-    samples: Annotated[int, Option(metavar="N", help="Of the posterior.")] = _SAMPLES,
+    samples: Annotated[
+        int | None, Option(metavar="N", help="Of the posterior; 2000 if left out.")
+    ] = None,
     profiles: Annotated[
         bool, Option("--profiles", help="Profile the likelihood of each parameter.")
     ] = False,
-    output: Results = None,
-    report: Report = None,
-    processes: Processes = None,
-    scheduler: Scheduler = None,
 ) -> int:
     """Find the material parameters that make the model match a measurement.
 
@@ -145,20 +100,17 @@ def fit_files(
     from hotlever.measurement import parse_columns, read_measurement_of
     from hotlever.probe.priors import is_of_laws
 
-    several = _check_levers(data, processes, scheduler)
-    check_number("--samples", samples, 1, 1_000_000)
-    if not posterior:
-        refuse("goes with --posterior", samples=samples != _SAMPLES)
+    several = _check_levers(levers)
+    count = _count_samples(posterior, samples)
     if several:
         why = "expected a single data file"
-        refuse(why, posterior=posterior, profiles=profiles, step=step, pulse=pulse)
-        refuse(why, period=period, count=count, ramp=ramp, sine=sine, waveform=waveform)
-    like = read_probe(reporter, probe, physics=physics)
-    priors, stated = parse_priors(with_laws(prior, laws), like), like.stated_priors
-    if laws is not None:
+        refuse(why, posterior=posterior, profiles=profiles, **asdict(drive))
+    like = read_probe(reporter, beforehand.probe, physics=beforehand.physics)
+    priors, stated = beforehand.priors(like), like.stated_priors
+    if beforehand.laws is not None:
         stated = {name: text for name, text in stated.items() if not is_of_laws(name)}
-    usual = USUAL in (prior or [])
-    choices: dict[str, Any] = {"robust": robust, "weights": weights, "medium": medium}
+    usual = "usual" in (beforehand.prior or [])
+    choices: dict[str, Any] = {"robust": robust, "weights": weights, "medium": beforehand.medium}
     options = FitOptions(
         observables=None if observables is None else observables.split(","),
         fixed={
@@ -171,12 +123,11 @@ def fit_files(
         **choices,
     )
     if several:
-        levers = _Levers(data, column, output, report, processes, scheduler, "fits", LEVERS_TABLE)
         make = partial(fit_many, probe=like, options=options)
-        return _estimate_several(reporter, levers, make)
-    (path,) = data
-    drive = read_drive(step, pulse, period, count, ramp, sine, waveform)
-    measurement = read_measurement_of(like, path, parse_columns(column or []), drive)
+        return _estimate_several(reporter, levers, beforehand.column, make, "fits")
+    (path,) = levers.data
+    columns = parse_columns(beforehand.column or [])
+    measurement = read_measurement_of(like, path, columns, drive.read())
     options.of(like, in_time=measurement.time_us is not None)  # raises before anything is said
     if posterior or profiles:
         measurement.need_rest("--posterior" if posterior else "--profiles")
@@ -193,20 +144,18 @@ def fit_files(
         reporter.note("no posterior and no profiles of a lever that does not show these data")
     elif posterior or profiles:
         try:
-            uncertainty = _examine(
-                reporter, result, samples if posterior else None, profiles, processes
-            )
+            uncertainty = _examine(reporter, result, count or None, profiles, levers.processes)
             reporter.note(*uncertainty.statements())
             texts.append(uncertainty.text())
         except (HotleverError, KeyboardInterrupt) as error:
             # the fit is there; what ends this is said when it is written
             failure = error
-    if output is not None:
-        write_text(output, (uncertainty or result).to_json())
-    if report is not None:
+    if levers.output is not None:
+        write_text(levers.output, (uncertainty or result).to_json())
+    if levers.report is not None:
         from hotlever.report.estimate_pages import fit_page
 
-        texts.append(f"report: {fit_page(result, uncertainty).write(report)}")
+        texts.append(f"report: {fit_page(result, uncertainty).write(levers.report)}")
     reporter.give("\n".join([*texts, ""]))
     if failure is not None:
         raise failure
@@ -215,20 +164,29 @@ def fit_files(
     return 0
 
 
-def _check_levers(data: Sequence[Path], processes: int | None, scheduler: str | None) -> bool:
+def _check_levers(levers: ManyArguments) -> bool:
     """Refuse ways to work on levers that do not go together; return whether there are several."""
-    check_number("--processes", processes, 1, 256)
-    at_most_one(processes=processes, scheduler=scheduler)
-    if len(data) == 1:
-        refuse("expected several data files", scheduler=scheduler)
-    return len(data) > 1
+    check_number("--processes", levers.processes, 1, 256)
+    at_most_one(processes=levers.processes, scheduler=levers.scheduler)
+    if len(levers.data) == 1:
+        refuse("expected several data files", scheduler=levers.scheduler)
+    return len(levers.data) > 1
+
+
+def _count_samples(posterior: bool, samples: int | None) -> int:
+    """Return how many samples of a posterior are drawn, 0 without."""
+    check_number("--samples", samples, 1, 1_000_000)
+    if not posterior:
+        refuse("goes with --posterior", samples=samples)
+        return 0
+    return 2_000 if samples is None else samples
 
 
 def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
     """Show how near to the data the lever is that was found so far."""
     columns = prediction.columns
     along, *_ = columns.values()
-    some = along.argsort()[:: max(1, along.size // _DRAWN)]
+    some = along.argsort()[:: max(1, along.size // 200)]
     reporter.show("curve", {name: values[some].tolist() for name, values in columns.items()})
 
 
@@ -256,18 +214,13 @@ def _examine(
 
 def calibrate_files(
     reporter: Reporter,
-    data: Data,
+    levers: ManyArguments,
     *,
     fit: Annotated[Path | None, Option(help="A fit of this lever (hotlever fit -o).")] = None,
-    probe: MeasuredProbe = None,
     power_law: Annotated[
         Path | None, Option(help="Power law in vacuum (JSON), or a calibration file.")
     ] = None,
-    medium: MeasuredMedium = None,
-    physics: Physics = None,
-    column: Column = None,
-    prior: Priors = None,
-    laws: Laws = None,
+    beforehand: MeasuredOptions,
     pulse: Annotated[
         str | None,
         Option(metavar="TIME[,PERIOD]", help="Calibrate a pulse too, such as 5us or 5us,100us."),
@@ -275,7 +228,9 @@ def calibrate_files(
     posterior: Annotated[
         bool, Option("--posterior", help="Take the limits from samples of the posterior.")
     ] = False,
-    samples: Annotated[int, Option(metavar="N", min=1, help="Of the posterior.")] = _SAMPLES,
+    samples: Annotated[
+        int | None, Option(metavar="N", help="Of the posterior; 2000 if left out.")
+    ] = None,
     at: Annotated[
         str | None,
         Option(
@@ -298,8 +253,9 @@ def calibrate_files(
         Written((".csv",)),
     ] = None,
     table_by: Annotated[
-        str, Option(help="What the rows are even in: temperature, power or bias.")
-    ] = _EVEN_IN,
+        str | None,
+        Option(help="What the rows are even in: temperature (if left out), power or bias."),
+    ] = None,
     table_step: Annotated[
         str | None,
         Option(
@@ -307,11 +263,7 @@ def calibrate_files(
             help="Between the rows, as 10K, 0.05mW or 0.1V; left out: for 50 rows or more.",
         ),
     ] = None,
-    output: Results = None,
-    report: Report = None,
     plot: Plot = None,
-    processes: Processes = None,
-    scheduler: Scheduler = None,
 ) -> int:
     """Find the tip temperature of a lever from its I-V curve, with its error.
 
@@ -326,15 +278,15 @@ def calibrate_files(
     from hotlever.estimate.summary import calibration_text
     from hotlever.measurement import parse_columns, read_measurement_of
 
-    several = _check_levers(data, processes, scheduler)
-    if not posterior:
-        refuse("goes with --posterior", samples=samples != _SAMPLES)
+    several = _check_levers(levers)
+    count = _count_samples(posterior, samples)
     if table is None and not several:
-        refuse("goes with --table", table_by=table_by != _EVEN_IN, table_step=table_step)
-    at_most_one(fit=fit, probe=probe, power_law=power_law)
+        refuse("goes with --table", table_by=table_by, table_step=table_step)
+    at_most_one(fit=fit, probe=beforehand.probe, power_law=power_law)
     if fit or power_law:
-        refuse("goes with --probe, expected neither --fit nor --power-law", physics=physics)
-    check_medium(medium, "unknown")
+        why = "goes with --probe, expected neither --fit nor --power-law"
+        refuse(why, physics=beforehand.physics)
+    check_medium(beforehand.medium, "unknown")
     if several:
         refuse("expected a single data file", fit=fit, table=table, plot=plot)
     budget_at = None if at is None else Setting(*parse_setting(at))
@@ -343,28 +295,27 @@ def calibrate_files(
             f"--at: found {quoted(at)}, expected a bias such as 8V of one data file, or several "
             "data files"
         )
-    table_options = _table_options(table_by, table_step)
+    table_options = _table_options(table_by or "temperature", table_step)
     law = None if power_law is None else read_power_law(power_law)
     of_lever = None if fit is None else read_fit(fit)
-    like = of_lever.probe if of_lever else read_probe(reporter, probe, physics=physics)
-    choices: dict[str, Any] = {"medium": medium, "budget_of": budget_of}
+    stated = beforehand.probe
+    like = of_lever.probe if of_lever else read_probe(reporter, stated, physics=beforehand.physics)
+    choices: dict[str, Any] = {"medium": beforehand.medium, "budget_of": budget_of}
     options = CalibrationOptions(
         law=law,
-        priors=parse_priors(with_laws(prior, laws), like),
+        priors=beforehand.priors(like),
         pulse=None if pulse is None else parse_timing(pulse),
-        samples=samples if posterior else 0,
+        samples=count,
         at_V=None if budget_at is None or several else budget_at.value,
         **choices,
     )
     like_probe = like if of_lever is None and law is None else None
     if several:
-        levers = _Levers(
-            data, column, output, report, processes, scheduler, "calibrations", CALIBRATIONS_TABLE
-        )
         make = partial(calibrate_many, probe=like_probe, options=options)
-        return _estimate_several(reporter, levers, make, budget_at, table_options)
-    (path,) = data
-    measurement = read_measurement_of(like, path, parse_columns(column or []))
+        more = "calibrations", budget_at, table_options
+        return _estimate_several(reporter, levers, beforehand.column, make, *more)
+    (path,) = levers.data
+    measurement = read_measurement_of(like, path, parse_columns(beforehand.column or []))
     reporter.tell_table(measurement.understood)
     reporter.note(*measurement.notes, *measurement.unused)
     with reporter.progress("calibrate") as update:
@@ -373,13 +324,13 @@ def calibrate_files(
         )
     reporter.note(*result.notes)
     texts = [calibration_text(result)]
-    if output is not None:
-        result.write(output)
+    if levers.output is not None:
+        result.write(levers.output)
     if table is not None:
         write_text(table, result.table_csv(**table_options))
     draw(plot, lambda figures: figures.calibration_curves(result))
-    if report is not None:
-        texts.append(f"report: {_write_pages(result, report)}")
+    if levers.report is not None:
+        texts.append(f"report: {_write_pages(result, levers.report)}")
     reporter.give("\n".join([*texts, ""]))
     if not result.describes_data:
         raise ComputationError(f"{path}: {result.doubt}")
@@ -423,15 +374,7 @@ def propose(
         ),
     ] = None,
     *,
-    probe: Annotated[
-        Path | None,
-        Option(help="Probe file of a lever like this one; the reference probe if left out."),
-    ] = None,
-    medium: MeasuredMedium = None,
-    physics: Physics = None,
-    column: Column = None,
-    prior: Priors = None,
-    laws: Laws = None,
+    beforehand: MeasuredOptions,
     allow: Annotated[
         str | None,
         Option(
@@ -508,36 +451,33 @@ def propose(
     if quantity == "knee":
         refuse("the knee has a temperature of its own; leave it out", at=at)
     # of a lever that was not measured nothing could tell in which it is
-    check_medium(medium, *([] if data is None else ["unknown"]))
-    check_number("--count", count, 1, MOST_PROPOSALS)
-    allowed = parse_kinds(allow)
+    check_medium(beforehand.medium, *([] if data is None else ["unknown"]))
+    most = 100
+    check_number("--count", count, 1, most)
+    allowed = parse_kinds(allow, most)
     limits = list((allowed or {"": None}).values())
-    usual = sum(number or 0 for number in limits) if all(limits) else _PROPOSALS
+    usual = sum(number or 0 for number in limits) if all(limits) else 5
     choices: dict[str, Any] = {
         "quantity": quantity,
         "at_K": parse_temperature(at, "--at"),
         "stay_below_K": parse_temperature(stay_below, "--stay-below"),
         "allowed": allowed,
-        "count": count or min(usual, MOST_PROPOSALS),
+        "count": count or min(usual, most),
         "bias": None if bias is None else parse_bias(bias),
         "costs": parse_costs(cost, list(allowed or ("bias", "spectra"))),
         "noise": parse_noise(noise),
     }
     if data is not None and data.suffix.lower() == ".json":
         why = "the calibration has its own; expected a measurement file"
-        refuse(why, probe=probe, prior=prior, laws=laws, medium=medium)
-        refuse(why, physics=physics, column=column)
+        refuse(why, **asdict(beforehand))
         choices["calibration"] = read_calibration(data)
     elif data is not None:
-        like = read_probe(reporter, probe, physics=physics)
-        choices["calibration"] = _calibrated_first(
-            reporter, data, like, column, with_laws(prior, laws), medium
-        )
+        choices["calibration"] = _calibrated_first(reporter, data, beforehand)
     else:
-        refuse("expected a measurement file", column=column)
-        like = read_probe(reporter, probe, physics=physics)
-        like = like if medium is None else like.in_medium(medium)
-        choices |= {"probe": like, "priors": parse_priors(with_laws(prior, laws), like)}
+        refuse("expected a measurement file", column=beforehand.column)
+        like = read_probe(reporter, beforehand.probe, physics=beforehand.physics)
+        like = like if beforehand.medium is None else like.in_medium(beforehand.medium)
+        choices |= {"probe": like, "priors": beforehand.priors(like)}
     with reporter.progress("next"):
         plan = plan_next(**choices)
     reporter.note(*plan.notes)
@@ -547,22 +487,16 @@ def propose(
     reporter.give(plan.text() + "\n")
 
 
-def _calibrated_first(
-    reporter: Reporter,
-    data: Path,
-    like: Probe,
-    column: list[str] | None,
-    beforehand: Sequence[str],
-    medium: str | None,
-) -> Estimate:
+def _calibrated_first(reporter: Reporter, data: Path, beforehand: MeasuredOptions) -> Estimate:
     from hotlever.estimate import calibrate
     from hotlever.measurement import parse_columns, read_measurement_of
 
-    measurement = read_measurement_of(like, data, parse_columns(column or []))
+    like = read_probe(reporter, beforehand.probe, physics=beforehand.physics)
+    measurement = read_measurement_of(like, data, parse_columns(beforehand.column or []))
     reporter.note(*measurement.notes)
-    priors = parse_priors(beforehand, like)
+    known: Any = {"priors": beforehand.priors(like), "medium": beforehand.medium}
     with reporter.progress("calibrate") as update:
-        result = calibrate(measurement, probe=like, priors=priors, medium=medium, progress=update)
+        result = calibrate(measurement, probe=like, **known, progress=update)
     reporter.note(f"{data} was calibrated first, which a file of hotlever calibrate -o saves")
     return result
 
@@ -570,36 +504,12 @@ def _calibrated_first(
 # --- many levers --------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Levers:
-    """Data files of several levers, how they are worked on, and where what comes out goes.
-
-    Attributes
-    ----------
-    data : list of path
-    column : list of str or None
-    output, report : path or None
-    processes : int or None
-    scheduler : str or None
-        As the options say it.
-    results, table : str
-        What the results are called, as their folder beside a page, and the table of all of them.
-    """
-
-    data: list[Path]
-    column: list[str] | None
-    output: Path | None
-    report: Path | None
-    processes: int | None
-    scheduler: str | None
-    results: str
-    table: str
-
-
 def _estimate_several(
     reporter: Reporter,
-    levers: _Levers,
+    levers: ManyArguments,
+    column: list[str] | None,
     make: Callable[..., Batch],
+    results: str,
     at: Setting | None = None,
     table_options: dict[str, Any] | None = None,
 ) -> int:
@@ -610,9 +520,13 @@ def _estimate_several(
     Parameters
     ----------
     reporter : Reporter
-    levers : _Levers
+    levers : ManyArguments
+    column : list of str or None
+        Which column of the data is which, as the option says it.
     make : callable
         Takes data files, a folder, and how they are worked on: see `estimate_many`.
+    results : str
+        What the results are called, as their folder beside a page.
     at : Setting, optional
         Where the tips of calibrations are compared.
     table_options : dict, optional
@@ -627,8 +541,8 @@ def _estimate_several(
     """
     from hotlever.measurement import parse_columns
 
-    data, output, report = levers.data, levers.output, levers.report
-    scheduler, results = levers.scheduler, levers.results
+    data, output, report, scheduler = levers.data, levers.output, levers.report, levers.scheduler
+    table = "levers.csv" if results == "fits" else f"{results}.csv"
     if scheduler is not None and _is_open(scheduler):
         reporter.note(
             f"--scheduler {scheduler}: without TLS whoever reaches this address can have its "
@@ -643,7 +557,7 @@ def _estimate_several(
     if output is None:
         check_outputs([(folder, FOLDER)])
     if folder.is_dir():
-        check_outputs([(folder / levers.table, (".csv",))], data)
+        check_outputs([(folder / table, (".csv",))], data)
     done = 0
     with reporter.progress_bars("levers", "geometry") as (estimating, reducing):
 
@@ -661,7 +575,7 @@ def _estimate_several(
         where: Any = {"processes": levers.processes, "scheduler": scheduler}
         bars: Any = {"reading": read, "reducing": reducing, "progress": update}
         try:
-            batch = make(data, folder, columns=parse_columns(levers.column or []), **where, **bars)
+            batch = make(data, folder, columns=parse_columns(column or []), **where, **bars)
         except KeyboardInterrupt:
             raise ComputationError(
                 f"stopped by the user after {done} of {len(data)} files; the same command goes "
@@ -673,7 +587,7 @@ def _estimate_several(
             f"{batch.reused} of {count} levers have their {results} from before, of the same data"
         )
     if batch.results:
-        _tell_together(reporter, levers, batch, folder, at, table_options)
+        _tell_together(reporter, batch, folder / table, report, at, table_options)
     for failure in (*map(str, batch.failures.values()), *batch.undescribed.values()):
         reporter.fail(failure)
     return batch.exit_status
@@ -694,9 +608,9 @@ def _is_open(address: str) -> bool:
 
 def _tell_together(
     reporter: Reporter,
-    levers: _Levers,
     batch: Batch,
-    folder: Path,
+    table: Path,
+    report: Path | None,
     at: Setting | None,
     table_options: dict[str, Any] | None,
 ) -> None:
@@ -708,14 +622,14 @@ def _tell_together(
 
     compared = compare_levers(batch.results, at)
     texts = [levers_text(compared)]
-    write_text(folder / levers.table, levers_csv(compared, batch.failures))
+    write_text(table, levers_csv(compared, batch.failures))
     for name, each in batch.results.items() if table_options is not None else ():
         try:
-            write_text(folder / f"{name}{TABLE}", each.table_csv(**table_options or {}))
+            write_text(table.with_name(f"{name}{TABLE}"), each.table_csv(**table_options or {}))
         except InputError as error:
             texts.append(f"{name}: {error}")
-    if levers.report is not None:
+    if report is not None:
         from hotlever.report.estimate_pages import levers_page
 
-        texts.append(f"report: {levers_page(batch, compared).write(levers.report)}")
+        texts.append(f"report: {levers_page(batch, compared).write(report)}")
     reporter.give("\n".join([*texts, ""]))

@@ -11,8 +11,6 @@ from hotlever.files import write_text
 from hotlever.tasks.arguments import Written, refuse
 from hotlever.tasks.reporter import Reporter
 
-_VALIDATION = Path("validate")
-
 
 def reproduce(
     reporter: Reporter,
@@ -44,13 +42,15 @@ def validate(
     ] = None,
     *,
     output: Annotated[
-        Path, Option("-o", "--output", help="Folder for the page and its table."), Written()
-    ] = _VALIDATION,
+        Path | None,
+        Option("-o", "--output", help="Folder for the page and its table; validate if left out."),
+        Written(),
+    ] = None,
 ) -> None:
     """Predict published numbers of other levers and compare them, on one page and in a table."""
     if case is not None:
         why = "goes without a case of your own, whose prediction is printed"
-        refuse(why, output=output != _VALIDATION)
+        refuse(why, output=output)
         _predict(reporter, case)
         return
     from hotlever.datasets import frame_text
@@ -58,9 +58,10 @@ def validate(
 
     with reporter.progress("validate") as update:
         page, compared = validation_page(update)
-    written = page.write(output)
+    folder = output or Path("validate")
+    written = page.write(folder)
     table = frame_text(compared.to_dataframe(), float_format="%.6g")
-    write_text(output / "validation.csv", table)
+    write_text(folder / "validation.csv", table)
     reporter.give(f"{written}\n")
 
 

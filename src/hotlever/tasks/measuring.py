@@ -12,22 +12,9 @@ from typer import Option
 
 from hotlever.errors import ComputationError, InputError, counted, excerpt, quoted
 from hotlever.files import write_text
-from hotlever.tasks.arguments import (
-    Laws,
-    MeasuredProbe,
-    Physics,
-    Priors,
-    Written,
-    check_medium,
-)
+from hotlever.tasks.arguments import LikeOptions, Written, check_medium
 from hotlever.tasks.common_steps import read_probe
-from hotlever.tasks.parsing import (
-    check_number,
-    parse_bias,
-    parse_priors,
-    parse_temperature,
-    with_laws,
-)
+from hotlever.tasks.parsing import check_number, parse_bias, parse_temperature
 from hotlever.tasks.reporter import Reporter
 from hotlever.units import setting
 
@@ -81,13 +68,10 @@ def measure_lever(
     compliance: Annotated[
         str, Option(metavar="CURRENT", help="The most that the source lets through.")
     ] = "5mA",
-    probe: MeasuredProbe = None,
+    beforehand: LikeOptions,
     medium: Annotated[
         str | None, Option(help="vacuum or air; what the probe file says if left out.")
     ] = None,
-    physics: Physics = None,
-    prior: Priors = None,
-    laws: Laws = None,
     calibration: Annotated[
         Path | None,
         Option(metavar="CAL.json", help="Write the calibration of all rows to this file."),
@@ -111,10 +95,10 @@ def measure_lever(
     limit_mA = setting(compliance, "mA", "--compliance")
     check_number("--compliance", limit_mA, 1e-3, 100.0)
     limit_K = stay_below if stay_below == KNEE else parse_temperature(stay_below, "--stay-below")
-    like = read_probe(reporter, probe, physics=physics)
+    like = read_probe(reporter, beforehand.probe, physics=beforehand.physics)
     check_medium(medium)
     like = like if medium is None else like.in_medium(medium)
-    priors = parse_priors(with_laws(prior, laws), like)
+    priors = beforehand.priors(like)
     ramp = Ramp(
         like,
         parse_bias(bias),

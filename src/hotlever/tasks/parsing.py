@@ -19,18 +19,6 @@ if TYPE_CHECKING:
     from hotlever.probe import Probe
     from hotlever.types import Array
 
-#: Of priors: those of a calibration, where none is stated.
-USUAL = "usual"
-#: Values of a range: a sweep of so many biases takes minutes, as does a design varied so often.
-MOST_BIASES, MOST_DESIGNS = 10_000, 1000
-MOST_FREQUENCIES, MOST_SET_POINTS = 10_000, 1000
-#: Distances to a surface, of which each takes seconds, and between which they are (µm).
-MOST_DISTANCES, NEAREST, FARTHEST = 1000, 0.001, 1e4
-#: Times that may be asked for, and measurements that are proposed at once.
-MOST_TIMES, MOST_PROPOSALS = 10_000, 100
-#: Minutes by unit of time.
-_MINUTES = {"s": 1.0 / 60.0, "min": 1.0, "h": 60.0}
-
 
 def parse_number(text: str, where: str) -> float:
     """Parse a finite number."""
@@ -88,7 +76,7 @@ def parse_priors(texts: Sequence[str] | None, probe: Probe) -> dict[str, str] | 
     if list(texts) == ["none"]:
         return {}
     expected = "NAME=VALUE±SPREAD, NAME=VALUE×/FACTOR, usual, or none alone"
-    pairs = parse_pairs("--prior", [text for text in texts if text != USUAL], expected)
+    pairs = parse_pairs("--prior", [text for text in texts if text != "usual"], expected)
     for name in [name for name in pairs if probe.shape.named(name) != name]:
         full = probe.shape.named(name)
         if full in pairs:
@@ -96,11 +84,6 @@ def parse_priors(texts: Sequence[str] | None, probe: Probe) -> dict[str, str] | 
         pairs[full] = pairs.pop(name)
     priors_of(pairs, probe, "--prior")
     return pairs
-
-
-def with_laws(prior: list[str] | None, laws: str | None) -> list[str]:
-    """Return what is known beforehand, as ``--prior`` has it."""
-    return [*(prior or []), *([] if laws is None else [f"laws={laws}"])]
 
 
 def parse_settings(texts: Sequence[str] | None, probe: Probe) -> dict[str, Any]:
@@ -226,8 +209,8 @@ def parse_times(until: str | None, at: str | None) -> tuple[float | None, list[f
     """
     end = None if until is None else setting(until, "us", "--until")
     times = None if at is None else [setting(time, "us", "--at") for time in at.split(",")]
-    if times is not None and len(times) > MOST_TIMES:
-        raise InputError(f"--at: found {len(times)} times, expected at most {MOST_TIMES}")
+    if times is not None and len(times) > 10_000:
+        raise InputError(f"--at: found {len(times)} times, expected at most 10000")
     return end, times
 
 
@@ -243,8 +226,10 @@ def parse_temperature(text: str | None, option: str) -> float | None:
     return kelvins
 
 
-def parse_kinds(text: str | None) -> dict[str, int | None] | None:
+def parse_kinds(text: str | None, most: int = 100) -> dict[str, int | None] | None:
     """Parse ``bias,spectra`` or ``bias=15,spectra=3``: kinds of measurement, at most so many.
+
+    Of one kind there may be `most` at most.
 
     Examples
     --------
@@ -256,10 +241,10 @@ def parse_kinds(text: str | None) -> dict[str, int | None] | None:
     kinds = dict[str, int | None]()
     expected = "KIND,... or KIND=COUNT,..., such as bias,spectra=3"
     for name, number in parse_pairs("--allow", text.split(","), expected, bare=True).items():
-        if number and not (number.isdecimal() and 1 <= int(number[:9]) <= MOST_PROPOSALS):
+        if number and not (number.isdecimal() and 1 <= int(number[:9]) <= most):
             raise InputError(
                 f"--allow {excerpt(name)}: found {quoted(number)}, expected a whole number from 1 "
-                f"to {MOST_PROPOSALS}"
+                f"to {most}"
             )
         kinds[name] = int(number) if number else None
     return kinds
@@ -280,7 +265,8 @@ def parse_costs(texts: Iterable[str] | None, kinds: Sequence[str]) -> dict[str, 
             raise unknown_name("kind of measurement", name, kinds, "--cost")
         number, minutes = text.rstrip("hminsec "), 0.0
         with suppress(InputError):
-            minutes = _MINUTES.get(text[len(number) :].strip(), 0.0) * parse_number(number, where)
+            unit = {"s": 1.0 / 60.0, "min": 1.0, "h": 60.0}.get(text[len(number) :].strip(), 0.0)
+            minutes = unit * parse_number(number, where)
         if not 0.0 < minutes < math.inf:
             raise InputError(f"{where}: found {quoted(text)}, expected a time such as 30s or 10min")
         costs[name] = minutes
@@ -328,7 +314,7 @@ def parse_bias(text: str | None, lowest_V: float = 0.0) -> Array:
     """
     text = "1:11:25" if text is None else text  # the paper's sweep
     where = f"--bias {excerpt(text)}"
-    biases = _values(text, where, "1:11:25 (V)", MOST_BIASES, bias_setting)
+    biases = _values(text, where, "1:11:25 (V)", 10_000, bias_setting)
     # between two ends of either sign there are smaller ones
     bias_setting(str(min((abs(bias) for bias in biases.tolist() if bias), default=0.0)), where)
     if biases[0] < lowest_V:
@@ -353,7 +339,7 @@ def parse_set_points(text: str, unit: str, where: str) -> Array:
     if ":" not in text:
         return np.array([value_of(part, where) for part in text.split(",")])
     example = "2kohm:3kohm:11" if unit == "ohm" else f"1{unit}:4{unit}:7"
-    return _values(text, where, example, MOST_SET_POINTS, value_of)
+    return _values(text, where, example, 1000, value_of)
 
 
 def parse_frequencies(text: str) -> Array:
@@ -366,7 +352,7 @@ def parse_frequencies(text: str) -> Array:
     """
     hertz = partial(_positive, "Hz")
     where = f"--frequency {excerpt(text)}"
-    return _values(text, where, "1Hz:10MHz:71", MOST_FREQUENCIES, hertz, even=False)
+    return _values(text, where, "1Hz:10MHz:71", 10_000, hertz, even=False)
 
 
 def parse_distances(text: str) -> Array:
@@ -377,7 +363,7 @@ def parse_distances(text: str) -> Array:
     >>> parse_distances("300nm:3um:4").round(6).tolist()
     [0.3, 1.2, 2.1, 3.0]
     """
-    return _values(text, f"--distance {excerpt(text)}", "0.3um:3um:10", MOST_DISTANCES, _distance)
+    return _values(text, f"--distance {excerpt(text)}", "0.3um:3um:10", 1000, _distance)
 
 
 def parse_pressures(text: str) -> Array:
@@ -389,11 +375,13 @@ def parse_pressures(text: str) -> Array:
     [10.0, 100.0, 1000.0]
     """
     where, example = f"--pressure {excerpt(text)}", "10:1000:3 (mbar)"
-    return _values(text, where, example, MOST_DISTANCES, _pressure, even=False)
+    return _values(text, where, example, 1000, _pressure, even=False)
 
 
-def parse_varied(texts: Iterable[str]) -> dict[str, Array]:
+def parse_varied(texts: Iterable[str], most: int = 1000) -> dict[str, Array]:
     """Parse several ``NAME=START:STOP:COUNT``, of which each value goes with each other.
+
+    More than the `most` designs would take hours.
 
     Examples
     --------
@@ -407,15 +395,15 @@ def parse_varied(texts: Iterable[str]) -> dict[str, Array]:
         name, equals, numbers = text.partition("=")
         if not equals:
             raise InputError(f"{where}: expected NAME=START:STOP:COUNT, such as {example}")
-        values = _values(numbers, where, example, MOST_DESIGNS, parse_number)
+        values = _values(numbers, where, example, most, parse_number)
         if values.size < 2:
             raise InputError(f"{where}: expected two values or more, such as {example}")
         if name.strip() in varied:
             raise InputError(f"--vary {excerpt(name.strip())}: given twice, expected once")
         varied[name.strip()] = values
     count = math.prod(values.size for values in varied.values())
-    if count > MOST_DESIGNS:
-        raise InputError(f"--vary: found {count} designs, expected at most {MOST_DESIGNS}")
+    if count > most:
+        raise InputError(f"--vary: found {count} designs, expected at most {most}")
     return varied
 
 
@@ -461,10 +449,9 @@ def _positive(unit: str, text: str, where: str) -> float:
 
 def _distance(text: str, where: str) -> float:
     length = setting(text, "um", where)
-    if not NEAREST <= length <= FARTHEST:
+    if not 0.001 <= length <= 1e4:
         raise InputError(
-            f"{where}: found {quoted(text)}, expected a length from {1e3 * NEAREST:g}nm to "
-            f"{1e-4 * FARTHEST:g}cm, such as 300nm"
+            f"{where}: found {quoted(text)}, expected a length from 1nm to 1cm, such as 300nm"
         )
     return length
 

@@ -5,40 +5,28 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import asdict
 from itertools import count as count_up
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.files import FILM_TYPES, output_folder
 from hotlever.tasks.arguments import (
-    Count,
-    Medium,
-    Period,
-    Physics,
+    HistoryOptions,
+    LeverArguments,
     Plot,
-    ProbeFile,
-    Pulse,
-    Ramp,
-    Settings,
-    Sine,
-    Step,
     Table,
-    Times,
-    Until,
-    WaveformFile,
     Written,
-    read_drive,
     refuse,
 )
 from hotlever.tasks.common_steps import (
-    draw,
+    give_table,
     make_lever,
     notes_of,
     read_surrounded_probe,
-    write_table,
 )
 from hotlever.tasks.parsing import parse_times
 from hotlever.tasks.reporter import Reporter
@@ -50,28 +38,12 @@ if TYPE_CHECKING:
     from hotlever.lever.transient import Waveform
     from hotlever.types import Array
 
-#: Points of a curve for each step of the solver, and frames of a film where no times are asked.
-_CURVE, _FRAMES = 8, 120
-#: Share of the tip's rise by which straight lines between frames may be off, without a note.
-_COARSE = 0.25
-
 
 def simulate_in_time(
     reporter: Reporter,
-    probe: ProbeFile = None,
     *,
-    step: Step = None,
-    pulse: Pulse = None,
-    period: Period = None,
-    count: Count = None,
-    ramp: Ramp = None,
-    sine: Sine = None,
-    waveform: WaveformFile = None,
-    until: Until = None,
-    at: Times = None,
-    medium: Medium = None,
-    set: Settings = None,
-    physics: Physics = None,
+    drive: HistoryOptions,
+    lever: LeverArguments,
     output: Table = None,
     plot: Plot = None,
     fields: Annotated[
@@ -98,30 +70,21 @@ def simulate_in_time(
     from hotlever.lever.transient import simulate, with_times
     from hotlever.lever.transient.history import TIME_COLUMNS
 
-    drive: dict[str, Any] = {
-        "step": step,
-        "pulse": pulse,
-        "period": period,
-        "count": count,
-        "ramp": ramp,
-    }
-    drive |= {"sine": sine, "waveform": waveform}
     if report is not None:
-        others = {"until": until, "at": at, "output": output, "plot": plot, "fields": fields}
         why = "does not go with --report, which has wave forms of its own"
-        refuse(why, **drive, **others, film=film)
-        changed = read_surrounded_probe(reporter, probe, medium, set, physics)
+        refuse(why, **asdict(drive), output=output, plot=plot, fields=fields, film=film)
+        changed = read_surrounded_probe(reporter, lever)
         _write_page(reporter, make_lever(reporter, changed), report)
         return
-    bias = read_drive(step, pulse, period, count, ramp, sine, waveform)
+    bias = drive.read()
     if bias is None:
         raise InputError("found none: expected one of --step, --pulse, --ramp, --sine, --waveform")
-    end, times = parse_times(until, at)
-    lever = make_lever(reporter, read_surrounded_probe(reporter, probe, medium, set, physics))
+    end, times = parse_times(drive.until, drive.at)
+    meshed = make_lever(reporter, read_surrounded_probe(reporter, lever))
     frames = None if film is None else _Frames(times or _even(bias, end))
     failure: HistoryEndError | None = None
     # figures and rise times are of smooth curves, the table of the steps alone
-    per_step = _CURVE if times is None else 1
+    per_step = 8 if times is None else 1
     kept_at: list[float] = []
     states: list[State] = []
     ends: list[State] = []
@@ -138,7 +101,7 @@ def simulate_in_time(
 
         try:
             curve = simulate(
-                lever, bias, end, times, per_step=per_step, progress=update, callback=keep
+                meshed, bias, end, times, per_step=per_step, progress=update, callback=keep
             )
         except HistoryEndError as error:
             # what was reached is written
@@ -149,15 +112,15 @@ def simulate_in_time(
     data = curve.isel(time=slice(None, None, per_step))
     reporter.note(*notes_of(data))
     reporter.tell_table(_times(data))
-    text = write_table(output, data, in_a_file(data, TIME_COLUMNS))
-    if data.sizes["time"]:
-        draw(plot, lambda figures: figures.history_overview(curve))
+    drawn = plot if data.sizes["time"] else None
+    columns = in_a_file(data, TIME_COLUMNS)
+    give_table(
+        reporter, data, columns, output, drawn, lambda figures: figures.history_overview(curve)
+    )
     if fields is not None:
-        write_fields_in_time(lever, kept_at, states, output_folder(fields))
+        write_fields_in_time(meshed, kept_at, states, output_folder(fields))
     if frames is not None and film is not None and frames.states:
         _draw_film(reporter, curve, frames.states, film)
-    if text:
-        reporter.give(text)
     if failure is not None:
         raise failure
 
@@ -182,16 +145,19 @@ class _Frames:
         self._before = t, state.x
 
 
-def _even(waveform: Waveform, until: float | None) -> list[float]:
-    """Return times (µs) even on the axis on which a history is drawn, and of some corners."""
+def _even(waveform: Waveform, until: float | None, frames: int = 120) -> list[float]:
+    """Return times (µs) of the `frames` of a film, and of some corners.
+
+    They are even on the axis on which a history is drawn.
+    """
     import numpy as np
 
     end = waveform.usual_end if until is None else until
-    times = np.linspace(0.0, end, _FRAMES)
+    times = np.linspace(0.0, end, frames)
     if np.ptp(waveform.bias(times)) == 0.0:
-        times = np.geomspace(1e-4 * end, end, _FRAMES)
+        times = np.geomspace(1e-4 * end, end, frames)
     corners = [piece.end for piece in waveform.pieces(end)]
-    return np.union1d(times, corners if len(corners) < _FRAMES else []).tolist()
+    return np.union1d(times, corners if len(corners) < frames else []).tolist()
 
 
 def _draw_film(
@@ -204,7 +170,8 @@ def _draw_film(
 
     interpolated_K = np.interp(curve.time, *np.transpose([(t, state.tip_K) for t, state in states]))
     off, rise = np.abs(interpolated_K - curve.tip_K).max().item(), np.ptp(curve.tip_K.values)
-    if off > _COARSE * rise:
+    # by this share of the tip's rise straight lines between frames may be off
+    if off > 0.25 * rise:
         reporter.note(
             f"the {len(states)} frames of {path} are too few for all that the tip does: between "
             f"them it is up to {off:.0f} K elsewhere (--until or --at choose others)"

@@ -13,18 +13,6 @@ from typer import Argument, Option
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import FIGURE_TYPES, write_text
 from hotlever.tasks.arguments import (
-    CalibrateFrom,
-    CalibrationLaw,
-    CalibrationName,
-    Corrections,
-    LaserPower,
-    LineShape,
-    Reference,
-    Resolution,
-    Spectra,
-    Stress,
-    Temperatures,
-    ThermalResistance,
     Written,
     at_most_one,
     refuse,
@@ -42,27 +30,78 @@ if TYPE_CHECKING:
     from hotlever.raman.spectrum_tables import Correction
     from hotlever.raman.thermometer import Thermometer
 
-#: What stands for the published laws in place of a calibration file.
-PUBLISHED = "published"
-_ANHARMONIC = "anharmonic"
-_MOST_NOTES = 20
+
+@dataclass(frozen=True)
+class ThermometerOptions:
+    """How the silicon line is found, and what its shift is read with, as the options say it."""
+
+    calibration: Annotated[
+        str | None,
+        Option(
+            metavar="CAL.json",
+            help="A calibration that --save-calibration wrote, or 'published' for the published "
+            "laws (then --reference is needed).",
+        ),
+    ] = None
+    calibrate_from: Annotated[
+        list[Path] | None,
+        Option(metavar="FILE_OR_DIR...", help="Hot-plate spectra to calibrate from; one or more."),
+    ] = None
+    temperatures: Annotated[
+        Path | None,
+        Option(
+            metavar="TABLE.csv",
+            help="Hot-plate temperatures: file name, temperature. Left out: header or file name.",
+        ),
+    ] = None
+    corrections: Annotated[
+        Path | None,
+        Option(
+            metavar="TABLE.csv",
+            help="By hand: file, start_cm-1 of the line, from_cm-1 and to_cm-1 of what is fitted, "
+            "use.",
+        ),
+    ] = None
+    reference: Annotated[
+        list[Path] | None,
+        Option(
+            metavar="FILE_OR_DIR",
+            help="Spectrum at room temperature on the instrument as it is now; may be repeated.",
+        ),
+    ] = None
+    law: Annotated[str, Option(metavar="linear|anharmonic", help="Calibration law.")] = "anharmonic"
+    shape: Annotated[
+        str | None,
+        Option(
+            metavar="lorentzian|voigt|fano",
+            help="Line shape; left out: that of the calibration, else lorentzian.",
+        ),
+    ] = None
+    resolution: Annotated[
+        float | None,
+        Option(
+            metavar="CM-1", help="FWHM of the spectrometer's response, for voigt; left out: fitted."
+        ),
+    ] = None
+    laser_power: Annotated[
+        float | None, Option(metavar="MW", help="Laser power on the lever, for its heating.")
+    ] = None
+    thermal_resistance: Annotated[
+        float | None,
+        Option(metavar="K/MW", help="Thermal resistance of the lever, K per mW of heat."),
+    ] = None
+    stress: Annotated[
+        float, Option(metavar="MPA", help="Unknown stress in the silicon; enters the error.")
+    ] = 0.0
 
 
 def measure_spectra(
     reporter: Reporter,
-    spectra: Spectra,
+    spectra: Annotated[
+        list[Path], Argument(metavar="FILE_OR_DIR...", help="Spectra, or folders of spectra.")
+    ],
     *,
-    calibration: CalibrationName = None,
-    calibrate_from: CalibrateFrom = None,
-    temperatures: Temperatures = None,
-    corrections: Corrections = None,
-    reference: Reference = None,
-    law: CalibrationLaw = _ANHARMONIC,
-    shape: LineShape = None,
-    resolution: Resolution = None,
-    laser_power: LaserPower = None,
-    thermal_resistance: ThermalResistance = None,
-    stress: Stress = 0.0,
+    thermometer: ThermometerOptions,
     save_calibration: Annotated[
         Path | None,
         Option(metavar="CAL.json", help="Write the calibration to this file."),
@@ -82,22 +121,7 @@ def measure_spectra(
     """Find the silicon line in Raman spectra and, calibrated, the temperature."""
     from hotlever.raman import series
 
-    setup = set_up(
-        reporter,
-        ThermometerOptions(
-            calibration=calibration,
-            calibrate_from=calibrate_from,
-            temperatures=temperatures,
-            corrections=corrections,
-            reference=reference,
-            law=law,
-            shape=shape,
-            resolution=resolution,
-            laser_power=laser_power,
-            thermal_resistance=thermal_resistance,
-            stress=stress,
-        ),
-    )
+    setup = set_up(reporter, thermometer)
     if save_calibration is not None and setup.calibration is None:
         raise InputError("--save-calibration: there is no calibration; give --calibrate-from")
     lines, table = setup.measure(spectra)
@@ -114,19 +138,11 @@ def measure_spectra(
 def join_spectra(
     reporter: Reporter,
     bias_log: Annotated[Path, Argument(metavar="BIAS_LOG.csv", help="The bias sweep.")],
-    spectra: Spectra,
+    spectra: Annotated[
+        list[Path], Argument(metavar="FILE_OR_DIR...", help="Spectra, or folders of spectra.")
+    ],
     *,
-    calibration: CalibrationName = None,
-    calibrate_from: CalibrateFrom = None,
-    temperatures: Temperatures = None,
-    corrections: Corrections = None,
-    reference: Reference = None,
-    law: CalibrationLaw = _ANHARMONIC,
-    shape: LineShape = None,
-    resolution: Resolution = None,
-    laser_power: LaserPower = None,
-    thermal_resistance: ThermalResistance = None,
-    stress: Stress = 0.0,
+    thermometer: ThermometerOptions,
     output: Annotated[
         Path | None,
         Option("--output", "-o", metavar="DATA.csv", help="Left out: print."),
@@ -141,22 +157,7 @@ def join_spectra(
     from hotlever.raman.spectrum_tables import join, read_bias_log
 
     log = read_bias_log(bias_log)
-    setup = set_up(
-        reporter,
-        ThermometerOptions(
-            calibration=calibration,
-            calibrate_from=calibrate_from,
-            temperatures=temperatures,
-            corrections=corrections,
-            reference=reference,
-            law=law,
-            shape=shape,
-            resolution=resolution,
-            laser_power=laser_power,
-            thermal_resistance=thermal_resistance,
-            stress=stress,
-        ),
-    )
+    setup = set_up(reporter, thermometer)
     if setup.thermometer is None:
         raise InputError("join needs temperatures: give --calibration or --calibrate-from")
     _, table = setup.measure(spectra)
@@ -176,23 +177,6 @@ def _answer(reporter: Reporter, text: str, output: Path | None) -> None:
 
 
 # --- the thermometer ------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class ThermometerOptions:
-    """How the silicon line is found, and what its shift is read with, as the options say it."""
-
-    calibration: str | None = None
-    calibrate_from: Sequence[Path] | None = None
-    temperatures: Path | None = None
-    corrections: Path | None = None
-    reference: Sequence[Path] | None = None
-    law: str = _ANHARMONIC
-    shape: str | None = None
-    resolution: float | None = None
-    laser_power: float | None = None
-    thermal_resistance: float | None = None
-    stress: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -238,11 +222,11 @@ class Thermometry:
         return lines, series.read_lines(lines, self.thermometer)
 
 
-def _note_some(listener: Listener, texts: Sequence[str]) -> None:
-    """Tell the first of many notes, and how many more there are."""
-    listener.note(*texts[:_MOST_NOTES])
-    if len(texts) > _MOST_NOTES:
-        listener.note(f"{len(texts) - _MOST_NOTES} more such notes")
+def _note_some(listener: Listener, texts: Sequence[str], most: int = 20) -> None:
+    """Tell the first of many notes, at most so many, and how many more there are."""
+    listener.note(*texts[:most])
+    if len(texts) > most:
+        listener.note(f"{len(texts) - most} more such notes")
 
 
 def _read(listener: Listener, paths: Sequence[Path]) -> list[Spectrum]:
@@ -288,7 +272,7 @@ def calibration_named(name: str | None) -> RamanCalibration | None:
 
     if name is None:
         return None
-    return published_raman_calibration() if name == PUBLISHED else read_raman_calibration(name)
+    return published_raman_calibration() if name == "published" else read_raman_calibration(name)
 
 
 def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
@@ -338,7 +322,7 @@ def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
             reference=asked.reference or None,
             stress=asked.stress or None,
             laser_power=asked.laser_power,
-            law=asked.law != _ANHARMONIC,
+            law=asked.law != ThermometerOptions.law,
         )
         return Thermometry(listener, options, corrections=by_hand, corrected_by=corrected_by)
     if chosen.reference_cm is None and not asked.reference:

@@ -11,32 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Option
 
 from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
-from hotlever.tasks.arguments import (
-    Count,
-    Medium,
-    Period,
-    Physics,
-    Plot,
-    ProbeFile,
-    Pulse,
-    Ramp,
-    Settings,
-    Sine,
-    Step,
-    Table,
-    Times,
-    Until,
-    WaveformFile,
-    read_drive,
-    refuse,
-)
-from hotlever.tasks.common_steps import (
-    draw,
-    make_lever,
-    notes_of,
-    read_surrounded_probe,
-    write_table,
-)
+from hotlever.tasks.arguments import HistoryOptions, LeverArguments, Plot, Table, refuse
+from hotlever.tasks.common_steps import give_table, make_lever, notes_of, read_surrounded_probe
 from hotlever.tasks.parsing import parse_bias, parse_distances, parse_pressures, parse_times
 from hotlever.tasks.reporter import Reporter
 from hotlever.units import setting
@@ -49,17 +25,9 @@ if TYPE_CHECKING:
     from hotlever.probe import Probe
     from hotlever.types import Array
 
-#: Radii that a contact may have (µm).
-_SMALLEST, _LARGEST = 1e-4, 10.0
-#: How well a change of the current is known, for the note on what it tells, over the current.
-_CURRENT_KNOWN = 1e-4
-#: Up to this bias (V) the best one for a reader is looked for.
-_HIGHEST_V = 11.0
-
 
 def touch(
     reporter: Reporter,
-    probe: ProbeFile = None,
     *,
     sample: Annotated[
         str | None,
@@ -88,18 +56,8 @@ def touch(
             "form is given.",
         ),
     ] = None,
-    step: Step = None,
-    pulse: Pulse = None,
-    period: Period = None,
-    count: Count = None,
-    ramp: Ramp = None,
-    sine: Sine = None,
-    waveform: WaveformFile = None,
-    until: Until = None,
-    at: Times = None,
-    medium: Medium = None,
-    set: Settings = None,
-    physics: Physics = None,
+    history: HistoryOptions,
+    lever: LeverArguments,
     output: Table = None,
     plot: Plot = None,
 ) -> None:
@@ -110,32 +68,35 @@ def touch(
         sweep_in_contact,
     )
 
-    drive = read_drive(step, pulse, period, count, ramp, sine, waveform)
+    drive = history.read()
     if drive is None:
-        refuse("goes with a wave form, such as --pulse", until=until, at=at)
+        why = "goes with a wave form, such as --pulse"
+        refuse(why, until=history.until, at=history.at)
     else:
         refuse("does not go with a wave form, which has biases of its own", bias=bias)
-    read = read_surrounded_probe(reporter, probe, medium, set, physics)
+    read = read_surrounded_probe(reporter, lever)
     touching = in_contact(reporter, read, sample, radius, interface)
     biases = parse_bias(bias, touching.lowest_bias_V)
-    lever = make_lever(reporter, touching)
+    meshed = make_lever(reporter, touching)
     with reporter.progress("contact") as update:
         if drive is None:
-            columns, solve = CONTACT_COLUMNS, partial(sweep_in_contact, lever, biases)
+            columns, solve = CONTACT_COLUMNS, partial(sweep_in_contact, meshed, biases)
         else:
-            times = parse_times(until, at)
-            columns, solve = (
-                ("time_us", *CONTACT_COLUMNS),
-                partial(history_in_contact, lever, drive, *times),
-            )
+            times = parse_times(history.until, history.at)
+            columns = ("time_us", *CONTACT_COLUMNS)
+            solve = partial(history_in_contact, meshed, drive, *times)
         data, failure = as_far_as_possible(lambda: solve(progress=update))
     if failure is not None and not data.tip_K.size:
         raise failure
     reporter.note(*contact_notes(data))
-    text = write_table(output, data, columns)
-    draw(plot, lambda figures: figures.contact_overview(data, touching))
-    if text:
-        reporter.give(text)
+    give_table(
+        reporter,
+        data,
+        columns,
+        output,
+        plot,
+        lambda figures: figures.contact_overview(data, touching),
+    )
     if failure is not None:
         raise failure
 
@@ -163,10 +124,10 @@ def in_contact(
         changes["tip.height_um"] = tip.height_um
     if radius is not None:
         radius_um = setting(radius, "um", "--radius")
-        if not _SMALLEST <= radius_um <= _LARGEST:
+        if not 1e-4 <= radius_um <= 10.0:
             raise InputError(
-                f"--radius: found '{excerpt(radius)}', expected a length from "
-                f"{1e3 * _SMALLEST:g} nm to {_LARGEST:g} µm, such as 5nm"
+                f"--radius: found '{excerpt(radius)}', expected a length from 0.1 nm to 10 µm, "
+                "such as 5nm"
             )
         changes["tip.apex_radius_um"] = radius_um
     if sample is not None:
@@ -197,12 +158,15 @@ def contact_notes(data: xr.Dataset) -> list[str]:
     return [*notes_of(data), *([note] if note else [])]
 
 
-def what_the_current_tells(data: xr.Dataset) -> str:
-    """Say how well the sum of resistances is known by the current, where it tells most of it."""
+def what_the_current_tells(data: xr.Dataset, known: float = 1e-4) -> str:
+    """Say how well the sum of resistances is known by the current, where it tells most of it.
+
+    A change of the current is `known` to this share of the current.
+    """
     import numpy as np
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        error = _CURRENT_KNOWN * np.abs(data.current_mA / data.current_by_resistance)
+        error = known * np.abs(data.current_mA / data.current_by_resistance)
         whole = data.tip_K_per_mW + data.interface_K_per_mW + data.spreading_K_per_mW
         relative = (error / whole).values
     if not np.isfinite(relative).any():
@@ -211,14 +175,13 @@ def what_the_current_tells(data: xr.Dataset) -> str:
     share = relative[best]
     accuracy = f"to {share:.2g} of it" if share < 1 else f"no better than {share:.2g} times over"
     return (
-        f"a change of I_h known to {_CURRENT_KNOWN:g} of I_h tells the sum of resistances, "
+        f"a change of I_h known to {known:g} of I_h tells the sum of resistances, "
         f"{1e3 * whole.values[best]:.3g} K/W, best at {data.bias_V.values[best]:.4g} V: {accuracy}"
     )
 
 
 def approach(
     reporter: Reporter,
-    probe: ProbeFile = None,
     *,
     distance: Annotated[
         str,
@@ -252,9 +215,7 @@ def approach(
         str | None,
         Option(metavar="LENGTH", help="Of the lever itself, for each √Hz; none if left out."),
     ] = None,
-    medium: Medium = None,
-    set: Settings = None,
-    physics: Physics = None,
+    lever: LeverArguments,
     output: Table = None,
     plot: Plot = None,
 ) -> None:
@@ -267,23 +228,24 @@ def approach(
     distances = parse_distances(distance)
     noise = reader_noise(bandwidth, amplifier, hooge, vibration)
     pressures = None if pressure is None else parse_pressures(pressure)
-    read = read_surrounded_probe(reporter, probe, medium, set, physics, finds_air=True)
-    above = over_a_surface(reporter, read, medium, distances)
+    read = read_surrounded_probe(reporter, lever, finds_air=True)
+    above = over_a_surface(reporter, read, lever.medium, distances)
     biases = None if bias is None else parse_bias(bias, above.lowest_bias_V)
     reader = Reader(above, noise)
     coarse = Lever(above, COARSE)
     if biases is None:
+        highest_V = 11.0
         with reporter.progress("best bias") as update:
-            best_V = best_bias(coarse, distances[[0, -1]], _HIGHEST_V, noise, update)
+            best_V = best_bias(coarse, distances[[0, -1]], highest_V, noise, update)
         biases = np.array([best_V])
         reporter.note(
-            f"of all biases up to {_HIGHEST_V:g} V {biases.item():.4g} V resolves these "
+            f"of all biases up to {highest_V:g} V {biases.item():.4g} V resolves these "
             "distances best (--bias chooses others)"
         )
     above = jumping_at_tip(reporter, coarse, float(biases[biases.size // 2]))
-    lever = make_lever(reporter, above)
+    meshed = make_lever(reporter, above)
     with reporter.progress("distances") as update:
-        data = over_surface(lever, distances, biases, noise, pressures, progress=update)
+        data = over_surface(meshed, distances, biases, noise, pressures, progress=update)
     if not data.tip_K.notnull().any():
         raise ComputationError(notes_of(data)[0])
     if not reader.is_held and above.circuit.swept != "reader":
@@ -296,10 +258,10 @@ def approach(
     rows = rows_of(data)
     columns = [str(name) for name in rows.data_vars]
     whole = output is not None and output.suffix.lower() == ".nc"
-    text = write_table(output, data if whole else rows, columns)
-    draw(plot, lambda figures: figures.reader_overview(data))
-    if text:
-        reporter.give(text)
+    table = data if whole else rows
+    give_table(
+        reporter, table, columns, output, plot, lambda figures: figures.reader_overview(data)
+    )
 
 
 def over_a_surface(reporter: Reporter, probe: Probe, medium: str | None, distances: Array) -> Probe:

@@ -10,12 +10,8 @@ from typer import Option
 from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
 from hotlever.files import FIGURE_TYPES, output_folder
 from hotlever.tasks.arguments import (
-    Bias,
-    Medium,
-    Physics,
+    LeverArguments,
     Plot,
-    ProbeFile,
-    Settings,
     Table,
     Written,
     at_most_one,
@@ -23,10 +19,10 @@ from hotlever.tasks.arguments import (
 )
 from hotlever.tasks.common_steps import (
     draw,
+    give_table,
     make_lever,
     notes_of,
     read_surrounded_probe,
-    write_table,
 )
 from hotlever.tasks.parsing import parse_bias, parse_frequencies, parse_set_points
 from hotlever.tasks.reporter import Reporter
@@ -40,12 +36,15 @@ if TYPE_CHECKING:
 
 def sweep(
     reporter: Reporter,
-    probe: ProbeFile = None,
+    lever: LeverArguments,
     *,
-    medium: Medium = None,
-    set: Settings = None,
-    physics: Physics = None,
-    bias: Bias = None,
+    bias: Annotated[
+        str | None,
+        Option(
+            metavar="START:STOP:COUNT",
+            help="In volts, ends included, or a single one; 1:11:25 if left out.",
+        ),
+    ] = None,
     and_back: Annotated[
         bool,
         Option(
@@ -90,7 +89,7 @@ def sweep(
     from hotlever.lever.dataset import SWEEP_COLUMNS
     from hotlever.lever.set_points import hold
 
-    changed = read_surrounded_probe(reporter, probe, medium, set, physics)
+    changed = read_surrounded_probe(reporter, lever)
     at_most_one(bias=bias, hold_resistance=hold_resistance, hold_power=hold_power)
     held, unit = ("resistance", "ohm") if hold_resistance is not None else ("power", "mW")
     option, points = f"--hold-{held}", hold_resistance if hold_power is None else hold_power
@@ -100,35 +99,38 @@ def sweep(
             raise InputError(f"{option}: goes with --model flat, found {excerpt(model)}")
         set_points = parse_set_points(points, unit, option)
     biases = parse_bias(bias, changed.lowest_bias_V)
-    lever = make_lever(reporter, changed, model)
+    meshed = make_lever(reporter, changed, model)
     states: list[State] = []
     curve: xr.Dataset | None = None
     failure: ComputationError | None = None
     with reporter.progress("sweep") as update:
         if points is not None:
             try:
-                held_states = hold(lever, held, set_points, progress=update)
+                held_states = hold(meshed, held, set_points, progress=update)
             except InputError as error:
                 raise InputError(f"{option}: {error}") from None
             data, states, curve = held_states.data, held_states.states, held_states.curve
         else:
             data, failure = as_far_as_possible(
-                lambda: lever.sweep(biases, and_back=and_back, progress=update)
+                lambda: meshed.sweep(biases, and_back=and_back, progress=update)
             )
         if failure is not None and not data.bias.size:
             raise failure
         if fields is not None and not states:
             solved = biases if and_back else data.bias_V.values
             states, ended = as_far_as_possible(
-                lambda: lever.solve(solved, update, and_back=and_back)
+                lambda: meshed.solve(solved, update, and_back=and_back)
             )
             failure = failure or ended
         if map is not None:
             hottest = int(data.tip_K.values.argmax())
-            (mapped,) = states[hottest:][:1] or lever.solve([data.bias_V.values[hottest]])
+            (mapped,) = states[hottest:][:1] or meshed.solve([data.bias_V.values[hottest]])
     reporter.note(*notes_of(data))
-    text = write_table(output, data, in_a_file(data, SWEEP_COLUMNS))
-    draw(
+    give_table(
+        reporter,
+        data,
+        in_a_file(data, SWEEP_COLUMNS),
+        output,
         plot,
         lambda figures: (
             figures.sweep_overview(data) if points is None else figures.held_states(data, curve)
@@ -139,24 +141,19 @@ def sweep(
         from hotlever.lever.fields import write_fields
 
         write_fields(
-            lever,
+            meshed,
             states,
             output_folder(fields),
             lambda slices, path: draw(path, lambda figures: figures.temperature_slices(slices)),
         )
-    if text:
-        reporter.give(text)
     if failure is not None:
         raise failure
 
 
 def respond(
     reporter: Reporter,
-    probe: ProbeFile = None,
+    lever: LeverArguments,
     *,
-    medium: Medium = None,
-    set: Settings = None,
-    physics: Physics = None,
     bias: Annotated[str, Option(metavar="V", help="Of the operating point.")],
     frequency: Annotated[
         str,
@@ -183,16 +180,13 @@ def respond(
 
     swing = None if amplitude is None else bias_setting(amplitude, "--amplitude")
     volts, frequencies = bias_setting(bias, "--bias"), parse_frequencies(frequency)
-    changed = read_surrounded_probe(reporter, probe, medium, set, physics)
-    lever = make_lever(reporter, changed)
+    changed = read_surrounded_probe(reporter, lever)
+    meshed = make_lever(reporter, changed)
     with reporter.progress("spectrum") as update:
         if swing is None:
-            (state,) = lever.solve([volts], update)
+            (state,) = meshed.solve([volts], update)
             data = spectrum(state, frequencies)
         else:
-            data = harmonics(lever, volts, swing, frequencies, update)
+            data = harmonics(meshed, volts, swing, frequencies, update)
     columns = in_a_file(data, SPECTRUM_COLUMNS if swing is None else HARMONIC_COLUMNS)
-    text = write_table(output, data, columns)
-    draw(plot, lambda figures: figures.figure_of(data))
-    if text:
-        reporter.give(text)
+    give_table(reporter, data, columns, output, plot, lambda figures: figures.figure_of(data))
