@@ -182,6 +182,10 @@ class MeasuredOptions(LikeOptions):
     ] = None
 
 
+def _types_of_results(values: Mapping[str, Any]) -> tuple[str, ...]:
+    return FOLDER if len(values["data"]) > 1 else (".json",)
+
+
 @dataclass(frozen=True)
 class ManyArguments:
     """Data files of one lever or several, where results go, and who works on them."""
@@ -194,7 +198,7 @@ class ManyArguments:
         Option(
             "-o", "--output", help="Result file (JSON); a folder of them with several data files."
         ),
-        Written(types_of=lambda values: FOLDER if len(values["data"]) > 1 else (".json",)),
+        Written(types_of=_types_of_results),
     ] = None
     report: Annotated[
         Path | None, Option(help="Write a page with figures to this folder."), Written()
