@@ -29,23 +29,26 @@ __version__ = "3.0.0"
 
 #: What the package offers at its top, by the module it lives in. Loaded when first used, so that
 #: the command line starts fast.
-_MODULES = {
-    "hotlever.probe": ("Probe", "Circuit", "MeshOptions"),
-    "hotlever.materials": ("Material", "published"),
-    "hotlever.lever": ("Lever", "Branch", "sweep", "read_sweep", "write_sweep"),
-    "hotlever.lever.transient": ("simulate",),
-    "hotlever.estimate": (
-        *("Measurement", "read_measurement", "FitOptions", "fit", "read_fit"),
-        *("calibrate", "read_calibration", "plan_next", "PowerLaw", "read_power_law"),
-    ),
-    "hotlever.raman": (
-        *("read_spectra", "measure", "read_lines", "Thermometer"),
-        *("calibrate_from", "read_raman_calibration", "published_raman_calibration"),
-    ),
-    "hotlever.errors": ("HotleverError", "InputError", "ComputationError", "BranchEndError"),
-    "hotlever.figures": ("save_figure",),
+_PUBLIC = {
+    name: module
+    for module, names in {
+        "hotlever.probe": ("Probe", "Circuit", "MeshOptions"),
+        "hotlever.materials": ("Material", "published"),
+        "hotlever.lever": ("Lever", "Branch", "sweep", "read_sweep", "write_sweep"),
+        "hotlever.lever.transient": ("simulate",),
+        "hotlever.estimate": (
+            *("Measurement", "read_measurement", "FitOptions", "fit", "read_fit"),
+            *("calibrate", "read_calibration", "plan_next", "PowerLaw", "read_power_law"),
+        ),
+        "hotlever.raman": (
+            *("read_spectra", "measure", "read_lines", "Thermometer"),
+            *("calibrate_from", "read_raman_calibration", "published_raman_calibration"),
+        ),
+        "hotlever.errors": ("HotleverError", "InputError", "ComputationError", "BranchEndError"),
+        "hotlever.figures": ("save_figure",),
+    }.items()
+    for name in names
 }
-_PUBLIC = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:

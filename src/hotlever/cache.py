@@ -15,7 +15,7 @@ import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import platformdirs
@@ -24,16 +24,12 @@ from numpy.typing import NDArray
 from hotlever import __version__
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import output_folder, whole_file
+from hotlever.types import T
 
 #: Environment variable that moves the cache; empty switches it off.
 CACHE_VARIABLE = "HOTLEVER_CACHE"
-#: Environment variable with the largest size of the cache (GB), and the size without it.
-SIZE_VARIABLE, _SIZE_GB = "HOTLEVER_CACHE_GB", 2.0
 #: Packages whose code makes what is kept.
 _MAKERS = ("tables", "materials", "probe", "air", "contact", "lever", "lever3d")
-
-Arrays = dict[str, NDArray[Any]]
-T = TypeVar("T")
 
 
 def cache_folder() -> Path | None:
@@ -82,7 +78,7 @@ def code_digest(package: Path) -> bytes:
     return content.digest()
 
 
-def stored(path: Path | None, make: Callable[[Arrays], T]) -> T | None:
+def stored(path: Path | None, make: Callable[[dict[str, NDArray[Any]]], T]) -> T | None:
     """Make something of a stored file's arrays; None if there is no file.
 
     None, too, if it is damaged or `make` raises for its content; it is then removed.
@@ -136,11 +132,12 @@ def largest_size() -> float:
     InputError
         If the environment gives no number of 0 or more.
     """
-    text = os.environ.get(SIZE_VARIABLE) or str(_SIZE_GB)
+    variable = "HOTLEVER_CACHE_GB"
+    text = os.environ.get(variable) or "2"
     with suppress(ValueError):
         if float(text) >= 0:
             return 1e9 * float(text)
-    raise InputError(f"{SIZE_VARIABLE} = {text}: expected a number of gigabytes, 0 or more")
+    raise InputError(f"{variable} = {text}: expected a number of gigabytes, 0 or more")
 
 
 def kept_files(top: Path) -> list[tuple[os.stat_result, Path]]:

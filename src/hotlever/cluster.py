@@ -17,20 +17,6 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.files import read_text
 from hotlever.processes import Patience, WorkerDiedError, guarded
 
-#: Seconds that a scheduler, and then its first worker, may take to answer.
-_PATIENCE_S = 10
-#: Seconds that a scheduler may take to say who its workers are.
-_ANSWER_S = 30
-#: Those that Dask gives levels of their own.
-_LOGGERS = ("distributed", "distributed.client")
-#: Dask's settings of TLS, and the variables of the environment that set them.
-_CREDENTIALS = {
-    "ca-file": "DASK_DISTRIBUTED__COMM__TLS__CA_FILE",
-    "client.cert": "DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT",
-    "client.key": "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY",
-}
-_LOST = "the scheduler is lost; what was done until then is written"
-
 
 class ClusterExecutor:
     """The workers that a scheduler has."""
@@ -51,9 +37,11 @@ class ClusterExecutor:
         try:
             if self._client.status != "running":
                 raise ConnectionError
-            threads = self._client.sync(self._client.scheduler.ncores, callback_timeout=_ANSWER_S)
+            threads = self._client.sync(
+                self._client.scheduler.ncores, callback_timeout=self.patience.answer_s
+            )
         except (OSError, TimeoutError) as error:
-            raise ComputationError(_LOST) from error
+            raise _lost() from error
         return sum(threads.values())
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
@@ -65,12 +53,16 @@ class ClusterExecutor:
         return result
 
 
+def _lost() -> ComputationError:
+    return ComputationError("the scheduler is lost; what was done until then is written")
+
+
 def _hand_on(task: Any, result: Future[Any]) -> None:
     """Give a task's result, or why there is none, to the future that stands for it."""
     try:
         result.set_result(task.result())
     except CancelledError:
-        result.set_exception(ComputationError(_LOST))
+        result.set_exception(_lost())
     except KilledWorker:
         result.set_exception(WorkerDiedError())
     except Exception as error:
@@ -88,7 +80,8 @@ def cluster_executor(address: str) -> Iterator[ClusterExecutor]:
     """
     where = f"--scheduler {address}"
     # Dask's logs are kept from standard error
-    levels = {name: logging.getLogger(name).level for name in _LOGGERS}
+    loggers = "distributed", "distributed.client"  # each has a level of its own
+    levels = {name: logging.getLogger(name).level for name in loggers}
     for name in levels:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
@@ -107,29 +100,36 @@ def _check_credentials(where: str) -> None:
     InputError
         If they name none, or one that cannot be read.
     """
-    for setting, variable in _CREDENTIALS.items():
+    # Dask's settings of TLS, and the variables of the environment that set them
+    credentials = {
+        "ca-file": "DASK_DISTRIBUTED__COMM__TLS__CA_FILE",
+        "client.cert": "DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT",
+        "client.key": "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY",
+    }
+    for setting, variable in credentials.items():
         path = dask.config.get(f"distributed.comm.tls.{setting}", None)
         if not path:
             raise InputError(
                 f"{where}: no credentials for TLS, expected the names of their files in "
-                f"{', '.join(_CREDENTIALS.values())}; {variable} is not set"
+                f"{', '.join(credentials.values())}; {variable} is not set"
             )
         read_text(path)
 
 
 @contextmanager
 def _connected(address: str, where: str) -> Iterator[Client]:
+    patience = ClusterExecutor.patience
     if address.startswith("tls://"):
         _check_credentials(where)
     try:
-        client = Client(address, timeout=_PATIENCE_S, set_as_default=False)
+        client = Client(address, timeout=patience.scheduler_s, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
             f"{where}: no scheduler answers there, expected one like tls://HOST:8786"
         ) from error
     with client:
         try:
-            client.wait_for_workers(1, timeout=_PATIENCE_S)
+            client.wait_for_workers(1, timeout=patience.scheduler_s)
         except TimeoutError as error:
             raise InputError(f"{where}: the scheduler has no workers") from error
         versions = client.run(_version, on_error="return")

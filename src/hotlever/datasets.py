@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 #: Attribute of a written dataset, see `checksum`.
 CHECKSUM = "checksum"
-#: What sweeps of a lever have that a controller holds.
-_OF_SET_POINTS = {"set_ohm", "set_mW", "state", "slope_ohm_per_K", "slope_mW_per_K"}
 
 
 def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:
@@ -35,7 +33,9 @@ def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:
     These are of a bridge, of set points, and of terminals and monitors, which are named by users.
     """
     own = [str(name) for name in data.data_vars]
-    some = {name for name in own if "bridge_" in name or name in _OF_SET_POINTS}
+    # sweeps of a lever that a controller holds
+    held = {"set_ohm", "set_mW", "state", "slope_ohm_per_K", "slope_mW_per_K"}
+    some = {name for name in own if "bridge_" in name or name in held}
     return [*columns, *(name for name in own if name in some or name not in QUANTITIES)]
 
 

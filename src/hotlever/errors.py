@@ -13,11 +13,6 @@ from typing import Any
 
 from hotlever import __version__
 
-#: Characters that an error quotes of what was found.
-_QUOTED = 40
-#: Names up to which all are listed to choose from, and how many of more.
-_MOST_CHOICES, _NEAREST = 30, 5
-
 
 class HotleverError(Exception):
     """Base of every error raised on purpose; its text is one line for a user."""
@@ -100,7 +95,7 @@ def quoted(value: object) -> str:
         text = repr(value)
     except (ValueError, RecursionError):
         return f"a very long {type(value).__name__}"
-    return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 2]}…"
+    return text if len(text) <= 40 else f"{text[:38]}…"
 
 
 def excerpt(text: str, limit: int = 40) -> str:
@@ -128,21 +123,21 @@ def unknown_name(kind: str, name: str, choices: Iterable[str], where: str = "") 
     >>> str(unknown_name("parameter", "c_kapa", ["c_kappa", "delta"]))
     "unknown parameter 'c_kapa': did you mean 'c_kappa'? (expected one of: c_kappa, delta)"
     """
-    names = list(choices)
+    names, asked, most = list(choices), name[:40], 5
     # a longer name may be meant that has all its words, though the whole is less alike than others
     whole = [other for other in names if _words(name) <= _words(other)]
-    whole = difflib.get_close_matches(name[:_QUOTED], whole, n=_NEAREST, cutoff=0.0)
+    whole = difflib.get_close_matches(asked, whole, n=most, cutoff=0.0)
     # of names that are less alike, one that begins as it does is meant, not any other
-    alike = difflib.get_close_matches(name[:_QUOTED], names, n=_NEAREST, cutoff=0.5)
-    near = difflib.get_close_matches(name[:_QUOTED], names, n=1)
+    alike = difflib.get_close_matches(asked, names, n=most, cutoff=0.5)
+    near = difflib.get_close_matches(asked, names, n=1)
     fewest = min((len(_words(other)) for other in whole), default=0)
     meant = [other for other in whole if len(_words(other)) == fewest]
     near = (meant if len(meant) == 1 else near) or [
         other for other in alike if other[:1].lower() == name[:1].lower()
     ]
-    if len(names) > _MOST_CHOICES:
-        nearest = difflib.get_close_matches(name[:_QUOTED], names, n=_NEAREST, cutoff=0.0)
-        nearest = list(dict.fromkeys([*whole, *nearest]))[:_NEAREST]
+    if len(names) > 30:
+        nearest = difflib.get_close_matches(asked, names, n=most, cutoff=0.0)
+        nearest = list(dict.fromkeys([*whole, *nearest]))[:most]
         names = [*nearest, f"and {len(names) - len(nearest)} more"]
     hint = f": did you mean '{near[0]}'?" if near else ""
     prefix = f"{where}: " if where else ""

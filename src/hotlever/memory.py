@@ -5,9 +5,6 @@ from __future__ import annotations
 import ctypes
 from contextlib import suppress
 
-#: The number of a parameter of the GNU library's `mallopt`, in its ``malloc.h``.
-_M_MMAP_THRESHOLD = -3
-
 
 def give_back(block_bytes: int = 2**20) -> None:
     """Return freed memory to the system, where its C library can.
@@ -25,5 +22,6 @@ def give_back(block_bytes: int = 2**20) -> None:
     # not found: AttributeError; no library of that kind: TypeError or OSError
     with suppress(AttributeError, OSError, TypeError):
         library = ctypes.CDLL(None)
-        library.mallopt(_M_MMAP_THRESHOLD, block_bytes)
+        # -3 is M_MMAP_THRESHOLD in the library's malloc.h
+        library.mallopt(-3, block_bytes)
         library.malloc_trim(0)

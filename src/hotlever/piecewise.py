@@ -16,12 +16,6 @@ from hotlever.types import Array, Index
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-#: Part of the distance between two nodes by which a root may be off.
-_ROUNDING = 1e-10
-#: Points between two nodes at which a value is first looked for, and steps of Newton's method from
-#: there.
-_SAMPLES, _NEWTON_STEPS = 8, 6
-
 
 @dataclass(frozen=True, eq=False)
 class Piecewise:
@@ -78,18 +72,21 @@ class Piecewise:
         powers = np.arange(len(self.c) - 1, 0, -1).reshape(-1, *(1,) * (self.c.ndim - 1))
         return Piecewise(self.c[:-1] * powers, self.x)
 
-    def roots(self) -> Array:
-        """Return where a single quantity is zero between the first and the last node, rising."""
+    def roots(self, rounding: float = 1e-10) -> Array:
+        """Return where a single quantity is zero between the first and the last node, rising.
+
+        One may be off by `rounding`, as a part of the distance between two nodes.
+        """
         roots, widths = [np.empty(0)], np.diff(self.x)
-        for piece in np.flatnonzero(_may_vanish(self.c, widths)).tolist():
+        for piece in np.flatnonzero(_may_vanish(self.c, widths, rounding)).tolist():
             coefficients, left, width = self.c[:, piece], self.x[piece], widths[piece]
             away = np.roots(coefficients)
-            real = away.real[np.abs(away.imag) <= _ROUNDING * width]
-            inside = (real >= -_ROUNDING * width) & (real <= width * (1 + _ROUNDING))
+            real = away.real[np.abs(away.imag) <= rounding * width]
+            inside = (real >= -rounding * width) & (real <= width * (1 + rounding))
             roots.append(left + real[inside])
         rising = np.unique(np.clip(np.concatenate(roots), self.x[0], self.x[-1]))
         # one at a node belongs to the polynomials on both sides of it
-        again = np.diff(rising, prepend=-np.inf) <= 2 * _ROUNDING * np.ptp(self.x)
+        again = np.diff(rising, prepend=-np.inf) <= 2 * rounding * np.ptp(self.x)
         return np.asarray(rising[~again])
 
 
@@ -146,7 +143,7 @@ def monotone_cubic(x: Array, y: Array) -> Piecewise:
     return hermite_cubic(x, y, slopes)
 
 
-def _may_vanish(c: Array, widths: Array) -> NDArray[np.bool_]:
+def _may_vanish(c: Array, widths: Array, rounding: float) -> NDArray[np.bool_]:
     """Return which polynomials may have a root: those whose Bernstein coefficients differ in sign.
 
     A polynomial lies between its smallest and its largest one. Most pieces have no root, and each
@@ -157,7 +154,7 @@ def _may_vanish(c: Array, widths: Array) -> NDArray[np.bool_]:
     to_bernstein = [[comb(i, j) / comb(degree, j) for j in orders] for i in orders]
     powers = c[::-1] * widths ** np.arange(degree + 1)[:, None]
     bernstein = np.array(to_bernstein) @ powers
-    clear = _ROUNDING * np.abs(bernstein).max(axis=0)
+    clear = rounding * np.abs(bernstein).max(axis=0)
     return np.asarray((bernstein.min(axis=0) <= clear) & (bernstein.max(axis=0) >= -clear))
 
 
@@ -278,7 +275,7 @@ def crossing(curve: Piecewise, low: float, high: float, values: Array) -> Array:
     # between two samples it is one polynomial
     piece = np.clip(np.searchsorted(curve.x, left, side="right") - 1, 0, curve.x.size - 2)
     start, (highest, *lower) = curve.x[piece], curve.c[:, piece]
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(6):
         away, height, slope = u - start, highest, np.zeros(u.shape)
         for coefficients in lower:
             height, slope = height * away + coefficients, slope * away + height
@@ -290,5 +287,6 @@ def _samples(curve: Piecewise, low: float, high: float) -> Array:
     """Return points between which a curve is smooth enough for a few steps of Newton's method."""
     inner = curve.x[(curve.x > low) & (curve.x < high)]
     ends = np.concatenate([[low], inner, [high]])
-    shares = np.arange(_SAMPLES) / _SAMPLES
+    between = 8
+    shares = np.arange(between) / between
     return np.append((ends[:-1, None] + np.diff(ends)[:, None] * shares).ravel(), high)

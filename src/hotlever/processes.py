@@ -17,24 +17,18 @@ from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, Thre
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import starmap
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 
 from hotlever.cache import CACHE_VARIABLE, cache_folder
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.types import Progress
-
-T = TypeVar("T")
-# Applies a function to each of many arguments, telling how many are done; gives the results.
-Run = Callable[..., list[Any]]
+from hotlever.types import Progress, T
 
 #: Processes that this one starts if nothing else is said: one for each processor it may use.
 PROCESSORS = (
     len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 )
-#: Variables that keep the linear algebra of a new process on one thread.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -52,12 +46,18 @@ class Patience:
         Seconds between two looks at whether there are workers.
     without_workers_s : float
         Seconds for which there may be none while there is work.
+    scheduler_s : float
+        Seconds that a scheduler, and then its first worker, may take to be there.
+    answer_s : float
+        Seconds that a scheduler may take to say who its workers are.
     """
 
     start_s: float = 120.0
     task_s: float = 1800.0
     look_s: float = 5.0
     without_workers_s: float = 30.0
+    scheduler_s: float = 10.0
+    answer_s: float = 30.0
 
 
 class WorkerDiedError(Exception):
@@ -153,8 +153,11 @@ def guarded(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 @contextmanager
-def local_processes(processes: int) -> Iterator[Run]:
+def local_processes(processes: int) -> Iterator[Callable[..., list[Any]]]:
     """Start local processes that do tasks, and raise what these raise; one would be this one.
+
+    What is given applies a function to each of many arguments, tells how many are done, and returns
+    the results.
 
     Raises
     ------
@@ -196,7 +199,7 @@ def local_executor(processes: int, patience: Patience | None = None) -> Iterator
     ComputationError
         If they cannot be started.
     """
-    environment = dict.fromkeys(_THREADS, "1")
+    environment = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with ExitStack() as stack:
         if cache_folder() is None:
             # the processes share what they make even if the user's cache is switched off

@@ -51,35 +51,41 @@ class Quantity(NamedTuple):
         return f"{self.label or self.meaning} ({self.unit})"
 
 
-_BIAS = ("vb", "ub", "vbias", "ubias", "bias", "biasvoltage", "vorspannung", "versorgungsspannung")
-_LEVER = ("vl", "ul", "vlever", "ulever", "lever", "levervoltage", "hebelspannung")
-_CURRENT = (
-    *("ih", "i", "current", "heatercurrent", "levercurrent"),
-    *("strom", "heizstrom", "heizerstrom", "hebelstrom"),
-)
-_READER = ("vr", "ur", "vreader", "ureader", "reader", "readervoltage", "readerspannung")
-_BRIDGE = (
-    *("vbridge", "ubridge", "bridge", "bridgevoltage", "bridgeoutput", "bridgeoutputvoltage"),
-    *("bridgesignal", "ubrücke", "brücke", "brückenspannung", "diagonalspannung"),
-)
-_TIP = ("ttip", "tip", "tiptemperature", "spitzentemperatur")
-_APEX = ("tapex", "apex", "apextemperature")
-_MELTING = ("tmelt", "meltingpoint", "meltingtemperature", "schmelzpunkt", "schmelztemperatur")
-_DISTANCE = ("d", "distance", "separation", "tipsampledistance", "tipsampleseparation", "abstand")
 #: All of them, by name.
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
         # what instruments and thermometers measure
         Quantity("time_us", "µs", "time", "t"),
-        Quantity("lever_V", "V", "lever voltage", "V_l", _LEVER, label="lever voltage V$_l$"),
-        Quantity("bias_V", "V", "bias", "V_b", _BIAS, (1e-3, 1e3), label="bias V$_b$"),
+        Quantity(
+            "lever_V",
+            "V",
+            "lever voltage",
+            "V_l",
+            ("vl", "ul", "vlever", "ulever", "lever", "levervoltage", "hebelspannung"),
+            label="lever voltage V$_l$",
+        ),
+        Quantity(
+            "bias_V",
+            "V",
+            "bias",
+            "V_b",
+            (
+                *("vb", "ub", "vbias", "ubias", "bias", "biasvoltage"),
+                *("vorspannung", "versorgungsspannung"),
+            ),
+            (1e-3, 1e3),
+            label="bias V$_b$",
+        ),
         Quantity(
             "current_mA",
             "mA",
             "heater current",
             "I_h",
-            _CURRENT,
+            (
+                *("ih", "i", "current", "heatercurrent", "levercurrent"),
+                *("strom", "heizstrom", "heizerstrom", "hebelstrom"),
+            ),
             (1e-9, 1e3),
             small=("µA", 1e3),
             label="heater current I$_h$",
@@ -89,7 +95,7 @@ QUANTITIES = {
             "V",
             "reader voltage",
             "V_r",
-            _READER,
+            ("vr", "ur", "vreader", "ureader", "reader", "readervoltage", "readerspannung"),
             (1e-9, 1e3),
             small=("mV", 1e3),
             label="reader voltage V$_r$",
@@ -99,13 +105,25 @@ QUANTITIES = {
             "V",
             "bridge voltage",
             "V_bridge",
-            _BRIDGE,
+            (
+                *("vbridge", "ubridge", "bridge", "bridgevoltage", "bridgeoutput"),
+                "bridgeoutputvoltage",
+                *("bridgesignal", "ubrücke", "brücke", "brückenspannung", "diagonalspannung"),
+            ),
             (1e-9, 1e3),
             True,
             ("mV", 1e3),
             label="bridge voltage V$_{bridge}$",
         ),
-        Quantity("tip_K", "K", "tip temperature", "T_tip", _TIP, (0.0, 5e3), small=("K", 1.0)),
+        Quantity(
+            "tip_K",
+            "K",
+            "tip temperature",
+            "T_tip",
+            ("ttip", "tip", "tiptemperature", "spitzentemperatur"),
+            (0.0, 5e3),
+            small=("K", 1.0),
+        ),
         Quantity(
             "tip_error_K",
             "K",
@@ -135,7 +153,13 @@ QUANTITIES = {
             ("dvbridge", "δvbridge"),
         ),
         Quantity(
-            "apex_K", "K", "temperature of the apex", "T_apex", _APEX, (0.0, 5e3), small=("K", 1.0)
+            "apex_K",
+            "K",
+            "temperature of the apex",
+            "T_apex",
+            ("tapex", "apex", "apextemperature"),
+            (0.0, 5e3),
+            small=("K", 1.0),
         ),
         Quantity(
             "apex_error_K",
@@ -149,7 +173,7 @@ QUANTITIES = {
             "K",
             "sample's surface temperature",
             "T_melt",
-            _MELTING,
+            ("tmelt", "meltingpoint", "meltingtemperature", "schmelzpunkt", "schmelztemperatur"),
             (0.0, 5e3),
             small=("K", 1.0),
         ),
@@ -161,7 +185,11 @@ QUANTITIES = {
             ("dtmelt", "δtmelt"),
         ),
         Quantity(
-            "distance_um", "µm", "distance of the apex to the sample, 0 in contact", "D", _DISTANCE
+            "distance_um",
+            "µm",
+            "distance of the apex to the sample, 0 in contact",
+            "D",
+            ("d", "distance", "separation", "tipsampledistance", "tipsampleseparation", "abstand"),
         ),
         # what follows from it
         Quantity("bias", "V", "bias", label="bias V$_b$"),
@@ -396,10 +424,12 @@ QUANTITIES = {
 }
 #: Everything that a measurement may hold, by symbol; ``d`` begins that of a standard error.
 MEASURANDS = {quantity.symbol: quantity for quantity in QUANTITIES.values() if quantity.symbol}
-_BUFFER = ("source", "sourcevalue", "value", "reading")
 #: Headings that say no more than the unit does: what a file has of this unit counts as the
 #: quantity where it is the only one.
-PLAIN = {"V_b": ("voltage", "spannung", "u", *_BUFFER), "I_h": _BUFFER}
+PLAIN = {
+    "V_b": ("voltage", "spannung", "u", "source", "sourcevalue", "value", "reading"),
+    "I_h": ("source", "sourcevalue", "value", "reading"),
+}
 #: What a lever shows, by the name that users give it. How each follows is said in
 #: `hotlever.lever.observables`.
 OBSERVABLES = {

@@ -22,28 +22,14 @@ from pydantic import (
 
 from hotlever.errors import InputError, excerpt, quoted, unknown_name
 
-#: Characters of a key that an error names.
-_LONGEST_KEY = 120
-#: What stands in an error for words of pydantic.
-_WORDS = {
-    "Input should be": "expected",
-    "a valid dictionary or instance of": "keys of",
-    "a valid tuple": "a list",
-    "a valid string": "a text in quotes",
-    "a valid boolean": "true or false",
-    "a valid": "a",
-}
-_LIMITS = {
-    "greater_than_equal": "at least",
-    "less_than_equal": "at most",
-    "greater_than": "more than",
-    "less_than": "less than",
-}
 
-_NAN_IF_NONE = WrapValidator(lambda value, check: math.nan if value is None else check(value))
+def _nan_if_none(value: Any, check: Callable[[Any], Any]) -> Any:
+    return math.nan if value is None else check(value)
+
+
 # A number of a result file, and a standard error; NaN where the file has none.
-Number = Annotated[float, _NAN_IF_NONE]
-StandardError = Annotated[float, Field(ge=0), _NAN_IF_NONE]
+Number = Annotated[float, WrapValidator(_nan_if_none)]
+StandardError = Annotated[float, Field(ge=0), WrapValidator(_nan_if_none)]
 
 
 def stored_as(
@@ -127,18 +113,32 @@ def explained(error: ValidationError, record: type[BaseModel], where: str) -> In
     first = min(reports, key=lambda report: report["type"] != "extra_forbidden")
     # where a number or a word may stand, pydantic adds which of them it has tried
     path = [part for part in first["loc"] if part not in ("float", "constrained-float")]
-    key = excerpt(".".join(map(str, path)), _LONGEST_KEY)
+    key = excerpt(".".join(map(str, path)), 120)
     place = f"{where}: " if where else ""
     if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
         return unknown_name("key", key, record.model_fields, where)
     if first["type"] == "missing":
         return InputError(f"{place}{key} is missing")
     message = first["msg"].removeprefix("Value error, ")
-    for of_pydantic, words in _WORDS.items():
+    own_words = {
+        "Input should be": "expected",
+        "a valid dictionary or instance of": "keys of",
+        "a valid tuple": "a list",
+        "a valid string": "a text in quotes",
+        "a valid boolean": "true or false",
+        "a valid": "a",
+    }
+    for of_pydantic, words in own_words.items():
         message = message.replace(of_pydantic, words)
-    if first["type"] in _LIMITS:
+    limits = {
+        "greater_than_equal": "at least",
+        "less_than_equal": "at most",
+        "greater_than": "more than",
+        "less_than": "less than",
+    }
+    if first["type"] in limits:
         (limit,) = first["ctx"].values()
-        message = f"expected {_LIMITS[first['type']]} {limit:g}"
+        message = f"expected {limits[first['type']]} {limit:g}"
     if not key:
         return InputError(f"{place}{message}")
     input_value = first["input"]

@@ -108,16 +108,18 @@ PUBLISHED_VALUES = {name: _in_units(printed) for name, printed in _VALUES.items(
 STANDARD_ERRORS = {name: _in_units(errors) for name, (_, _, errors) in _OPTIONS.items()}
 INVERSION_TEMPERATURES_K = {name: T for name, (_, T, _) in _OPTIONS.items()}
 FITTED_OBSERVABLES = {name: observables for name, (observables, _, _) in _OPTIONS.items()}
-#: Levers whose scatter stands for that of any lever of unknown material (Table II), and by how much
-#: it is widened: four levers of one wafer differ less than those of two makers.
-SCATTER_OF, _WIDENED = ("lever 1", "lever 2", "lever 3", "lever 4"), 1.5
 
 
 def _scatter() -> dict[str, tuple[float, float]]:
-    """Return mean and widened standard deviation of the logarithms of the levers' parameters."""
-    logarithms = np.log([list(PUBLISHED_VALUES[lever].values()) for lever in SCATTER_OF])
+    """Return mean and widened standard deviation of the logarithms of the levers' parameters.
+
+    The scatter of those of Table II stands for that of any lever of unknown material; it is
+    widened, as four levers of one wafer differ less than those of two makers.
+    """
+    levers = (PUBLISHED_VALUES[f"lever {number}"] for number in (1, 2, 3, 4))
+    logarithms = np.log([list(lever.values()) for lever in levers])
     means, spreads = logarithms.mean(axis=0), logarithms.std(axis=0, ddof=1)
-    rows = zip(np.exp(means).tolist(), (_WIDENED * spreads).tolist(), strict=True)
+    rows = zip(np.exp(means).tolist(), (1.5 * spreads).tolist(), strict=True)
     return dict(zip(_UNITS, rows, strict=True))
 
 

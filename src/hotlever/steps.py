@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import TypeVar
 
-from hotlever.types import Progress
-
-T = TypeVar("T")
+from hotlever.types import Progress, T
 
 
 def each(items: Collection[T], progress: Progress | None) -> Iterator[T]:

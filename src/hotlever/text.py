@@ -8,14 +8,8 @@ from collections.abc import Iterable, Sequence
 
 #: What is written of a quantity whose error says that it may be anything.
 NOT_DETERMINED = "not determined"
-#: Numbers between these are written without a power of ten.
-_WITHOUT_POWER = 1e-4, 1e5
 #: Standard errors that 95 % of a normal distribution lie within.
 BAND = 1.96
-#: A bound this many times as large as the value is none.
-_NO_BOUND = 10.0
-#: Characters beyond which a list takes several lines.
-_LINE_LENGTH = 100
 
 
 def value_with_error(
@@ -61,7 +55,7 @@ def value_with_error(
     if stderr >= abs(value):
         return _interval(value, stderr, scale, bounds)
     value, error = value / scale, stderr / scale
-    if not _WITHOUT_POWER[0] <= abs(value) < _WITHOUT_POWER[1]:
+    if _has_power(value):
         power = math.floor(math.log10(abs(value)))
         return f"{value_with_error(value / 10.0**power, error / 10.0**power)}e{power}"
     # one digit of the error, two where the first is a 1, and two of the value
@@ -72,13 +66,18 @@ def value_with_error(
     return f"{value:.{digits}f}({last})"
 
 
+def _has_power(value: float) -> bool:
+    """Whether a number is written with a power of ten."""
+    return not 1e-4 <= abs(value) < 1e5
+
+
 def _interval(value: float, stderr: float, scale: float, bounds: tuple[float, float]) -> str:
     """Return what 95 % lie between, where an error is larger than its value."""
     low, high = value - BAND * stderr, value + BAND * stderr
     told_low, told_high = low > bounds[0], high < bounds[1]
     if told_low and told_high:
         return f"{significant(low / scale)} to {significant(high / scale)}"
-    if told_high and (math.isfinite(bounds[1]) or high < _NO_BOUND * value):
+    if told_high and (math.isfinite(bounds[1]) or high < 10.0 * value):
         return f"below {significant(high / scale)}"
     if told_low:
         return f"above {significant(low / scale)}"
@@ -95,7 +94,7 @@ def significant(value: float) -> str:
     """
     rounded = f"{value:.1e}"
     mantissa, _, power = rounded.partition("e")
-    if value and not _WITHOUT_POWER[0] <= abs(float(rounded)) < _WITHOUT_POWER[1]:
+    if value and _has_power(float(rounded)):
         return f"{mantissa}e{int(power)}"
     return f"{value:.{max(0, 1 - int(power))}f}"
 
@@ -146,7 +145,7 @@ def as_toml(value: object) -> str:
     """
     # JSON writes all of these as TOML does
     text = json.dumps(value, ensure_ascii=False)
-    if len(text) <= _LINE_LENGTH or not isinstance(value, list | tuple):
+    if len(text) <= 100 or not isinstance(value, list | tuple):
         return text
     inner = ",\n".join(as_toml(entry) for entry in value)
     return f"[\n{inner},\n]"

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from typing import ParamSpec
 
 from threadpoolctl import ThreadpoolController
 
+from hotlever.types import T
+
 P = ParamSpec("P")
-R = TypeVar("R")
 
 
 @functools.cache
@@ -23,11 +24,11 @@ def _controller() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def one_blas_thread(function: Callable[P, R]) -> Callable[P, R]:
+def one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
     """Make a function run with one BLAS thread; the caller's setting comes back after it."""
 
     @functools.wraps(function)
-    def limited(*args: P.args, **kwargs: P.kwargs) -> R:
+    def limited(*args: P.args, **kwargs: P.kwargs) -> T:
         with _controller().limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 

@@ -25,30 +25,6 @@ LEAST_BIAS, MOST_BIAS = 1e-6, 1e4
 NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 LONGEST_NUMBER = 60  #: characters
 
-_PREFIXES = {"": 0, "d": -1, "c": -2, "m": -3, "u": -6, "μ": -6, "n": -9, "p": -12, "f": -15}
-_PREFIXES |= {"a": -18, "da": 1, "h": 2, "k": 3, "K": 3, "M": 6, "G": 9, "T": 12, "P": 15, "E": 18}
-_PREFIX_WORDS = {"": 0, "milli": -3, "micro": -6, "nano": -9, "pico": -12, "kilo": 3, "mega": 6}
-#: Hyphens, dashes and minus signs that stand before negative numbers, and what U+2212 and the en
-#: dash look like where UTF-8 was read as Windows' Latin-1.
-_MINUS = re.compile("[‐‑‒–—−﹣－]|âˆ’|â€“")
-#: Quantity (its unit), and what one of a unit is of it.
-_SYMBOLS = {
-    **{symbol: (symbol, 1.0) for symbol in ("V", "A", "W", "K", "s", "Hz", "m", "bar", "S", "J")},
-    **dict.fromkeys(("ohm", "Ohm", "OHM", "Ω"), ("ohm", 1.0)),
-    **dict.fromkeys(("torr", "Torr"), ("bar", 1.01325 / 760.0)),
-    "Pa": ("bar", 1e-5),
-}
-_WORDS = {
-    **dict.fromkeys(("volt", "volts"), ("V", 1.0)),
-    **dict.fromkeys(("amp", "amps", "ampere", "amperes"), ("A", 1.0)),
-    **dict.fromkeys(("ohm", "ohms"), ("ohm", 1.0)),
-    **dict.fromkeys(("kelvin", "kelvins"), ("K", 1.0)),
-    **dict.fromkeys(("sec", "second", "seconds"), ("s", 1.0)),
-    **dict.fromkeys(("pascal", "pascals"), ("bar", 1e-5)),
-    "atm": ("bar", 1.01325),
-    "mmhg": ("bar", 1.01325 / 760.0),
-}
-
 
 class _Unit(NamedTuple):
     quantity: str  #: named by its unit
@@ -56,46 +32,71 @@ class _Unit(NamedTuple):
     factor: float  #: what else one of the unit is of the quantity
 
 
-_UNITS = {
-    prefix + symbol: _Unit(quantity, power, factor)
-    for prefix, power in _PREFIXES.items()
-    for symbol, (quantity, factor) in _SYMBOLS.items()
-}
-#: The same for words, in small letters.
-_UNIT_WORDS = {
-    prefix + word: _Unit(quantity, power, factor)
-    for prefix, power in _PREFIX_WORDS.items()
-    for word, (quantity, factor) in _WORDS.items()
-}
-#: In brackets alone: in a heading `V_s` is no voltage in seconds.
-_OF_SETTINGS = {"s", "Hz", "W", "m", "S", "J"}
+def _symbols() -> dict[str, _Unit]:
+    """Return units by their symbols, with SI prefixes."""
+    prefixes = {"": 0, "d": -1, "c": -2, "m": -3, "u": -6, "μ": -6, "n": -9, "p": -12, "f": -15}
+    prefixes |= {"a": -18, "da": 1, "h": 2, "k": 3, "K": 3, "M": 6, "G": 9}
+    prefixes |= {"T": 12, "P": 15, "E": 18}
+    # quantity (its unit), and what one of a unit is of it
+    symbols = {
+        **{each: (each, 1.0) for each in ("V", "A", "W", "K", "s", "Hz", "m", "bar", "S", "J")},
+        **dict.fromkeys(("ohm", "Ohm", "OHM", "Ω"), ("ohm", 1.0)),
+        **dict.fromkeys(("torr", "Torr"), ("bar", 1.01325 / 760.0)),
+        "Pa": ("bar", 1e-5),
+    }
+    return _with_prefixes(prefixes, symbols)
+
+
+def _words() -> dict[str, _Unit]:
+    """Return units by their names, in small letters."""
+    prefixes = {"": 0, "milli": -3, "micro": -6, "nano": -9, "pico": -12, "kilo": 3, "mega": 6}
+    words = {
+        **dict.fromkeys(("volt", "volts"), ("V", 1.0)),
+        **dict.fromkeys(("amp", "amps", "ampere", "amperes"), ("A", 1.0)),
+        **dict.fromkeys(("ohm", "ohms"), ("ohm", 1.0)),
+        **dict.fromkeys(("kelvin", "kelvins"), ("K", 1.0)),
+        **dict.fromkeys(("sec", "second", "seconds"), ("s", 1.0)),
+        **dict.fromkeys(("pascal", "pascals"), ("bar", 1e-5)),
+        "atm": ("bar", 1.01325),
+        "mmhg": ("bar", 1.01325 / 760.0),
+    }
+    return _with_prefixes(prefixes, words)
+
+
+def _with_prefixes(
+    prefixes: dict[str, int], units: dict[str, tuple[str, float]]
+) -> dict[str, _Unit]:
+    return {
+        prefix + name: _Unit(quantity, power, factor)
+        for prefix, power in prefixes.items()
+        for name, (quantity, factor) in units.items()
+    }
+
+
+_UNITS, _UNIT_WORDS = _symbols(), _words()
 #: Headings that name a time; of these alone a unit of time is one.
 TIMES = {"t", "time", "relative time", "elapsed time", "zeit", "relative zeit"}
-_CELSIUS = {"°C", "degC", "C", "oC", "celsius", "Celsius", "degreesC", "degreesCelsius"}
-#: What µ, Ω and °C of other encodings (UTF-8 read twice, DOS, GBK, Shift-JIS, Mac) look like when
-#: a file is read as Windows' Latin-1; what is part of another stands behind it.
-_MISREAD = {
-    **dict.fromkeys(("â„ƒ", "øC", "¡æ", "¡ãC", "�Ž", "�‹C", "¡C"), "°C"),
-    **dict.fromkeys(("â„¦", "Î©", "ê", "¦¸", "ƒ¶", "½"), "Ω"),
-    **dict.fromkeys(("Âµ", "Î¼", "æ", "¦Ì", "ƒÊ"), "µ"),
-    "Â°": "°",
-}
-#: Units a thousand times smaller, with which one is confused.
-_SMALLER = {"V": "mV", "mA": "µA"}
-#: Marks between a name and its unit, where there are no brackets.
-_BETWEEN = ("/", ",", " in ", " ", "_")
 
 
 def _unit(text: str) -> _Unit | None:
     """Look up a unit; degrees Celsius have the quantity °C."""
     if not 0 < len(text) < 20:
         return None
-    misread = next((misread for misread in _MISREAD if misread in text), None)
+    # what µ, Ω and °C of other encodings (UTF-8 read twice, DOS, GBK, Shift-JIS, Mac) look like when
+    # a file is read as Windows' Latin-1; what is part of another stands behind it
+    of_misread = {
+        **dict.fromkeys(("â„ƒ", "øC", "¡æ", "¡ãC", "�Ž", "�‹C", "¡C"), "°C"),
+        **dict.fromkeys(("â„¦", "Î©", "ê", "¦¸", "ƒ¶", "½"), "Ω"),
+        **dict.fromkeys(("Âµ", "Î¼", "æ", "¦Ì", "ƒÊ"), "µ"),
+        "Â°": "°",
+    }
+    misread = next((misread for misread in of_misread if misread in text), None)
     if misread is not None:
-        text = text.replace(misread, _MISREAD[misread])
+        text = text.replace(misread, of_misread[misread])
     # one spelling for the two signs of micro, of ohm, and for the compact degree
     text = unicodedata.normalize("NFKC", text).replace(" ", "")
-    if text in _CELSIUS:
+    celsius = {"°C", "degC", "C", "oC", "celsius", "Celsius", "degreesC", "degreesCelsius"}
+    if text in celsius:
         return _Unit("°C", 0, 1.0)
     return _UNITS.get(text) or _UNIT_WORDS.get(text.casefold())
 
@@ -109,7 +110,8 @@ def is_unit(text: str) -> bool:
     (True, True, False)
     """
     unit = _unit(text.strip())
-    return unit is not None and unit.quantity not in _OF_SETTINGS
+    # those of settings stand in brackets alone: in a heading `V_s` is no voltage in seconds
+    return unit is not None and unit.quantity not in {"s", "Hz", "W", "m", "S", "J"}
 
 
 def differ(unit: str, other: str) -> bool:
@@ -145,21 +147,6 @@ def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float,
     return 10.0 ** (theirs.power - ours.power) * (theirs.factor / ours.factor), 0.0
 
 
-#: Powers of V, A, K, s and m of the quantities that properties of materials are products of.
-_POWERS = {
-    **{symbol: {symbol: 1} for symbol in ("V", "A", "K", "s", "m")},
-    "ohm": {"V": 1, "A": -1},
-    "S": {"A": 1, "V": -1},
-    "W": {"V": 1, "A": 1},
-    "J": {"V": 1, "A": 1, "s": 1},
-    "1": {},
-}
-#: Numbers that stand among units.
-_NUMBERS = {"1": _Unit("1", 0, 1.0), "%": _Unit("1", -2, 1.0)}
-_FACTOR = re.compile(r"([^\d\s^*·./()-]+|%|1(?!\d))(?:\^|\*\*)?([+-]?\d+)?")
-_RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-
-
 def product_conversion(unit: str, inside: str) -> float | None:
     """Return the factor from one product of units to another; None if they are of other kinds.
 
@@ -178,24 +165,35 @@ def product_conversion(unit: str, inside: str) -> float | None:
 
 def _product(text: str) -> tuple[dict[str, int], float] | None:
     """Return the powers of V, A, K, s and m in a product of units, and what one of it is."""
-    text = unicodedata.normalize("NFKC", text.translate(_RAISED)).strip()
+    plain = text.translate(str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-"))
+    text = unicodedata.normalize("NFKC", plain).strip()
     # written together: metres or centimetres, and kelvins
     text = re.sub(r"(ohm|Ω)(c?m)\b", r"\1 \2", text)
     text = re.sub(r"\b([cmµμ]?m(?:\^?[23])?)K\b", r"\1 K", text)
     above, slash, below = text.partition("/")
     powers: dict[str, int] = {}
     scale = 1.0
+    numbers = {"1": _Unit("1", 0, 1.0), "%": _Unit("1", -2, 1.0)}
+    powers_of = {
+        **{symbol: {symbol: 1} for symbol in ("V", "A", "K", "s", "m")},
+        "ohm": {"V": 1, "A": -1},
+        "S": {"A": 1, "V": -1},
+        "W": {"V": 1, "A": 1},
+        "J": {"V": 1, "A": 1, "s": 1},
+        "1": {},
+    }
+    factor = re.compile(r"([^\d\s^*·./()-]+|%|1(?!\d))(?:\^|\*\*)?([+-]?\d+)?")
     for part, sign in ((above, 1), (below.strip(" ()") if slash else "", -1)):
-        rest = _FACTOR.sub("", part).strip(" *·.()")
+        rest = factor.sub("", part).strip(" *·.()")
         if rest or "/" in part:
             return None
-        for symbol, exponent in _FACTOR.findall(part):
-            unit = _UNITS.get(symbol) or _NUMBERS.get(symbol)
-            if unit is None or unit.quantity not in _POWERS:
+        for symbol, exponent in factor.findall(part):
+            unit = _UNITS.get(symbol) or numbers.get(symbol)
+            if unit is None or unit.quantity not in powers_of:
                 return None
             times = sign * int(exponent or 1)
             scale *= (unit.factor * 10.0**unit.power) ** times
-            for name, each in _POWERS[unit.quantity].items():
+            for name, each in powers_of[unit.quantity].items():
                 powers[name] = powers.get(name, 0) + times * each
     return {name: power for name, power in powers.items() if power}, scale
 
@@ -224,7 +222,8 @@ def name_and_unit(heading: str) -> tuple[str, str | None]:
     bracket = re.search(r"[(\[{<]", heading)
     if bracket is not None and heading[-1:] in (")", "]", "}", ">"):
         return heading[: bracket.start()].strip(" _/,"), heading[bracket.end() : -1].strip()
-    for mark in _BETWEEN:
+    # marks between a name and its unit, where there are no brackets
+    for mark in ("/", ",", " in ", " ", "_"):
         name, _, unit = heading.rpartition(mark)
         name, unit = name.strip(" _/,"), unit.strip()
         if name and is_unit_of(name, unit):
@@ -264,7 +263,8 @@ def plain_minus(text: str) -> str:
     >>> plain_minus("−1.5e–3")
     '-1.5e-3'
     """
-    return text if text.isascii() else _MINUS.sub("-", text)
+    # hyphens, dashes, minus signs; what U+2212 and the en dash look like read as Windows' Latin-1
+    return text if text.isascii() else re.sub("[‐‑‒–—−﹣－]|âˆ’|â€“", "-", text)
 
 
 def quantity(text: str) -> tuple[float | None, str]:
@@ -407,7 +407,7 @@ def plausible(where: str, unit: str, value: float, low: float, high: float) -> N
     """
     if low <= value <= high:
         return
-    smaller = _SMALLER.get(unit)
+    smaller = {"V": "mV", "mA": "µA"}.get(unit)
     if value < 0:
         cause = "is the sign wrong?"
     elif smaller and high < value <= 1e3 * high:

@@ -311,7 +311,7 @@ def test_the_worst_failure_decides_the_exit_status():
     ],
 )
 def test_requests_for_many_levers_that_cannot_be_met(run, monkeypatch, arguments, message):
-    monkeypatch.setattr("hotlever.cluster._PATIENCE_S", 1)
+    monkeypatch.setattr("hotlever.cluster.ClusterExecutor.patience", Patience(scheduler_s=1.0))
     for name in ("a.csv", "b.csv"):
         Path(name).write_text("V_b (V),I_h (mA)\n1,0.1\n")
     status, out, err = run("fit", "a.csv", "b.csv", *arguments)

@@ -14,6 +14,7 @@ import pytest
 from corpus import NUMBERS, WORDS
 from size import cases
 
+from hotlever.processes import Patience
 from limits import time_limit
 
 LIMIT_S = 20.0
@@ -255,7 +256,8 @@ def test_wrong_arguments_are_one_line(
     folder: Path, run: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr("hotlever.files.PATIENCE_S", 0.05)
-    monkeypatch.setattr("hotlever.cluster._PATIENCE_S", 0.5)
+    impatient = Patience(scheduler_s=0.5)
+    monkeypatch.setattr("hotlever.cluster.ClusterExecutor.patience", impatient)
     before, found = state(folder), []
     for case in wrong_cases(cases(CASES)):
         with time_limit(LIMIT_S):

@@ -7,7 +7,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.instruments.curve_file import CurveFile
-from hotlever.instruments.ramp import KNEE, Ramp, RampOptions
+from hotlever.instruments.ramp import Ramp, RampOptions
 from hotlever.instruments.source_meter import Reading
 from hotlever.instruments.twin import RampCurve, TwinBench, TwinOptions, drawn_from_priors
 from hotlever.lever.lever import COARSE
@@ -60,7 +60,7 @@ def test_the_tip_stays_below_the_limit_and_steps_become_finer_before_it(curve):
 
 
 def test_the_limit_may_be_the_knee(curve):
-    known = ramp([1.0], stay_below_K=KNEE)
+    known = ramp([1.0], stay_below_K="knee")
     branch = known._known.surrogate.branch
     assert known.limit_K == pytest.approx(branch.knee.tip_K)
 

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from hotlever import Lever, Probe
 from hotlever.lever.lever import COARSE
-from hotlever.report import transient_pages
-from hotlever.report.transient_pages import transient_page
+from hotlever.report.transient_pages import TransientOptions, transient_page
 
 
 @pytest.mark.slow
-def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path, monkeypatch):
+def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path):
     # few pulses and frequencies are as many pages
-    monkeypatch.setattr(transient_pages, "_COUNT", 2)
-    monkeypatch.setattr(transient_pages, "_FREQUENCIES", np.geomspace(10.0, 1e7, 7))
+    few = TransientOptions(pulses=2, frequencies=7)
     progress = []
-    page = transient_page(Lever(Probe.reference(), COARSE), lambda *steps: progress.append(steps))
+    lever = Lever(Probe.reference(), COARSE)
+    page = transient_page(lever, lambda *steps: progress.append(steps), few)
     written = page.write(tmp_path)
     text = written.read_text(encoding="utf-8")
     for heading in ("A step", "A train of pulses", "Time constants", "Small signals", "Harmonics"):

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 #: When progress is first told in a line, and how long after that again (s).
 FIRST_LINE_S, NEXT_LINE_S = 2.0, 10.0
-#: Characters of a line that says what went wrong.
-_LONGEST = 1200
 
 
 def give(result: str = "") -> None:
@@ -57,9 +55,6 @@ class _StandardError:
             sys.stderr.flush()
 
 
-_stderr = _StandardError()
-
-
 def tell(text: str) -> None:
     """Say something in one line on standard error."""
     _say(" ".join(_printable(text).split()))
@@ -78,7 +73,7 @@ def show(what: str, content: Any) -> None:
 
 
 def _say(line: str) -> None:
-    print(line, file=cast(Any, _stderr), flush=True)
+    print(line, file=cast(Any, _StandardError()), flush=True)
 
 
 def _printable(text: str) -> str:
@@ -94,10 +89,11 @@ def note(*texts: str) -> None:
 
 def fail(message: str) -> None:
     """Say what went wrong, in a line that can be read whatever it quotes."""
+    most = 1200
     if message:
-        if len(message) > _LONGEST:
+        if len(message) > most:
             # what was found stands at the beginning, what is wrong with it at the end
-            half = _LONGEST // 2
+            half = most // 2
             message = f"{message[:half]} … {message[-half:]}"
         tell(f"hotlever: {message}")
 
@@ -141,7 +137,7 @@ def progress_bars(*labels: str) -> Iterator[tuple[Progress, ...]]:
         rich.MofNCompleteColumn(),
         rich.TimeElapsedColumn(),
     )
-    console = Console(file=cast(Any, _stderr))
+    console = Console(file=cast(Any, _StandardError()))
     with rich.Progress(*columns, console=console, transient=True) as bar:
 
         def updater(label: str, visible: bool) -> Progress:

@@ -20,23 +20,20 @@ from hotlever.cli import output
 from hotlever.cli.output import fail, give
 from hotlever.errors import HotleverError, unforeseen_error
 
-#: Objects after which Python looks for those that only refer to each other.
-_ALLOCATIONS = 100_000
-#: Signals that end a command, and those that have come: a compiled module that is stopped while
-#: it is imported says something else.
-_STOPS = ("SIGINT", "SIGTERM", "SIGHUP")
+#: Signals to end that have come: a compiled module that is stopped while it is imported says
+#: something else.
 _received: list[int] = []
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line; exit status 0 done, 1 not finished, 2 the input is at fault."""
     # what modules consist of stays: looking at it again and again takes a tenth of a sweep
-    gc.set_threshold(_ALLOCATIONS)
+    gc.set_threshold(100_000)
     if arguments is None:
         arguments = sys.argv[1:]
         _keep_to_ourselves()
         sys.unraisablehook = _stop_again
-    for name in _STOPS:
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         # nohup, for one, has a command ignore a signal
         usual = (signal.SIG_DFL, signal.default_int_handler)

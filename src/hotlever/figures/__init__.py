@@ -75,31 +75,6 @@ from hotlever.lever import probe_of
 if TYPE_CHECKING:
     import xarray as xr
 
-#: The first figure counts for which a dataset holds all that is named.
-_FIGURES: dict[str, Callable[[Any], Figure]] = {
-    "apex_K current_change_mA": lambda data: contact_overview(data, probe_of(data)),
-    "state set_ohm tip_K": held_states,
-    "state set_mW tip_K": held_states,
-    "supplied_nJ air_stored_nJ bias_V lever_V reader_V tip_K": history_overview,
-    "bias_V current_mA lever_V reader_V tip_K heater_ohm": sweep_overview,
-    "dlnR_dz_per_um source_V_per_rtHz": reader_overview,
-    "impedance_real_ohm tip_per_bias_deg": small_signals,
-    "first_harmonic_V third_harmonic_V": harmonics,
-    "doping inversion_temperature": doping_profile,
-    "knee_K knee_mW knee_bias_V inversion_K": design_study,
-    "temperature along_um z_um": temperature_slices,
-    "paper_error reads_at_hottest": raman_check,
-    "loss near far": disc_between_planes,
-    "moved_nm share_nm": thermoelectric_shift,
-    "effective_sample_size quantity": posterior_corner,
-    "delta_chi_square parabola": lambda profile: profile_curves([profile]),
-    "described birge_ratio": lever_parameters,
-    "coverage largest_K": judged_calibrations,
-    "current_mA tip_K tip_stderr_K lever_V": tip_band,
-}
-#: Panels that a figure of any dataset has, curves of one of them, and characters of a label.
-_PANELS, _CURVES, _WIDE = 12, 8, 30
-
 
 def figure_of(data: xr.Dataset) -> Figure:
     """Draw a dataset that the package has made; ``data.hotlever.plot()`` does the same.
@@ -115,7 +90,29 @@ def figure_of(data: xr.Dataset) -> Figure:
     InputError
         If it holds no curve.
     """
-    for names, draw in _FIGURES.items():
+    # the first counts for which a dataset holds all that is named
+    figure_by_names = {
+        "apex_K current_change_mA": lambda data: contact_overview(data, probe_of(data)),
+        "state set_ohm tip_K": held_states,
+        "state set_mW tip_K": held_states,
+        "supplied_nJ air_stored_nJ bias_V lever_V reader_V tip_K": history_overview,
+        "bias_V current_mA lever_V reader_V tip_K heater_ohm": sweep_overview,
+        "dlnR_dz_per_um source_V_per_rtHz": reader_overview,
+        "impedance_real_ohm tip_per_bias_deg": small_signals,
+        "first_harmonic_V third_harmonic_V": harmonics,
+        "doping inversion_temperature": doping_profile,
+        "knee_K knee_mW knee_bias_V inversion_K": design_study,
+        "temperature along_um z_um": temperature_slices,
+        "paper_error reads_at_hottest": raman_check,
+        "loss near far": disc_between_planes,
+        "moved_nm share_nm": thermoelectric_shift,
+        "effective_sample_size quantity": posterior_corner,
+        "delta_chi_square parabola": lambda profile: profile_curves([profile]),
+        "described birge_ratio": lever_parameters,
+        "coverage largest_K": judged_calibrations,
+        "current_mA tip_K tip_stderr_K lever_V": tip_band,
+    }
+    for names, draw in figure_by_names.items():
         if all(name in data.variables for name in names.split()):
             return draw(data)
     return _every_quantity(data)
@@ -128,7 +125,7 @@ def _every_quantity(data: xr.Dataset) -> Figure:
         for name, values in data.data_vars.items()
         if values.dtype.kind in "fi" and 1 <= values.ndim <= 2 and values.notnull().any()
     }
-    drawn = dict(list(drawn.items())[:_PANELS])
+    drawn = dict(list(drawn.items())[:12])
     if not drawn:
         raise InputError("found a dataset without curves, expected one of the package")
     columns = min(len(drawn), 3)
@@ -148,7 +145,7 @@ def _panel(axes: Axes, name: str, values: xr.DataArray) -> None:
     along, *others = sorted(map(str, values.dims), key=lambda dim: -values.sizes[dim])
     curves = values.transpose(*others, along).values.reshape(-1, values.sizes[along])
     x = values[along] if values[along].dtype.kind in "fi" else np.arange(values.sizes[along])
-    for number, curve in enumerate(curves[:_CURVES]):
+    for number, curve in enumerate(curves[:8]):
         label = f"{others[0]} {values[others[0]].values[number]}" if others else None
         axes.plot(x, curve, ".-", label=label, color=COLOURS[number % len(COLOURS)])
     axes.set(xlabel=_label(along, values[along]), ylabel=_label(name, values))
@@ -158,4 +155,4 @@ def _panel(axes: Axes, name: str, values: xr.DataArray) -> None:
 
 def _label(name: str, values: xr.DataArray) -> str:
     meaning, unit = values.attrs.get("long_name", name), values.attrs.get("units", "1")
-    return fill(meaning if unit == "1" else f"{meaning} ({unit})", _WIDE)
+    return fill(meaning if unit == "1" else f"{meaning} ({unit})", 30)

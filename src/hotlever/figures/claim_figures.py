@@ -19,16 +19,6 @@ from hotlever.types import Array
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Marker of each shape, colour of each type of the heater.
-_BY_SHAPE, _BY_DOPANT = {"three-leg": "o", "u-shape": "s"}, {"n": BLUE, "p": VERMILION}
-#: Slopes (K/mW) that are marked, and ratios of published and predicted numbers.
-_SLOPES = (50, 100, 150, 200, 300, 400, 600, 800)
-_RATIOS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
-#: Colour of each verdict.
-_BY_VERDICT = {"inside 68 %": GREEN, "inside 95 %": ORANGE, "outside": VERMILION}
-#: Inches for each published number, and above and below them.
-_EACH, _MORE = 0.24, 0.9
-
 
 def disc_between_planes(loss: xr.Dataset) -> Figure:
     """Draw the loss of a disc between two planes over their distance (paper's Fig. 8)."""
@@ -99,27 +89,35 @@ def linear_branches(study: xr.Dataset, regression: Regression, spread_K: float) 
         ends = [np.nanmin(expected), np.nanmax(expected)]
         slope.plot(ends, ends, color="0.5", lw=0.8)
         slope.set(xscale="log", yscale="log")
-        ticks = [tick for tick in _SLOPES if ends[0] < 1.2 * tick and tick < 1.2 * ends[1]]
+        ticks = [
+            tick
+            for tick in (50, 100, 150, 200, 300, 400, 600, 800)
+            if ends[0] < 1.2 * tick and tick < 1.2 * ends[1]
+        ]
         for axis in (slope.xaxis, slope.yaxis):
             axis.set_ticks(ticks, [f"{tick}" for tick in ticks])
             axis.set_ticks([], minor=True)
         slope.set(xlabel="slope by the regression (K/mW)", ylabel="slope (K/mW)")
-        for shape, mark in _BY_SHAPE.items():
-            for dopant, colour in _BY_DOPANT.items():
-                name = f"{shape}, {dopant}-type"
-                slope.plot([], [], ls="none", marker=mark, color=colour, label=name)
+        for shape, mark, dopant, colour in _kinds():
+            name = f"{shape}, {dopant}-type"
+            slope.plot([], [], ls="none", marker=mark, color=colour, label=name)
         slope.legend(loc="upper left")
     return fig
 
 
 def _by_kind(axes: Axes, study: xr.Dataset, x: Any, y: Any, *, fill: bool) -> None:
     """Mark points by shape and dopant."""
-    for shape, mark in _BY_SHAPE.items():
-        for dopant, colour in _BY_DOPANT.items():
-            here = ((study["shape"] == shape) & (study.dopant == dopant)).values
-            face = colour if fill else "none"
-            style: Any = {"ls": "none", "marker": mark, "color": colour, "mfc": face, "alpha": 0.8}
-            axes.plot(np.asarray(x)[here], np.asarray(y)[here], **style)
+    for shape, mark, dopant, colour in _kinds():
+        here = ((study["shape"] == shape) & (study.dopant == dopant)).values
+        face = colour if fill else "none"
+        style: Any = {"ls": "none", "marker": mark, "color": colour, "mfc": face, "alpha": 0.8}
+        axes.plot(np.asarray(x)[here], np.asarray(y)[here], **style)
+
+
+def _kinds() -> list[tuple[str, str, str, str]]:
+    """Return shapes with their markers, each with types of the heater and their colours."""
+    shapes, dopants = (("three-leg", "o"), ("u-shape", "s")), (("n", BLUE), ("p", VERMILION))
+    return [(*shape, *dopant) for shape in shapes for dopant in dopants]
 
 
 def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: float) -> Figure:
@@ -223,7 +221,9 @@ def predicted_and_published(cases: xr.Dataset) -> Figure:
         From `hotlever.studies.validation.prediction.comparison`.
     """
     cases = cases.sortby("group")
-    with figure(7.4, _EACH * cases.sizes["case"] + _MORE) as (fig, axes):
+    colour_by_verdict = {"inside 68 %": GREEN, "inside 95 %": ORANGE, "outside": VERMILION}
+    # so many inches for each published number, and some above and below them
+    with figure(7.4, 0.24 * cases.sizes["case"] + 0.9) as (fig, axes):
         rows = np.arange(cases.sizes["case"])[::-1]
         low, high, middle = (
             (cases[name] / cases.predicted).values for name in ("low_95", "high_95", "published")
@@ -233,13 +233,17 @@ def predicted_and_published(cases: xr.Dataset) -> Figure:
         error = (cases.published_error / cases.predicted).values
         # as a share, below and above, so that what is uncertain to all of it stays on the page
         lower = middle - middle / (1.0 + error / middle)
-        for verdict, colour in _BY_VERDICT.items():
+        for verdict, colour in colour_by_verdict.items():
             of = (cases.verdict == verdict).values
             style: Any = {"fmt": "o", "color": colour, "lw": 1.2, "label": f"published, {verdict}"}
             axes.errorbar(middle[of], rows[of], xerr=[lower[of], error[of]], **style)
         axes.axvline(1.0, color="0.5", lw=0.6)
         axes.set(xscale="log", xlabel="over the predicted median", ylim=(-0.6, len(rows) - 0.4))
-        ticks = [tick for tick in _RATIOS if low.min() < tick < high.max()]
+        ticks = [
+            tick
+            for tick in (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
+            if low.min() < tick < high.max()
+        ]
         axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.set_xticks([], minor=True)
         axes.set_yticks(rows, cases.case.values)

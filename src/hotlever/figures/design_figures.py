@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
     from hotlever.studies.optimisation import OptimalDesign
 
-#: Contours of a map, about.
-_LEVELS = 8
-
 
 def design_study(data: xr.Dataset) -> Figure:
     """Draw what follows from a design against the number, or the two, that were varied.
@@ -77,7 +74,7 @@ def _contours(fig: Figure, axes: Axes, values: xr.DataArray, label: str) -> None
     missing = np.ma.masked_where(is_known, np.zeros(is_known.shape))
     axes.pcolor(across, up, missing, shading="nearest", lw=0.0, **hatched)
     if np.ptp(values.values[is_known]) > 0.0:
-        levels: Any = {"levels": _LEVELS}
+        levels: Any = {"levels": 8}
         filled = axes.contourf(across, up, values.values, **levels)
         lines = axes.contour(across, up, values.values, colors="white", linewidths=0.7, **levels)
         axes.clabel(lines, fontsize=7)

@@ -25,7 +25,7 @@ from hotlever.estimate.tip_table import PulseCalibration
 from hotlever.figures.style import (
     LINES,
     MEASURED,
-    MOST_NAMES,
+    are_numbered,
     axis_label,
     curve,
     entitle,
@@ -44,11 +44,6 @@ from hotlever.types import Array
 
 if TYPE_CHECKING:
     import xarray as xr
-
-#: Blue over white, as transparent colours cannot be stacked in filled contours.
-_LIGHT, _DARK = "#BFDBEB", "#5DA5CC"
-#: Quantiles of a band, for those that are stated by a standard error.
-_QUANTILES = (0.025, 0.16, 0.5, 0.84, 0.975)
 
 
 def data_and_model(
@@ -179,7 +174,9 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
         by_bias, by_power, middle_name = band.tip_K.values, band.tip_at_power_K.values, "median"
     else:
         stated = _stated(band)
-        away = ndtri(_QUANTILES)[:, None] * band.tip_stderr_K.fillna(0.0).values
+        away = (
+            ndtri((0.025, 0.16, 0.5, 0.84, 0.975))[:, None] * band.tip_stderr_K.fillna(0.0).values
+        )
         by_bias = by_power = band.tip_K.values + away
         middle_name = "prediction" if stated else "the nearest lever"
     panels = [("bias", by_bias, "bias V$_b$ (V)")]
@@ -276,6 +273,8 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
     labels = {name: parameter_label(name) for name in names}
     values = {name: posterior[name].values.ravel() / labels[name][1] for name in names}
     marks = {name: value / labels[name][1] for name, value in (optimum or {}).items()}
+    # blue over white, as transparent colours cannot be stacked in filled contours
+    light, dark = "#BFDBEB", "#5DA5CC"
     size = 1.3 * len(names) + 0.8
     with figure(size, size, len(names), len(names), squeeze=False) as (fig, grid):
         for (row, column), axes in np.ndenumerate(grid):
@@ -286,7 +285,7 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
             if row == column:
                 _histogram(axes, values[across])
             else:
-                _pair(axes, values[across], values[down])
+                _pair(axes, values[across], values[down], (light, dark))
                 axes.set(xlim=_range(values[across]), ylim=_range(values[down]))
                 axes.yaxis.set_major_locator(MaxNLocator(3))
             axes.grid(False)
@@ -304,7 +303,7 @@ def posterior_corner(posterior: xr.Dataset, optimum: Mapping[str, float] | None 
                 axes.set_ylabel(labels[down][0])
         fig.align_labels()
         entitle(fig, posterior)
-        handles = [Patch(color=_DARK, label="68 %"), Patch(color=_LIGHT, label="95 %")]
+        handles = [Patch(color=dark, label="68 %"), Patch(color=light, label="95 %")]
         if marks:
             handles.append(Patch(color=VERMILION, label="optimum of the fit"))
         fig.legend(handles=handles, loc="upper right", fontsize=10)
@@ -325,8 +324,8 @@ def _range(values: Array) -> tuple[float, float]:
     return float(low - margin), float(high + margin)
 
 
-def _pair(axes: Axes, x: Array, y: Array) -> None:
-    """Draw the smallest regions that hold 68 and 95 % of the samples."""
+def _pair(axes: Axes, x: Array, y: Array, colours: tuple[str, str]) -> None:
+    """Draw the smallest regions that hold 95 and 68 % of the samples."""
     counts, x_edges, y_edges = np.histogram2d(x, y, bins=40, range=(_range(x), _range(y)))
     smooth = gaussian_filter(counts, 1.5)
     falling = np.sort(smooth.ravel())[::-1]
@@ -335,7 +334,7 @@ def _pair(axes: Axes, x: Array, y: Array) -> None:
     middles = [(edges[1:] + edges[:-1]) / 2 for edges in (x_edges, y_edges)]
     if 0.0 < outer < inner < falling[0]:
         levels = [outer, inner, falling[0]]
-        axes.contourf(*middles, smooth.T, levels=levels, colors=[_LIGHT, _DARK])
+        axes.contourf(*middles, smooth.T, levels=levels, colors=colours)
 
 
 def lever_parameters(levers: xr.Dataset) -> Figure:
@@ -347,7 +346,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
         From `hotlever.estimate.levers.compare_levers`; without what was held.
     """
     count = levers.sizes["lever"]
-    many = count > MOST_NAMES
+    many = are_numbered(count)
     determined = (np.isfinite(levers.stderr) & levers.counts).any("lever")
     free = levers.quantity.values[determined.values].tolist()
     height, shape = 1.2 * len(free) + (0.8 if many else 1.2), {"sharex": True, "squeeze": False}
@@ -371,21 +370,6 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
     return fig
 
 
-#: What levers are compared by.
-_COMPARED = ("tip_K", "knee_lever_V", "knee_current_mA", "knee_power_mW")
-#: What is drawn of a tip in contact.
-_OF_THE_CONTACT = {"apex_K": ("apex", GREEN), "surface_K": ("the sample under it", VERMILION)}
-#: Colour of each way of calibrating.
-_BY_WAY = (BLUE, GREEN, ORANGE, VERMILION)
-#: How each kind of measurement is marked, and colours of errors, now and after more of them.
-_MARKS: dict[str, Any] = {
-    "bias": {"marker": "o", "color": BLUE},
-    "reader": {"marker": "s", "color": GREEN},
-    "spectra": {"marker": "^", "color": PURPLE},
-}
-_BY_ADDED = (BLACK, ORANGE, GREEN, BLUE, SKY)
-
-
 def calibration_curves(calibration: Estimate) -> Figure:
     """Draw the tip temperature against power and bias with its band, the knee and the budget.
 
@@ -396,6 +380,7 @@ def calibration_curves(calibration: Estimate) -> Figure:
     table, knee, described = calibration.table, calibration.knee, calibration.describes_data
     power = table.power_mW
     measured = calibration.measurement.dataset(calibration.probe.circuit)
+    of_the_contact = {"apex_K": ("apex", GREEN), "surface_K": ("the sample under it", VERMILION)}
     with figure(8.0, 6.0, 2, 2, letters=True) as (fig, grid):
         by_power, by_bias, iv, budget = grid.ravel()
         entitle(fig, more=calibration.probe.title, is_described=bool(described))
@@ -408,7 +393,7 @@ def calibration_curves(calibration: Estimate) -> Figure:
                 axes.fill_between(table[along], low, high, color=SKY, alpha=0.6, lw=0)
             curve(axes, table, along, "tip_K", color=BLUE, label=name)
             curve(axes, measured, along, "tip_K", **MEASURED)
-            for column, (label, colour) in _OF_THE_CONTACT.items():
+            for column, (label, colour) in of_the_contact.items():
                 if column in table:
                     curve(axes, table, along, column, color=colour, label=label)
                 if column in measured:
@@ -473,7 +458,9 @@ def calibrated_levers(calibrations: Mapping[str, Estimate], levers: xr.Dataset) 
             axes.set(xlabel=axis_label(along))
         if not many:
             fig.legend(*curves.get_legend_handles_labels(), loc="outside lower center", ncols=6)
-        for name, axes in zip(_COMPARED, by_lever, strict=True):
+        for name, axes in zip(
+            ("tip_K", "knee_lever_V", "knee_current_mA", "knee_power_mW"), by_lever, strict=True
+        ):
             values_by_lever(axes, levers.sel(quantity=name))
             axes.set(ylabel=levers.heading.sel(quantity=name).item(), xlim=(0.5, count + 0.5))
             if many:
@@ -494,9 +481,10 @@ def judged_calibrations(judged: xr.Dataset) -> Figure:
     largest, other = abs(judged.off_K).max("row"), judged.other_law.values
     ratio = (judged.off_K.sel(way=ESTIMATE) / judged.stated_K).transpose("lever", "row")
     laws = [law for law in (False, True) if law in other]
+    colours = (BLUE, GREEN, ORANGE, VERMILION)
     with figure(8.0, 3.8, 1, 2, letters=True) as (fig, (by_way, by_bias)):
         beside: Any = {"transform": by_way.get_yaxis_transform(), "va": "center", "fontsize": 8}
-        for row, (way, colour) in enumerate(zip(WAYS, _BY_WAY, strict=True)):
+        for row, (way, colour) in enumerate(zip(WAYS, colours, strict=True)):
             for law in laws:
                 at = row + (0.2 if law else -0.2) * (len(laws) - 1)
                 here = largest.sel(way=way).values[other == law]
@@ -519,8 +507,8 @@ def judged_calibrations(judged: xr.Dataset) -> Figure:
             for errors in ratio.values[other == law]:
                 finite = errors[np.isfinite(errors)]
                 share = np.linspace(0.0, 1.0, finite.size)
-                by_bias.plot(share, finite, color=_BY_WAY[0], ls=marks["ls"], lw=0.9)
-            by_bias.plot([], [], color=_BY_WAY[0], ls=marks["ls"], label=label)
+                by_bias.plot(share, finite, color=colours[0], ls=marks["ls"], lw=0.9)
+            by_bias.plot([], [], color=colours[0], ls=marks["ls"], label=label)
         by_bias.axhline(0.0, color=BLACK, lw=0.8)
         by_bias.set(xlim=(0, 1), xlabel="bias V$_b$ (above 400 K)")
         by_bias.set(ylabel="error of the estimate (stated errors)")
@@ -573,9 +561,16 @@ def planned_measurements(plan: Plan) -> Figure:
     finite = np.isfinite(errors.tip_limit_K.values)
     kinds = proposals.what.values.tolist()
     counts = Counter(zip(kinds, proposals.bias_V.values.tolist(), strict=True))
+    style_by_kind = {
+        "bias": {"marker": "o", "color": BLUE},
+        "reader": {"marker": "s", "color": GREEN},
+        "spectra": {"marker": "^", "color": PURPLE},
+    }
     with figure(8.0, 3.8, 1, 2, letters=True) as (fig, (by_tip, by_bias)):
         entitle(fig, more=plan.lever)
-        for added, colour in zip(errors.added.values.tolist(), cycle(_BY_ADDED), strict=False):
+        for added, colour in zip(
+            errors.added.values.tolist(), cycle((BLACK, ORANGE, GREEN, BLUE, SKY)), strict=False
+        ):
             label = f"after {added} more" if added else "now"
             stderr = errors.tip_stderr_K.sel(added=added)
             by_tip.plot(errors.tip_K[finite], stderr[finite], color=colour, label=label)
@@ -594,13 +589,13 @@ def planned_measurements(plan: Plan) -> Figure:
         for (kind, bias), times in counts.items():
             tip = float(np.interp(bias, errors.bias, errors.tip_K))
             stderr_K = float(np.interp(bias, errors.bias, last))
-            style = {"ls": "none", "ms": 7.0, "mec": "white", **_MARKS[kind], "zorder": 3}
+            style = {"ls": "none", "ms": 7.0, "mec": "white", **style_by_kind[kind], "zorder": 3}
             for axes, at in ((by_bias, (bias, tip)), (by_tip, (tip, stderr_K))):
                 axes.plot(*at, **style)
                 if times > 1:
                     axes.annotate(f" {times}×", at, fontsize=7, va="top")
         for kind in dict.fromkeys(kinds):
-            by_bias.plot([], [], ls="none", label=f"{kind}, proposed", **_MARKS[kind])
+            by_bias.plot([], [], ls="none", label=f"{kind}, proposed", **style_by_kind[kind])
         by_tip.set(xlabel=axis_label("tip_K"), ylabel="standard error (K)", ylim=(0, None))
         by_bias.set(xlabel=axis_label("bias_V"), ylabel=axis_label("tip_K"))
         for axes in (by_tip, by_bias):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,22 +13,10 @@ from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, VERMILION
 from hotlever.figures.style import beside, figure, parameter_label
 from hotlever.studies.published_lever.ensemble import ANY, Ensemble
 from hotlever.studies.published_lever.layouts import REFERENCE
+from hotlever.types import Array
 
 if TYPE_CHECKING:
     import xarray as xr
-
-#: Inches for each row, and above and below them.
-_EACH, _MORE = 0.27, 1.0
-#: Area of a marker of weight one, and the least.
-_AREA, _LEAST = 600.0, 8.0
-#: Lengths and widths (µm) that are marked.
-_LENGTHS, _SIZES = (25, 40, 60, 100), (1.5, 2, 3, 5, 10)
-#: Dimensions that are drawn by the length.
-_WIDTHS = {
-    "centre_leg_width_um": ("o", BLUE),
-    "outer_leg_width_um": ("s", GREEN),
-    "heater_width_um": ("^", VERMILION),
-}
 
 
 def printed_statements(found: Ensemble) -> Figure:
@@ -41,8 +30,8 @@ def printed_statements(found: Ensemble) -> Figure:
     names = [str(name) for name in deviations.statement.values]
     rows = np.arange(len(names))
     drawn = found.numbers.drawn.values
-    areas = _LEAST + _AREA * found.weights.sel(size=ANY).values[drawn]
-    with figure(7.6, _EACH * len(names) + _MORE) as (fig, axes):
+    areas = _areas(found)
+    with figure(7.6, _height(names)) as (fig, axes):
         for row, name in enumerate(names):
             values = deviations.sel(statement=name).values[drawn]
             style: Any = {"color": BLUE, "alpha": 0.35, "edgecolors": "none"}
@@ -67,11 +56,18 @@ def layouts_by_length(found: Ensemble) -> Figure:
     found : Ensemble
     """
     numbers, drawn = found.numbers, found.numbers.drawn.values
-    areas = _LEAST + _AREA * found.weights.sel(size=ANY).values[drawn]
+    areas = _areas(found)
     length = numbers.length_um.values
     nearest, reference = (found.names.index(name) for name in (found.nearest, REFERENCE))
+    lengths = (25, 40, 60, 100)
+    marked = (1.5, 2, 3, 5, 10)
+    marks = {
+        "centre_leg_width_um": ("o", BLUE),
+        "outer_leg_width_um": ("s", GREEN),
+        "heater_width_um": ("^", VERMILION),
+    }
     with figure(8.4, 3.4, 1, 2, letters=True) as (fig, (widths, air)):
-        for name, (marker, colour) in _WIDTHS.items():
+        for name, (marker, colour) in marks.items():
             values = numbers[name].values
             label = parameter_label(name)[0].partition(" (")[0]
             style: Any = {"color": colour, "alpha": 0.5, "edgecolors": "none"}
@@ -79,7 +75,7 @@ def layouts_by_length(found: Ensemble) -> Figure:
             widths.plot(length[nearest], values[nearest], "D", color=ORANGE)
             widths.plot(length[reference], values[reference], "x", color=BLACK)
         widths.set(xscale="log", yscale="log", xlabel="length (µm)", ylabel="width (µm)")
-        widths.set_yticks(_SIZES, map(str, _SIZES))
+        widths.set_yticks(marked, map(str, marked))
         widths.legend()
         columns = {
             "k_400": ("400 K", BLUE),
@@ -95,10 +91,20 @@ def layouts_by_length(found: Ensemble) -> Figure:
         air.axvline(paper.SPHERE_UM, color="0.6", lw=0.8)
         air.set(xscale="log", xlabel="length (µm)", ylabel="power in air over that in vacuum")
         for axes in (widths, air):
-            axes.set_xticks(_LENGTHS, map(str, _LENGTHS))
+            axes.set_xticks(lengths, map(str, lengths))
             axes.minorticks_off()
         beside(air)
     return fig
+
+
+def _areas(found: Ensemble) -> Array:
+    """Return the areas of the markers of layouts that are drawn, by their weight."""
+    return np.asarray(8.0 + 600.0 * found.weights.sel(size=ANY).values[found.numbers.drawn.values])
+
+
+def _height(rows: Sequence[str]) -> float:
+    """Return how high (inches) a figure of some rows is."""
+    return 0.27 * len(rows) + 1.0
 
 
 def knee_carried(carried: xr.Dataset, nearest: str, discrepancy_K: float) -> Figure:
@@ -115,7 +121,7 @@ def knee_carried(carried: xr.Dataset, nearest: str, discrepancy_K: float) -> Fig
     """
     names = [str(name) for name in carried.suspect.values]
     rows = np.arange(len(names))
-    with figure(7.8, _EACH * len(names) + _MORE) as (fig, axes):
+    with figure(7.8, _height(names)) as (fig, axes):
         for column, aside, colour, label in (
             ("moved_K", -0.2, "0.7", "model not fitted"),
             ("shift_K", 0.2, BLUE, "model fitted"),

@@ -48,20 +48,8 @@ if TYPE_CHECKING:
 
     from hotlever.lever.lever import Lever, State
 
-#: Most of the lever that is magnified, as a share of its length.
-_MAGNIFIED = 0.3
-#: Frames of a film per second, and how fine these are (dots per inch).
-_PER_SECOND, _DPI = 20, 100
-#: Colours of a film: those of the scale, and from black and that of the trace to white.
-_COLOURS = np.concatenate(
-    [
-        mpl.colormaps[HEAT](np.linspace(0.0, 1.0, 204))[:, :3],
-        np.linspace((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 32),
-        np.linspace(to_rgb(VERMILION), (1.0, 1.0, 1.0), 20),
-    ]
-)
-#: Rises above the base temperature at which isotherms are drawn, as a share of the tip's.
-ISOTHERMS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8)
+#: Frames of a film per second.
+_PER_SECOND = 20
 
 
 def field_maps(state: State) -> Figure:
@@ -88,7 +76,8 @@ def field_maps(state: State) -> Figure:
         ("current density (mA/µm²)", density, "cividis", LogNorm(strong * 1e-3, strong)),
     )
     what, size, centre = "heater", layout.heater.sides.max(), layout.heater.box.mean(axis=0)
-    most = _MAGNIFIED * np.ptp(layout.box, axis=0).max()
+    # no more than this of the lever is magnified
+    most = 0.3 * np.ptp(layout.box, axis=0).max()
     if size > most:  # where all of the conductor heats
         what, size, centre = "tip", most, np.array(layout.tip)
     with figure(7.0, 6.8, 3, 2, width_ratios=(1.75, 1.0)) as (fig, grid):
@@ -184,7 +173,9 @@ def temperature_slices(slices: xr.Dataset) -> Figure:
         From `hotlever.lever3d.fields.temperature_slices`.
     """
     base, tip = slices.attrs["base_K"], slices.attrs["tip_K"]
-    levels = [base + share * (tip - base) for share in ISOTHERMS]
+    # isotherms at these rises above the base temperature, as shares of the tip's
+    shares = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8)
+    levels = [base + share * (tip - base) for share in shares]
     with figure(7.2, 6.4, 2, 2, letters=True) as (fig, grid):
         for axes, name in zip(grid.ravel(), slices.slice.values, strict=True):
             cut = slices.sel(slice=name)
@@ -250,7 +241,7 @@ def pulse_film(history: xr.Dataset, states: Sequence[tuple[float, State]]) -> Fu
         (now,) = below.plot([], [], "o", color="black", ms=6)
         fig.suptitle(f"{lever.probe.title}, {history.attrs['waveform']}", x=0.01, ha="left")
         at = above.set_title(f"{states[-1][0]:.4g} µs")
-        fig.set_dpi(_DPI)
+        fig.set_dpi(100)
         fig.draw_without_rendering()
         fig.set_layout_engine("none")  # from here on nothing but the state changes
         # outlines are over the temperature
@@ -294,7 +285,8 @@ def save_film(
             progress(frame + 1, frames)
 
     with mpl.rc_context(STYLE), whole_file(path) as temporary:
-        film.save(temporary, _Writer(_PER_SECOND), dpi=_DPI, progress_callback=report_frame)
+        dpi: Any = "figure"  # that of its own
+        film.save(temporary, _Writer(_PER_SECOND), dpi=dpi, progress_callback=report_frame)
 
 
 class _Writer(PillowWriter):
@@ -325,7 +317,15 @@ class _Writer(PillowWriter):
     def finish(self) -> None:
         """Write the film."""
         colours = Image.new("P", (1, 1))
-        colours.putpalette((255 * _COLOURS).round().astype(np.uint8).tobytes())
+        # those of the scale, and from black and that of the trace to white
+        of_film = np.concatenate(
+            [
+                mpl.colormaps[HEAT](np.linspace(0.0, 1.0, 204))[:, :3],
+                np.linspace((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 32),
+                np.linspace(to_rgb(VERMILION), (1.0, 1.0, 1.0), 20),
+            ]
+        )
+        colours.putpalette((255 * of_film).round().astype(np.uint8).tobytes())
         self._frames = [
             frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in self._frames
         ]

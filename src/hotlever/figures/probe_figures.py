@@ -21,14 +21,6 @@ from hotlever.figures.style import COLOURS, figure
 from hotlever.materials import HIGH_DOPED
 from hotlever.probe import Layout, ProbeMesh, Region
 
-Ring = Sequence[tuple[float, float]]
-#: Characters of a title that have room above a drawing.
-_TITLE = 90
-#: Axes of the plane of a lever.
-_PLANE: Any = {"aspect": "equal", "xlabel": "x (µm)", "ylabel": "y (µm)"}
-#: Room around a drawing as a share of its extent, and a terminal's name over its height.
-_MARGIN, _NAME = 0.04, 0.33
-
 
 def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = None) -> Figure:
     """Draw a probe from above, with heater, reader, terminals and tip marked, or its mesh too."""
@@ -38,9 +30,9 @@ def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = N
             x, y = mesh.elements.p
             axes.triplot(Triangulation(x, y, mesh.elements.t.T), color="0.25", lw=0.25)
         low, high = layout.box
-        margin = _MARGIN * max(high - low)
+        margin = 0.04 * max(high - low)
         # beside a lever that is as wide as long names take more of its size
-        name_um = max(5 * margin, _NAME * (high - low)[1]), 5 * margin
+        name_um = max(5 * margin, 0.33 * (high - low)[1]), 5 * margin
         room = np.full((2, 2), margin)  # before and behind, in x and y
         for name, edges in groupby(layout.terminals, lambda terminal: terminal.name):
             ends = np.array([(edge.start, edge.end) for edge in edges])
@@ -59,9 +51,9 @@ def probe_drawing(layout: Layout, title: str = "", *, mesh: ProbeMesh | None = N
         handles["terminal"] = Line2D([], [], color=BLUE, lw=4, label="terminal (base temperature)")
         (handles["tip"],) = axes.plot(*layout.tip, "^", color=BLACK, label="tip")
         (left, below), (right, above) = low - room[0], high + room[1]
-        axes.set(**_PLANE, xlim=(left, right), ylim=(below, above))
+        _show_plane(axes, xlim=(left, right), ylim=(below, above))
         if title:
-            fig.suptitle(fill(title, _TITLE), x=0.01, ha="left", fontsize=9, parse_math=False)
+            fig.suptitle(_wrapped(title), x=0.01, ha="left", fontsize=9, parse_math=False)
         fig.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
     return fig
 
@@ -104,12 +96,21 @@ def outlines(axes: Axes, layout: Layout) -> None:
         axes.add_patch(_patch(region, fill=False, edgecolor="0.45", lw=0.4))
     tip: Any = {"marker": "^", "mfc": "white", "mec": "black", "ms": 4, "ls": "none"}
     axes.plot(*layout.tip, label="tip", **tip)
-    axes.set(**_PLANE)
+    _show_plane(axes)
     axes.grid(False)
 
 
+def _show_plane(axes: Axes, **limits: Any) -> None:
+    axes.set(aspect="equal", xlabel="x (µm)", ylabel="y (µm)", **limits)
+
+
+def _wrapped(title: str) -> str:
+    """Break a title into lines that have room above a drawing."""
+    return fill(title, 90)
+
+
 def outlines_drawing(
-    outlines: Mapping[str, Sequence[Ring]],
+    outlines: Mapping[str, Sequence[Sequence[tuple[float, float]]]],
     title: str = "",
     *,
     tip: tuple[float, float] | None = None,
@@ -148,9 +149,9 @@ def outlines_drawing(
             ring: Any = {"mec": VERMILION, "mfc": "none", "ms": 18, "mew": 2, "ls": "none"}
             axes.plot(*fault_at, marker="o", label="at fault", **ring)
             axes.plot(*fault_at, marker="+", color=VERMILION, ms=8, mew=1.5)
-        margin = 1.5 * _MARGIN * np.ptp(points, axis=0).max()
+        margin = 0.06 * np.ptp(points, axis=0).max()
         (left, below), (right, above) = points.min(axis=0) - margin, points.max(axis=0) + margin
-        axes.set(**_PLANE, xlim=(left, right), ylim=(below, above))
-        axes.set_title(fill(fault, _TITLE) if fault else title, color=VERMILION if fault else BLACK)
+        _show_plane(axes, xlim=(left, right), ylim=(below, above))
+        axes.set_title(_wrapped(fault) if fault else title, color=VERMILION if fault else BLACK)
         fig.legend(loc="outside lower center", ncols=4)
     return fig

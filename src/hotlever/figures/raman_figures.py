@@ -19,14 +19,6 @@ from hotlever.spieser2017 import RAMAN_ERROR_K, RAMAN_ERROR_SHARE
 from hotlever.studies.raman_check import conclusion
 from hotlever.types import Array
 
-GREY = "0.4"
-#: Spectra above each other at most, and characters of the name of one.
-STACKED, _LONGEST = 9, 22
-#: Scaled intensity at which a line is cut off, as a cosmic ray would hide the next spectrum.
-_HIGHEST = 1.25
-#: The paper's error of a temperature.
-_BAND = f"±({RAMAN_ERROR_K:g} K + {RAMAN_ERROR_SHARE:g} ΔT)"
-
 
 def thermometry(
     lines: Sequence[MeasuredLine],
@@ -78,11 +70,13 @@ def _in_window(line: MeasuredLine) -> tuple[Array, Array]:
     return line.spectrum.x[inside], line.spectrum.y[inside]
 
 
-def _stack(axes: Axes, stacked: Sequence[tuple[str, MeasuredLine]]) -> None:
-    """Spectra above each other, each scaled to its line, with the fit."""
-    if len(stacked) > STACKED:
-        chosen = np.unique(np.linspace(0, len(stacked) - 1, STACKED).round().astype(int))
+def _stack(axes: Axes, stacked: Sequence[tuple[str, MeasuredLine]], most: int = 9) -> None:
+    """At most so many spectra above each other, each scaled to its line, with the fit."""
+    if len(stacked) > most:
+        chosen = np.unique(np.linspace(0, len(stacked) - 1, most).round().astype(int))
         stacked = [stacked[index] for index in chosen]
+    # a cosmic ray would hide the next spectrum
+    highest = 1.25
     for level, (label, line) in enumerate(stacked):
         x, y = _in_window(line)
         peak = line.peak
@@ -93,18 +87,18 @@ def _stack(axes: Axes, stacked: Sequence[tuple[str, MeasuredLine]]) -> None:
             y = y - peak.baseline(x)
             height = y if "saturated" in peak.flags else peak.model(x) - peak.baseline(x)
             top = float(height.max()) or 1.0
-        scaled = level + 0.75 * np.clip(y / top, None, _HIGHEST)
-        axes.plot(x, scaled, ".", ms=1.6, color=GREY, rasterized=x.size > 2000)
+        scaled = level + 0.75 * np.clip(y / top, None, highest)
+        axes.plot(x, scaled, ".", ms=1.6, color="0.4", rasterized=x.size > 2000)
         if peak is not None:
             fine = np.linspace(x[0], x[-1], 1200)
-            curve = np.clip((peak.model(fine) - peak.baseline(fine)) / top, None, _HIGHEST)
+            curve = np.clip((peak.model(fine) - peak.baseline(fine)) / top, None, highest)
             axes.plot(fine, level + 0.75 * curve, color=BLUE, lw=1.0)
-        if len(label) > _LONGEST:
-            label = f"{label[: _LONGEST // 2 - 1]}…{label[-_LONGEST // 2 :]}"
+        if len(label) > 22:
+            label = f"{label[:10]}…{label[-11:]}"
         axes.text(WINDOW[1] - 1.0, level + 0.12, label, ha="right", va="bottom", fontsize=8)
     axes.set(xlabel="Raman shift (cm⁻¹)", ylabel="intensity less background, scaled", yticks=[])
     axes.set(xlim=WINDOW, ylim=(-0.15, len(stacked) + 0.25))
-    axes.plot([], [], ".", color=GREY, label="counts")
+    axes.plot([], [], ".", color="0.4", label="counts")
     axes.plot([], [], color=BLUE, label="fit")
     axes.legend(loc="upper left")
 
@@ -127,7 +121,7 @@ def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -
         points = (measured.shift_per_cm, measured.temperature_K, measured.temperature_error_K)
         style = {"fmt": "s", "ms": 4, "color": GREEN, "capsize": 2, "lw": 1.0, "label": "measured"}
         axes.errorbar(*points, **style)
-    axes.axhspan(low, high, color=GREY, alpha=0.12, lw=0, label="calibrated range")
+    axes.axhspan(low, high, color="0.4", alpha=0.12, lw=0, label="calibrated range")
     axes.set(xlabel="shift against room temperature (cm⁻¹)", ylabel="temperature (K)")
     axes.set_xlim(float(shift.min()) - 0.5, 1.0)
     axes.invert_xaxis()
@@ -145,7 +139,7 @@ def _residuals(axes: Axes, calibration: RamanCalibration) -> None:
     grid = np.linspace(*calibration.range_K, 100)
     band = calibration.linear.band(grid - calibration.room_temperature_K)
     style: Any = {"color": VERMILION, "alpha": 0.18, "lw": 0}
-    axes.fill_between(grid, -band, band, label=f"paper: {_BAND}", **style)
+    axes.fill_between(grid, -band, band, label=f"paper: {_paper_error()}", **style)
     out = np.abs(linear) > residuals["band_K"]
     label = f"line (filled: {np.count_nonzero(out)} of {out.size} outside the band)"
     axes.plot(at, linear, "^", mfc="none", color=VERMILION, ms=5, label=label)
@@ -159,15 +153,22 @@ def _residuals(axes: Axes, calibration: RamanCalibration) -> None:
     axes.legend(ncol=2, loc="upper left")
 
 
+def _paper_error() -> str:
+    """Return the paper's error of a temperature."""
+    return f"±({RAMAN_ERROR_K:g} K + {RAMAN_ERROR_SHARE:g} ΔT)"
+
+
 def raman_check(check: xr.Dataset) -> Figure:
     """How far a line calibrated to 900 K is off above, and what that does to the knee."""
     temperature, band = check.temperature_K.values, check.paper_error.values
     hottest, predicted = check.hottest_K, check.knee_predicted_K
     low, high = check.error_at_hottest.min().item(), check.error_at_hottest.max().item()
-    bars = [("as published", check.knee_measured_K - predicted, GREY)]
+    bars = [("as published", check.knee_measured_K - predicted, "0.4")]
     with figure(7.2, 6.4, 2, 1, height_ratios=(1.7, 1.0)) as (fig, (upper, lower)):
-        style: Any = {"color": GREY, "alpha": 0.2, "lw": 0}
-        upper.fill_between(temperature, -band, band, label=f"the paper's error, {_BAND}", **style)
+        style: Any = {"color": "0.4", "alpha": 0.2, "lw": 0}
+        upper.fill_between(
+            temperature, -band, band, label=f"the paper's error, {_paper_error()}", **style
+        )
         for index, (color, dash) in enumerate(((VERMILION, "--"), (BLUE, "-."))):
             law = check.isel(line=index)
             name = str(law.line.item())
@@ -201,14 +202,14 @@ def one_spectrum(line: MeasuredLine) -> Figure:
     x, y = _in_window(line)
     residual: Array = y - float(np.median(y))
     with figure(6.0, 4.6, 2, 1, sharex=True, height_ratios=(3.0, 1.0)) as (fig, (upper, lower)):
-        upper.plot(x, y, ".", ms=3, color=GREY, label="counts")
+        upper.plot(x, y, ".", ms=3, color="0.4", label="counts")
         if line.peak is not None:
             residual = _fitted(upper, line.peak, x, y)
         low, high = line.window
         if line.window != WINDOW:
             upper.axvspan(low, high, color=GREEN, alpha=0.12, lw=0, label="fitted part")
             residual = np.where((x >= low) & (x <= high), residual, np.nan)
-        lower.plot(x, residual, ".", ms=3, color=GREY)
+        lower.plot(x, residual, ".", ms=3, color="0.4")
         lower.axhline(0.0, color=BLACK, lw=0.8)
         upper.set(ylabel="counts", title=line.spectrum.name)
         lower.set(xlabel="Raman shift (cm⁻¹)", ylabel="counts − fit", xlim=WINDOW)

@@ -30,10 +30,6 @@ LINES = [(line, colour) for line in ("-", "--") for colour in COLOURS]
 #: How measured points look.
 MEASURED: Any = {"ls": "none", "marker": "o", "mfc": "none", "color": BLACK, "label": "measured"}
 
-#: More levers than this are numbered instead of named along an axis.
-MOST_NAMES = 24
-#: Points of a curve that are marked at most.
-_MARKED = 40
 #: How figures are drawn, in terms of matplotlib's settings.
 STYLE: Any = {
     "font.size": 9,
@@ -139,7 +135,7 @@ def entitle(fig: Figure, *datasets: xr.Dataset, more: str = "", is_described: bo
 
 def marker(data: xr.Dataset, along: str, mark: str = "o") -> str:
     """Mark the points of a curve, unless they are so many that they hide the line."""
-    return mark if data.sizes[along] <= _MARKED else ""
+    return mark if data.sizes[along] <= 40 else ""
 
 
 def settled(history: xr.Dataset) -> bool:
@@ -187,6 +183,11 @@ def parameter_label(name: str) -> tuple[str, float]:
     return f"{symbol} ({unit})" if unit else symbol, parameter.scale
 
 
+def are_numbered(levers: int) -> bool:
+    """Whether so many levers are numbered instead of named along an axis."""
+    return levers > 24
+
+
 def values_by_lever(axes: Axes, quantity: xr.Dataset, scale: float = 1.0) -> None:
     """Draw a quantity by lever with its standard error, and mean and scatter of the levers.
 
@@ -204,7 +205,7 @@ def values_by_lever(axes: Axes, quantity: xr.Dataset, scale: float = 1.0) -> Non
         low, high = mean - scatter, mean + scatter
         axes.axhspan(low, high, color="0.9", lw=0, label="mean ± scatter between levers")
     axes.axhline(mean, color=VERMILION, lw=1.0, label="mean of the levers")
-    style: Any = {"ms": 1.5, "lw": 0.5} if count > MOST_NAMES else {"ms": 4, "lw": 1.0}
+    style: Any = {"ms": 1.5, "lw": 0.5} if are_numbered(count) else {"ms": 4, "lw": 1.0}
     style |= {"fmt": "o", "color": BLUE, "label": "lever, with standard error"}
     value = quantity.value.where(quantity.counts) / scale
     axes.errorbar(np.arange(1, count + 1), value, quantity.stderr / scale, **style)

@@ -19,15 +19,6 @@ from hotlever.probe import Probe
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Heat (mW) that is none but for rounding.
-_NONE_MW = 1e-9
-#: Curves of one panel, evenly chosen where there are more.
-_CURVES = 6
-#: What a curve is of, by its dimension.
-_LABELS = {"distance": "{:.3g} µm", "bias": "{:.4g} V", "pressure": "{:.3g} mbar"}
-#: A share of the noise that is drawn.
-_COUNTS = 1e-3
-
 
 def contact_overview(data: xr.Dataset, probe: Probe) -> Figure:
     """Draw tip, contact and sample with their resistances, and temperatures, heat and current.
@@ -53,7 +44,7 @@ def contact_overview(data: xr.Dataset, probe: Probe) -> Figure:
         temperature.set(ylabel="temperature (K)")
         temperature.legend()
         through = ("sample_mW", ORANGE, "through the contact"), ("beside_mW", BLUE, "through air")
-        for name, colour, label in through[: 1 + bool((data.beside_mW > _NONE_MW).any())]:
+        for name, colour, label in through[: 1 + bool((data.beside_mW > 1e-9).any())]:
             heat.plot(data[along], 1e3 * data[name], mark, color=colour, label=label)
         heat.set(ylabel="heat into the\nsample (µW)")
         heat.legend()
@@ -95,7 +86,8 @@ def _draw(axes: Axes, state: xr.Dataset, probe: Probe) -> None:
     word(0.3 * low, f"spreading: {_per_watt(state.spreading_K_per_mW)}")
     word(0.5 * low, f"heat: {1e3 * float(state.sample_mW):.3g} µW")
     word(low, f"far away: {base:.0f} K")
-    if float(state.beside_mW) > _NONE_MW:
+    # less heat (mW) is none but for rounding
+    if float(state.beside_mW) > 1e-9:
         air = f"air: {1e3 * float(state.beside_mW):.3g} µW"
         axes.text(-0.97 * width, 0.08 * high, air, fontsize=8)
     axes.set(xlim=(-1.05 * width, 2.45 * width), ylim=(low - 0.2, drawn.top + 0.2), xticks=[])
@@ -130,19 +122,20 @@ def reader_overview(data: xr.Dataset) -> Figure:
     """
     along = "distance" if data.sizes["distance"] > 1 or data.sizes["bias"] == 1 else "bias"
     x_name = {"distance": "surface_gap_um", "bias": "bias_V"}[along]
-    others = [name for name in _LABELS if name in data.sizes and name != along]
+    labels = {"distance": "{:.3g} µm", "bias": "{:.4g} V", "pressure": "{:.3g} mbar"}
+    others = [name for name in labels if name in data.sizes and name != along]
     points = [
         dict(zip(others, indices, strict=True))
         for indices in np.ndindex(*(data.sizes[name] for name in others))
     ]
-    chosen = np.unique(np.linspace(0, len(points) - 1, min(_CURVES, len(points))).round())
+    chosen = np.unique(np.linspace(0, len(points) - 1, min(6, len(points))).round())
     curves = [data.isel(points[int(number)]) for number in chosen]
     best = data.isel(data.resolution_nm_per_rtHz.argmin(...))
     of_best = data.sel({name: best[name].item() for name in others})
     mark = f"{marker(data, along)}-"
     with figure(8.2, 5.6, 2, 2, letters=True) as (fig, ((voltage, slope), (noise, resolution))):
         for curve, colour in zip(curves, COLOURS, strict=False):
-            label = ", ".join(_LABELS[name].format(curve[name].item()) for name in others)
+            label = ", ".join(labels[name].format(curve[name].item()) for name in others)
             style = {"color": colour, "label": label}
             x = curve[x_name]
             voltage.plot(x, curve.reader_V, mark, **style)
@@ -154,9 +147,9 @@ def reader_overview(data: xr.Dataset) -> Figure:
         noise.plot(of_best[x_name], 1e9 * of_best.noise_V_per_rtHz, "k" + mark, label="all")
         for source in data.source.values.tolist():
             part = of_best.source_V_per_rtHz.sel(source=source)
-            if (part**2 > _COUNTS * of_best.noise_V_per_rtHz**2).any():
+            if (part**2 > 1e-3 * of_best.noise_V_per_rtHz**2).any():
                 noise.plot(of_best[x_name], 1e9 * part, mark, label=source)
-        at = ", ".join(_LABELS[name].format(best[name].item()) for name in others)
+        at = ", ".join(labels[name].format(best[name].item()) for name in others)
         noise.set(ylabel=f"noise at {at} (nV/√Hz)", yscale="log")
         noise.legend(fontsize=7)
         if len(curves) > 1:

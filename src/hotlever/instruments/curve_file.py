@@ -15,9 +15,6 @@ from hotlever.instruments.source_meter import Reading
 from hotlever.probe import Probe
 from hotlever.quantities import QUANTITIES
 
-#: What a row holds, by the names of a `Reading`.
-_COLUMNS = ("bias_V", "current_mA", "reader_V")
-
 
 class CurveFile:
     """A CSV file of rows as they come, with circuit and surroundings in comments above.
@@ -40,7 +37,7 @@ class CurveFile:
 
     def __init__(self, path: str | os.PathLike[str], probe: Probe, with_reader: bool) -> None:
         self._path, self._probe = Path(path), probe
-        self._names = _COLUMNS[: 2 + with_reader]
+        self._names = ("bias_V", "current_mA", "reader_V")[: 2 + with_reader]
         self._has_heads = False
         self._file: IO[str]
 

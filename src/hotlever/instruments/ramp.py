@@ -26,9 +26,6 @@ from hotlever.probe.priors import Prior
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS
 
-#: The limit that is the temperature of the lever's own knee.
-KNEE = "knee"
-
 
 class Instrument(Protocol):
     """What sets a bias and reads; see `hotlever.instruments.supervisor`."""
@@ -226,7 +223,7 @@ class Ramp:
         """What the tip stays below: as stated, and below the lever's first fold."""
         branch, circuit = self._known.surrogate.branch, self._known.probe.circuit
         stated = self.options.stay_below_K
-        if stated == KNEE:
+        if stated == "knee":
             stated = branch.knee.tip_K if branch.knee is not None else None
         limit = np.inf if stated is None else float(stated)
         whole = branch.read(circuit, np.array([MOST_BIAS]))

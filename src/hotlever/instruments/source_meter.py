@@ -82,8 +82,6 @@ DIALECTS = {
         ":SENS:CURR:PROT:TRIP?",
     ),
 }
-#: The SCPI command of voltmeters of all makers (SCPI-1999, volume 2, MEASure).
-_VOLTAGE = ":MEAS:VOLT:DC?"
 
 
 class Line(Protocol):
@@ -217,7 +215,8 @@ class SourceMeter:
         self._check()
         reader_V = float("nan")
         if self.reader is not None:
-            (reader_V,) = self._numbers(self.reader, _VOLTAGE, 1)
+            # of voltmeters of all makers (SCPI-1999, volume 2, MEASure)
+            (reader_V,) = self._numbers(self.reader, ":MEAS:VOLT:DC?", 1)
         return Reading(bias_V, 1e3 * current_A, reader_V, tripped != 0.0)
 
     def turn_off(self) -> bool:

@@ -22,9 +22,6 @@ from typing import Any
 from hotlever.errors import HotleverError, InstrumentError, unforeseen_error
 from hotlever.instruments.source_meter import Reading, SourceMeter
 
-#: What asks the supervising process for a reading; a number is a bias (V) to set.
-READ = "read"
-
 
 @dataclass(frozen=True)
 class Supply:
@@ -85,7 +82,7 @@ class Supervisor:
 
     def read(self) -> Reading:
         """Return what the instruments show."""
-        reading: Reading = self._ask(READ)
+        reading: Reading = self._ask("read")
         return reading
 
     def __exit__(
@@ -193,7 +190,7 @@ def supervise(pipe: Connection, supply: Supply) -> None:
 
 def _serve(pipe: Connection, meter: SourceMeter) -> None:
     while (request := pipe.recv()) is not None:
-        if request == READ:
+        if request == "read":
             pipe.send(meter.read())
         else:
             meter.set_bias(request)

@@ -187,6 +187,15 @@ class TwinBench:
     def _source(self, message: str) -> str | None:
         header, argument = _parsed(message)
         bias, current, _ = self._shown()
+        waits = header == "SYST:ERR?" and self._errors
+        answers = {
+            "*IDN?": f"KEITHLEY INSTRUMENTS,MODEL {self.options.model},0,twin",
+            "OUTP?": f"{self.output_on:d}",
+            "READ?": f"{bias:.8E},{1e-3 * self._noisy(current):.8E}",
+            "SOUR:VOLT:ILIM:TRIP?": f"{current >= self.limit_mA:d}",
+            "SENS:CURR:PROT:TRIP?": f"{current >= self.limit_mA:d}",
+            "SYST:ERR?": self._errors.pop(0) if waits else '0,"No error"',
+        }
         if header == "*RST":
             self.output_on, self.bias_V, self.limit_mA = False, 0.0, 0.105
         elif header in ("SOUR:VOLT:ILIM", "SENS:CURR:PROT"):
@@ -196,27 +205,13 @@ class TwinBench:
             self._shown()  # the lever follows at once
         elif header == "OUTP":
             self.output_on = argument in ("1", "ON")
-        elif header not in (*_ACCEPTED, *_ANSWERS):
+        elif header not in answers and header not in (
+            # these change nothing here
+            *("*CLS", "SOUR:FUNC", "SENS:FUNC", "SOUR:VOLT:RANG:AUTO", "SENS:CURR:RANG:AUTO"),
+            *("SOUR:VOLT:READ:BACK", "FORM:ELEM"),
+        ):
             self._errors.append('-113,"Undefined header"')
-        return {
-            "*IDN?": f"KEITHLEY INSTRUMENTS,MODEL {self.options.model},0,twin",
-            "OUTP?": f"{self.output_on:d}",
-            "READ?": f"{bias:.8E},{1e-3 * self._noisy(current):.8E}",
-            "SOUR:VOLT:ILIM:TRIP?": f"{current >= self.limit_mA:d}",
-            "SENS:CURR:PROT:TRIP?": f"{current >= self.limit_mA:d}",
-            "SYST:ERR?": self._errors.pop(0) if header == "SYST:ERR?" and self._errors else _FINE,
-        }.get(header)
-
-
-_FINE = '0,"No error"'
-_ANSWERS = {
-    *("*IDN?", "OUTP?", "READ?", "SYST:ERR?", "SOUR:VOLT:ILIM:TRIP?", "SENS:CURR:PROT:TRIP?")
-}
-#: Commands that change nothing here.
-_ACCEPTED = {
-    *("*CLS", "SOUR:FUNC", "SENS:FUNC", "SOUR:VOLT:RANG:AUTO", "SENS:CURR:RANG:AUTO"),
-    *("SOUR:VOLT:READ:BACK", "FORM:ELEM"),
-}
+        return answers.get(header)
 
 
 def _parsed(message: str) -> tuple[str, str]:

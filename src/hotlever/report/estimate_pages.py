@@ -29,14 +29,6 @@ from hotlever.report.report_page import Block, Page
 from hotlever.text import significant, with_unit
 from hotlever.types import Array
 
-#: Points of a curve without visible corners.
-_POINTS = 110
-#: Rows of a calibration's table that are shown, about.
-_ROWS = 15
-#: Rows of an uncertainty budget that the page of a calibration shows, the others together.
-_CONTRIBUTIONS = 10
-_HEAD = ["quantity", "estimate", "prior", "u", "type", "distribution", "sensitivity", "in K", "dof"]
-
 
 def estimate_page(
     estimate: Estimate,
@@ -114,7 +106,8 @@ def _draw_at_rest(page: Page, fit: Estimate) -> None:
         else "The tip temperature of the nearest lever, which is no estimate.",
     )
     low, high = measured.bias.values[[0, -1]].tolist()
-    curve = lever.sweep(np.linspace(low, high, _POINTS))
+    # points of a curve without visible corners
+    curve = lever.sweep(np.linspace(low, high, 110))
     page.figure(
         "fit_iv",
         figures.iv_curves({"model": curve}, measured=measured),
@@ -216,7 +209,7 @@ def calibration_page(calibration: Estimate, added: Callable[[Block], None] | Non
         for name in (*TABLE_COLUMNS, *OF_THE_CONTACT)
         if name in calibration.table and (described or not (name in STATED or "stderr" in name))
     ]
-    columns = even_rows(calibration.heating, names, "tip_K", fewest=_ROWS)
+    columns = even_rows(calibration.heating, names, "tip_K", fewest=15)
     page.table(
         [f"{QUANTITIES[name].meaning} ({QUANTITIES[name].unit})" for name in names],
         [[f"{value:.4g}" for value in row] for row in zip(*columns.values(), strict=True)],
@@ -283,7 +276,7 @@ def _add_largest(page: Page, stated: TemperatureBudget) -> None:
         f"{stated.estimate_K:.1f} K: standard uncertainty {significant(budget.u)} K, {free}"
         f"k = {budget.coverage_factor():.2f}, expanded uncertainty "
         f"{significant(budget.expanded())} K (95 %). {_linear(stated)}".rstrip(),
-        most=_CONTRIBUTIONS,
+        most=10,
     )
 
 
@@ -301,8 +294,13 @@ def _add_rows(page: Page, budget: Budget, caption: str = "", most: int | None = 
     rest = budget.part(np.arange(len(cells), len(budget.inputs)))
     if rest.inputs:
         cells.append([f"{len(rest.inputs)} more, together", *[""] * 6, f"{rest.u:.1f}", ""])
-    columns = len(_HEAD) if budget.correlation is None else -1
-    page.table(_HEAD[:columns], [row[:columns] for row in cells], caption)
+    head = [
+        *["quantity", "estimate", "prior", "u", "type", "distribution", "sensitivity"],
+        "in K",
+        "dof",
+    ]
+    columns = len(head) if budget.correlation is None else -1
+    page.table(head[:columns], [row[:columns] for row in cells], caption)
 
 
 def _cells(row: InputQuantity) -> list[str]:

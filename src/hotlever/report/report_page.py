@@ -23,16 +23,12 @@ from hotlever.materials.parameters import sentence
 # A part of a page: its ``kind``, and what that has.
 Block = dict[str, Any]
 
-#: Sections from which on a page has a list of them.
-_CONTENTS_FROM = 5
-_PAGE = re.compile(r"\b(\w+\.html)\b")
-_DOI = re.compile(r"doi:(10\.\d{4,9}/[^\s,;]*[^\s,;.])")
-
 
 def _with_links(text: str) -> Markup:
     """Return a text whose DOIs and other pages are links."""
     link = r'<a href="https://doi.org/\1">doi:\1</a>'
-    return Markup(_PAGE.sub(r'<a href="\1">\1</a>', _DOI.sub(link, str(escape(text)))))
+    linked = re.sub(r"doi:(10\.\d{4,9}/[^\s,;]*[^\s,;.])", link, str(escape(text)))
+    return Markup(re.sub(r"\b(\w+\.html)\b", r'<a href="\1">\1</a>', linked))
 
 
 @dataclass
@@ -130,5 +126,5 @@ class Page:
             blocks=blocks,
             one_sheet=self.one_sheet,
             version=__version__,
-            contents_from=_CONTENTS_FROM,
+            contents_from=5,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
@@ -15,17 +16,36 @@ from hotlever.lever.transient.modes import Source
 from hotlever.materials.parameters import sentence
 from hotlever.report.report_page import Page
 from hotlever.steps import each
-from hotlever.types import Progress
-
-#: Operating points, as shares of the bias of the knee: beyond it a lever may run away.
-_SHARES = (0.25, 0.5, 0.75, 0.9)
-#: Length, period (µs) and number of the pulses; points of a curve for each step of the solver.
-_LENGTH, _PERIOD, _COUNT, _PER_STEP = 5.0, 50.0, 10, 8
-#: Frequencies (Hz) of spectra and harmonics; the drive as a share of the bias.
-_FREQUENCIES, _DRIVE = np.geomspace(10.0, 1e7, 49), 0.05
+from hotlever.types import Array, Progress
 
 
-def transient_page(lever: Lever, progress: Progress | None = None) -> Page:
+@dataclass(frozen=True)
+class TransientOptions:
+    """What is followed on the page.
+
+    Attributes
+    ----------
+    pulses : int
+        Of the train.
+    per_step : int
+        Points of a curve for each step of the solver.
+    frequencies : int
+        Of spectra and harmonics, from 10 Hz to 10 MHz.
+    """
+
+    pulses: int = 10
+    per_step: int = 8
+    frequencies: int = 49
+
+    @property
+    def frequencies_Hz(self) -> Array:
+        """Evenly spaced in the logarithm."""
+        return np.geomspace(10.0, 1e7, self.frequencies)
+
+
+def transient_page(
+    lever: Lever, progress: Progress | None = None, options: TransientOptions | None = None
+) -> Page:
     """Return the page of a lever in time.
 
     Parameters
@@ -33,6 +53,7 @@ def transient_page(lever: Lever, progress: Progress | None = None) -> Page:
     lever : Lever
     progress : callable, optional
         Called with the sections done and their number.
+    options : TransientOptions, optional
 
     Raises
     ------
@@ -46,7 +67,8 @@ def transient_page(lever: Lever, progress: Progress | None = None) -> Page:
         if knee is None
         else lever.circuit.bias(knee.lever_V, knee.current_mA)
     )
-    biases = [round(share * highest, 2) for share in _SHARES]
+    # shares of the bias of the knee: beyond it a lever may run away
+    biases = [round(share * highest, 2) for share in (0.25, 0.5, 0.75, 0.9)]
     page = Page(
         "A lever in time",
         f"A {lever.probe.shape.shape} lever in {lever.medium}, with "
@@ -57,7 +79,7 @@ def transient_page(lever: Lever, progress: Progress | None = None) -> Page:
             else f"Biases are shares of {highest:.2f} V, that of its knee."
         ),
     )
-    sections: dict[str, Callable[[Page, Lever, list[float]], None]] = {
+    sections: dict[str, Callable[[Page, Lever, list[float], TransientOptions], None]] = {
         "A step": _step,
         "A train of pulses": _train,
         "Time constants": _time_constants,
@@ -66,13 +88,13 @@ def transient_page(lever: Lever, progress: Progress | None = None) -> Page:
     }
     for heading, section in each(sections.items(), progress):
         page.heading(heading)
-        section(page, lever, biases)
+        section(page, lever, biases, options or TransientOptions())
     return page
 
 
-def _step(page: Page, lever: Lever, biases: list[float]) -> None:
+def _step(page: Page, lever: Lever, biases: list[float], options: TransientOptions) -> None:
     bias = biases[-1]
-    history = simulate(lever, step(bias), per_step=_PER_STEP)
+    history = simulate(lever, step(bias), per_step=options.per_step)
     page.figure("step", figures.history_overview(history), f"The bias is switched to {bias:g} V.")
     times = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
     rows = []
@@ -84,16 +106,18 @@ def _step(page: Page, lever: Lever, biases: list[float]) -> None:
     page.sentences(*filter(None, history.attrs["notes"].split("\n")))
 
 
-def _train(page: Page, lever: Lever, biases: list[float]) -> None:
-    wave = pulse(biases[-1], _LENGTH, _PERIOD, _COUNT)
-    history = simulate(lever, wave, per_step=_PER_STEP)
+def _train(page: Page, lever: Lever, biases: list[float], options: TransientOptions) -> None:
+    wave = pulse(biases[-1], 5.0, 50.0, options.pulses)
+    history = simulate(lever, wave, per_step=options.per_step)
     page.figure("train", figures.history_overview(history), f"{sentence(wave.text)}")
     accounted_nJ = history.stored_nJ + history.air_stored_nJ + history.lost_nJ
     off = float(np.abs(history.supplied_nJ - accounted_nJ).max() / history.supplied_nJ.max())
     page.text(f"Of the heat supplied all but {off:.0e} is stored or lost.")
 
 
-def _time_constants(page: Page, lever: Lever, biases: list[float]) -> None:
+def _time_constants(
+    page: Page, lever: Lever, biases: list[float], options: TransientOptions
+) -> None:
     columns = {
         source: time_constants(lever, biases, source, count=1) for source in get_args(Source)
     }
@@ -113,19 +137,21 @@ def _time_constants(page: Page, lever: Lever, biases: list[float]) -> None:
     )
 
 
-def _small_signals(page: Page, lever: Lever, biases: list[float]) -> None:
+def _small_signals(
+    page: Page, lever: Lever, biases: list[float], options: TransientOptions
+) -> None:
     for bias in (biases[1], biases[-1]):
         (state,) = lever.solve([bias])
-        figure = figures.small_signals(spectrum(state, _FREQUENCIES))
+        figure = figures.small_signals(spectrum(state, options.frequencies_Hz))
         page.figure(
             f"spectrum_{bias:g}V", figure, f"At {bias:g} V, with the tip at {state.tip_K:.0f} K."
         )
 
 
-def _harmonics(page: Page, lever: Lever, biases: list[float]) -> None:
+def _harmonics(page: Page, lever: Lever, biases: list[float], options: TransientOptions) -> None:
     bias = biases[1]
-    drive = _DRIVE * bias
-    harmonic_voltages = harmonics(lever, bias, drive, _FREQUENCIES)
+    drive = 0.05 * bias
+    harmonic_voltages = harmonics(lever, bias, drive, options.frequencies_Hz)
     page.figure(
         "harmonics",
         figures.harmonics(harmonic_voltages),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
@@ -29,23 +29,6 @@ from hotlever.studies.validation.prediction import (
 from hotlever.text import value_with_error
 from hotlever.types import Array, Progress
 
-_CURVE = "uiuc-lever"
-#: What else the lever of the curve may be, and its changes.
-_OTHER_LEVERS: dict[str, dict[str, Any]] = {
-    "as assumed, a U-shape of 120 µm in air": {},
-    "in vacuum": {"medium": "vacuum"},
-    "1.5 µm above a cold surface": {"surface_gap_um": 1.5},
-    "twice as long": {"length_um": 240.0},
-}
-#: A band is narrow if its ends are within this factor of the median.
-_NARROW = 2.0
-#: Shares of their prior's spread up to which parameters are told from data.
-_LEARNED = 0.8
-#: Change of a prediction since it was written down that is told, in its own standard deviations.
-_LEAST_CHANGE = 0.2
-#: Reading error of the curve (µA).
-_READ_UA = 4.0
-
 
 def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]:
     """Predict all published numbers, and compare them.
@@ -61,9 +44,16 @@ def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]
     compared : xarray.Dataset
         See `hotlever.studies.validation.prediction.comparison`.
     """
+    # what else the lever of the real curve may be, and its changes
+    other_levers: dict[str, dict[str, Any]] = {
+        "as assumed, a U-shape of 120 µm in air": {},
+        "in vacuum": {"medium": "vacuum"},
+        "1.5 µm above a cold surface": {"surface_gap_um": 1.5},
+        "twice as long": {"length_um": 240.0},
+    }
     every = cases()
     tasks: list[tuple[Any, ...]] = [(predict, case) for case in every]
-    tasks += [(_calibrated, changes) for changes in _OTHER_LEVERS.values()]
+    tasks += [(_calibrated, changes) for changes in other_levers.values()]
     with local_processes(PROCESSORS) as run:
         results = run(operator.call, tasks, progress)
     now, calibrations = results[: len(every)], results[len(every) :]
@@ -85,7 +75,7 @@ def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]
     _lost_draws_and_changes(page, every, now)
     _outside(page, every, compared)
     _bases(page, every)
-    _real_curve(page, calibrations)
+    _real_curve(page, dict(zip(other_levers, calibrations, strict=True)))
     page.heading("Sought in vain")
     page.table(("source", "wanted", "tried"), sought(), prose=True)
     return page, compared
@@ -95,8 +85,9 @@ def _summary(compared: xr.Dataset) -> str:
     verdicts, count = compared.verdict.values.tolist(), compared.sizes["case"]
     groups = len(set(compared.group.values.tolist()))
     outside = verdicts.count(OUTSIDE)
-    narrow = (compared.high_95 <= _NARROW * compared.predicted) & (
-        _NARROW * compared.low_95 >= compared.predicted
+    narrow_factor = 2.0
+    narrow = (compared.high_95 <= narrow_factor * compared.predicted) & (
+        narrow_factor * compared.low_95 >= compared.predicted
     )
     return (
         f"{count} published numbers of {groups} groups. Of each is known what its source states; "
@@ -105,8 +96,8 @@ def _summary(compared: xr.Dataset) -> str:
         "are within 68 % of what prediction and published error leave, "
         f"{count - outside} within 95 %, {outside} outside; where bands are right "
         f"{0.68 * count:.0f} and {0.95 * count:.0f} would be within. {narrow.sum().item()} of the "
-        f"bands are narrow, within a factor of {_NARROW:g} of the median: these test the model, "
-        "the others that it is not far off. "
+        f"bands are narrow, within a factor of {narrow_factor:g} of the median: these test the "
+        "model, the others that it is not far off. "
         "Those who wrote the inputs had read the abstracts and so were no strangers to the "
         "published values; the bands follow from the inputs alone."
     )
@@ -148,7 +139,8 @@ def _lost_draws_and_changes(
     for case, today in zip(every, now, strict=True):
         assert case.prediction is not None
         before = PredictedNumber.as_stored(case.prediction, case.definition.is_share)
-        if abs(today.centre - before.centre) > _LEAST_CHANGE * before.spread:
+        # told from this share of its own standard deviations on
+        if abs(today.centre - before.centre) > 0.2 * before.spread:
             changes.append(
                 f"{case.name}: {_number(before.median)} then, {_number(today.median)} now"
             )
@@ -194,25 +186,28 @@ def _bases(page: Page, every: Sequence[Case]) -> None:
 
 def _calibrated(changes: dict[str, Any]) -> Estimate:
     """Calibrate the one real I-V curve of the examples, with a lever that is other than assumed."""
+    curve = "uiuc-lever"
     with resources.as_file(resources.files("hotlever") / "examples") as folder:
-        probe = Probe.from_file(folder / f"{_CURVE}.toml")
+        probe = Probe.from_file(folder / f"{curve}.toml")
         other = probe.with_(**changes) if changes else probe
-        return calibrate(folder / f"{_CURVE}.csv", probe=other)
+        return calibrate(folder / f"{curve}.csv", probe=other)
 
 
-def _real_curve(page: Page, calibrations: Sequence[Estimate]) -> None:
+def _real_curve(page: Page, calibrations: Mapping[str, Estimate]) -> None:
     """Show what the real curve says of its lever, and what to believe of that."""
     page.heading("A real curve")
-    calibration = calibrations[0]
+    calibration = next(iter(calibrations.values()))
     off = _differences(calibration)
     last = calibration.table.isel(bias=-1)
-    tips = [other.table.tip_K[-1].item() for other in calibrations]
+    tips = [other.table.tip_K[-1].item() for other in calibrations.values()]
+    # reading error of the curve
+    read_uA = 4.0
     page.text(
         "The I-V curve of a silicon lever of the University of Illinois, digitised from a "
         f"published picture, {off.size} points. Lever, surroundings and temperatures are not "
         "stated with it. Calibrated with what is usual of such levers, the model follows the "
         f"current to {rms(off):.1f} µA (rms), at worst {np.abs(off).max():.1f} µA; reading it off "
-        f"was good to {_READ_UA:g} µA. At the last point, {last.power_mW.item():.2f} mW, the tip "
+        f"was good to {read_uA:g} µA. At the last point, {last.power_mW.item():.2f} mW, the tip "
         f"is at {last.tip_K.item():.0f} K, with 95 % from {last.tip_low_K.item():.0f} to "
         f"{last.tip_high_K.item():.0f} K."
     )
@@ -224,7 +219,7 @@ def _real_curve(page: Page, calibrations: Sequence[Estimate]) -> None:
     )
     page.figure(
         "real_curve_residuals",
-        figures.residuals_of_current(calibration.measurement.bias_V, off, _READ_UA),
+        figures.residuals_of_current(calibration.measurement.bias_V, off, read_uA),
         "Measured less calibrated currents, and the error of reading them off (grey).",
     )
     page.sentences(*calibration_parts(calibration).before)
@@ -233,7 +228,7 @@ def _real_curve(page: Page, calibrations: Sequence[Estimate]) -> None:
         [
             [name, use.stated, value_with_error(use.posterior_value, use.posterior_spread)]
             for name, use in calibration.priors.items()
-            if use.spread_ratio < _LEARNED
+            if use.spread_ratio < 0.8
         ],
         "What the curve tells of the lever: parameters whose spread it lessens by a fifth or more. "
         "All others stay what was assumed.",
@@ -247,7 +242,7 @@ def _real_curve(page: Page, calibrations: Sequence[Estimate]) -> None:
                 f"{row.tip_K.item():.0f}",
                 f"{row.tip_low_K.item():.0f} to {row.tip_high_K.item():.0f}",
             ]
-            for name, other in zip(_OTHER_LEVERS, calibrations, strict=True)
+            for name, other in calibrations.items()
             for row in [other.table.isel(bias=-1)]
         ],
         "The same curve, calibrated as that of other levers.",

@@ -86,7 +86,7 @@ def measure_lever(
     from hotlever.estimate import calibrate
     from hotlever.estimate.summary import calibration_text
     from hotlever.instruments.curve_file import CurveFile
-    from hotlever.instruments.ramp import KNEE, Ramp, RampOptions
+    from hotlever.instruments.ramp import Ramp, RampOptions
     from hotlever.instruments.supervisor import Supervisor, Supply
     from hotlever.measurement import read_measurement_of
 
@@ -94,7 +94,7 @@ def measure_lever(
     check_number("--settle", settle_s, 0.0, 3600.0)
     limit_mA = setting(compliance, "mA", "--compliance")
     check_number("--compliance", limit_mA, 1e-3, 100.0)
-    limit_K = stay_below if stay_below == KNEE else parse_temperature(stay_below, "--stay-below")
+    limit_K = stay_below if stay_below == "knee" else parse_temperature(stay_below, "--stay-below")
     like = read_probe(reporter, beforehand.probe, physics=beforehand.physics)
     check_medium(medium)
     like = like if medium is None else like.in_medium(medium)

@@ -92,7 +92,7 @@ class _Question:
     def __init__(self, session: Session, name: str, along: str) -> None:
         self._session, self._name, self._along = session, name, along
         self._targets = session.choices(
-            ("asked"), {key: at for key, (*_, at) in self.quantities.items()}
+            "asked", {key: at for key, (*_, at) in self.quantities.items()}
         )
         title, unit, _ = self.quantities[along]
         with ui.row().classes("w-full items-center"):
