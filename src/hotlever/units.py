@@ -82,8 +82,8 @@ def _unit(text: str) -> _Unit | None:
     """Look up a unit; degrees Celsius have the quantity °C."""
     if not 0 < len(text) < 20:
         return None
-    # what µ, Ω and °C of other encodings (UTF-8 read twice, DOS, GBK, Shift-JIS, Mac) look like when
-    # a file is read as Windows' Latin-1; what is part of another stands behind it
+    # what µ, Ω and °C of other encodings (UTF-8 read twice, DOS, GBK, Shift-JIS, Mac) look like in
+    # a file that is read as Windows' Latin-1; what is part of another stands behind it
     of_misread = {
         **dict.fromkeys(("â„ƒ", "øC", "¡æ", "¡ãC", "�Ž", "�‹C", "¡C"), "°C"),
         **dict.fromkeys(("â„¦", "Î©", "ê", "¦¸", "ƒ¶", "½"), "Ω"),
