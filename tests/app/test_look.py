@@ -11,7 +11,7 @@ pytest.importorskip("playwright", reason="the extra test-app is not installed")
 
 from playwright.sync_api import Page
 
-from app_in_browser import App, browsing, chromium_path, running
+from app_in_browser import App, browsing, chromium_path, go, running, stand_still
 from app_look import furnish, look
 from hotlever.app.pages.frame import PAGES
 
@@ -62,3 +62,24 @@ def test_what_is_wrong_is_noticed(opened: tuple[App, Page]) -> None:
         "a textbox has no name",
     ):
         assert fault in faults
+
+
+def test_on_a_phone_what_is_measured_is_drawn_before_what_is_asked(
+    opened: tuple[App, Page],
+) -> None:
+    app, page = opened
+    page.set_viewport_size({"width": 390, "height": 844})
+    go(page, app, "measurements")
+    page.get_by_text("Measure with a source meter").click()
+    page.get_by_label("Biases (V), and most rows").fill("1:2:2")
+    page.get_by_label("Wait at each").fill("0s")
+    command = page.locator("pre", has_text="--bias 1:2:2 --settle 0s")
+    command.wait_for()
+    page.get_by_role("button", name="Measure", exact=True).click()
+    page.get_by_text("Row 1").or_(page.get_by_text("Row 2")).wait_for(timeout=60_000)
+    stand_still(page)
+    plot, fields = page.get_by_label("Measured current against bias"), page.locator(".controls")
+    drawn, asked = plot.bounding_box(), fields.bounding_box()
+    assert drawn is not None
+    assert asked is not None
+    assert drawn["y"] + drawn["height"] < asked["y"]
