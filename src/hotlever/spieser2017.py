@@ -74,40 +74,41 @@ ABSORBED_SHARE = 0.10
 
 # --- Tables I and II ------------------------------------------------------------------------------
 
-#: c_κ, Δ (µm), n_d (10¹⁷ cm⁻³), p, a₀ (10⁻⁴ Ω cm) and a₁ (10⁻⁶ Ω cm K⁻¹) as printed.
-_UNITS = {"c_kappa": 1.0, "delta": 1.0, "n_d": 1e17, "p": 1.0, "a0": 1e-4, "a1": 1e-6}
-_VALUES = {
-    "option I": (0.744, 0.681, 4.10, 2.64, 5.87, 1.67),
-    "option II": (0.675, 0.649, 6.87, 2.80, 9.32, 1.08),
-    "option III": (0.686, 0.647, 5.75, 2.65, 9.34, 1.11),
-    "lever 1": (0.686, 0.647, 5.75, 2.65, 9.34, 1.11),
-    "lever 1, n_d fixed": (0.692, 0.763, 3.30, 2.74, 9.30, 1.12),
-    "lever 2": (0.687, 0.719, 3.64, 2.80, 10.2, 1.25),
-    "lever 2, n_d fixed": (0.688, 0.735, 3.30, 2.81, 10.2, 1.26),
-    "lever 3": (0.688, 0.646, 3.50, 2.85, 10.3, 1.26),
-    "lever 3, n_d fixed": (0.690, 0.659, 3.30, 2.86, 10.3, 1.26),
-    "lever 4": (0.613, 0.544, 5.93, 2.86, 10.7, 1.23),
-    "lever 4, n_d fixed": (0.686, 0.716, 3.30, 2.99, 10.7, 1.26),
-}
-#: Of Table I: the observables that were fitted, the inversion temperature (K), standard errors.
-_OPTIONS = {
-    "option I": (("current",), 805.0, (0.007, 0.030, 0.62, 0.02, 0.21, 0.10)),
-    "option II": (("current", "reader"), 851.0, (0.008, 0.053, 1.40, 0.02, 0.06, 0.03)),
-    "option III": (("current", "reader", "tip"), 831.0, (0.005, 0.051, 0.94, 0.05, 0.15, 0.05)),
-}
 
-
-def _in_units(printed: tuple[float, ...]) -> dict[str, float]:
-    pairs = zip(_UNITS.items(), printed, strict=True)
-    return {name: value * unit for (name, unit), value in pairs}
+def _printed(
+    c_kappa: float, delta: float, n_d: float, p: float, a0: float, a1: float
+) -> dict[str, float]:
+    """Return a row: c_κ, Δ (µm), n_d (10¹⁷ cm⁻³), p, a₀ (10⁻⁴ Ω cm), a₁ (10⁻⁶ Ω cm K⁻¹)."""
+    first = {"c_kappa": c_kappa, "delta": delta, "n_d": 1e17 * n_d}
+    return {**first, "p": p, "a0": 1e-4 * a0, "a1": 1e-6 * a1}
 
 
 #: Parameters of Table I (lever 1, by the observables fitted) and Table II (option III, by lever).
-PUBLISHED_VALUES = {name: _in_units(printed) for name, printed in _VALUES.items()}
+PUBLISHED_VALUES = {
+    "option I": _printed(0.744, 0.681, 4.10, 2.64, 5.87, 1.67),
+    "option II": _printed(0.675, 0.649, 6.87, 2.80, 9.32, 1.08),
+    "option III": _printed(0.686, 0.647, 5.75, 2.65, 9.34, 1.11),
+    "lever 1": _printed(0.686, 0.647, 5.75, 2.65, 9.34, 1.11),
+    "lever 1, n_d fixed": _printed(0.692, 0.763, 3.30, 2.74, 9.30, 1.12),
+    "lever 2": _printed(0.687, 0.719, 3.64, 2.80, 10.2, 1.25),
+    "lever 2, n_d fixed": _printed(0.688, 0.735, 3.30, 2.81, 10.2, 1.26),
+    "lever 3": _printed(0.688, 0.646, 3.50, 2.85, 10.3, 1.26),
+    "lever 3, n_d fixed": _printed(0.690, 0.659, 3.30, 2.86, 10.3, 1.26),
+    "lever 4": _printed(0.613, 0.544, 5.93, 2.86, 10.7, 1.23),
+    "lever 4, n_d fixed": _printed(0.686, 0.716, 3.30, 2.99, 10.7, 1.26),
+}
 #: Of Table I, which alone prints them.
-STANDARD_ERRORS = {name: _in_units(errors) for name, (_, _, errors) in _OPTIONS.items()}
-INVERSION_TEMPERATURES_K = {name: T for name, (_, T, _) in _OPTIONS.items()}
-FITTED_OBSERVABLES = {name: observables for name, (observables, _, _) in _OPTIONS.items()}
+STANDARD_ERRORS = {
+    "option I": _printed(0.007, 0.030, 0.62, 0.02, 0.21, 0.10),
+    "option II": _printed(0.008, 0.053, 1.40, 0.02, 0.06, 0.03),
+    "option III": _printed(0.005, 0.051, 0.94, 0.05, 0.15, 0.05),
+}
+INVERSION_TEMPERATURES_K = {"option I": 805.0, "option II": 851.0, "option III": 831.0}
+FITTED_OBSERVABLES = {
+    "option I": ("current",),
+    "option II": ("current", "reader"),
+    "option III": ("current", "reader", "tip"),
+}
 
 
 def _scatter() -> dict[str, tuple[float, float]]:
@@ -120,7 +121,7 @@ def _scatter() -> dict[str, tuple[float, float]]:
     logarithms = np.log([list(lever.values()) for lever in levers])
     means, spreads = logarithms.mean(axis=0), logarithms.std(axis=0, ddof=1)
     rows = zip(np.exp(means).tolist(), (1.5 * spreads).tolist(), strict=True)
-    return dict(zip(_UNITS, rows, strict=True))
+    return dict(zip(PUBLISHED_VALUES["lever 1"], rows, strict=True))
 
 
 #: What is known of the silicon of any lever, by parameter: geometric mean and relative spread of

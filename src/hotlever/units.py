@@ -19,8 +19,8 @@ PER_CM2_TO_MILLI_PER_UM2 = 1e-5
 #: J/cm³ to nJ/µm³; with times in µs, nJ are mW µs.
 PER_CM3_TO_NANO_PER_UM3 = 1e-3
 LARGEST_NUMBER = 1e30  #: no quantity is larger in any unit
-#: Between these (V) a lever has a current that can be told from none, and no spark.
-LEAST_BIAS, MOST_BIAS = 1e-6, 1e4
+#: Up to this bias (V) there is no spark.
+MOST_BIAS = 1e4
 
 NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 LONGEST_NUMBER = 60  #: characters
@@ -382,7 +382,7 @@ def bias_setting(text: str, where: str) -> float:
     Raises
     ------
     InputError
-        If it is no voltage, or none between `LEAST_BIAS` and `MOST_BIAS` but 0.
+        If it is no voltage, or none between 1 µV and `MOST_BIAS` but 0.
 
     Examples
     --------
@@ -390,9 +390,11 @@ def bias_setting(text: str, where: str) -> float:
     (0.2, 5.0)
     """
     volts = setting(text, "V", where, bare=True)
-    if volts and not LEAST_BIAS <= abs(volts) <= MOST_BIAS:
+    # below, the current cannot be told from none
+    least = 1e-6
+    if volts and not least <= abs(volts) <= MOST_BIAS:
         raise InputError(
-            f"{where}: found a bias of {volts:g} V, expected 0 or {LEAST_BIAS:g} to {MOST_BIAS:g} V"
+            f"{where}: found a bias of {volts:g} V, expected 0 or {least:g} to {MOST_BIAS:g} V"
         )
     return volts
 

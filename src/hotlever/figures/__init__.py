@@ -19,9 +19,12 @@ from matplotlib.figure import Figure
 from hotlever.errors import InputError
 from hotlever.figures.claim_figures import (
     disc_between_planes,
+    knee_carried,
+    layouts_by_length,
     linear_branches,
     parameter_deviations,
     predicted_and_published,
+    printed_statements,
     radiated_shares,
     residuals_of_current,
     scale_factor,
@@ -39,11 +42,6 @@ from hotlever.figures.estimate_figures import (
     posterior_corner,
     profile_curves,
     tip_band,
-)
-from hotlever.figures.layout_figures import (
-    knee_carried,
-    layouts_by_length,
-    printed_statements,
 )
 from hotlever.figures.lever_figures import (
     doping_profile,
