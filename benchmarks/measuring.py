@@ -33,7 +33,7 @@ from hotlever.estimate import Measurement, calibrate
 from hotlever.estimate.next_measurement import LinearisedLever
 from hotlever.instruments.ramp import Ramp, RampOptions
 from hotlever.instruments.source_meter import Reading
-from hotlever.instruments.twin import RampCurve, TwinBench, TwinOptions
+from hotlever.instruments.twin import RampCurve, TwinBench
 from hotlever.probe import Probe
 from problems import table
 
@@ -197,7 +197,7 @@ def ends(count: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for number in range(count):
             kind = kinds[number % len(kinds)]
-            with TwinBench(curve, TwinOptions(seed=number)) as twin:
+            with TwinBench(curve, seed=number) as twin:
                 after, text = end(kind, twin, Path(folder), rng)
             seconds[kind].append(after)
             aloud += "MAY STILL BE ON" in text

@@ -9,7 +9,7 @@ from hotlever.errors import InputError
 from hotlever.instruments.curve_file import CurveFile
 from hotlever.instruments.ramp import Ramp, RampOptions
 from hotlever.instruments.source_meter import Reading
-from hotlever.instruments.twin import RampCurve, TwinBench, TwinOptions, drawn_from_priors
+from hotlever.instruments.twin import RampCurve, TwinBench, drawn_from_priors
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import read_measurement
 from hotlever.probe import Probe
@@ -44,7 +44,7 @@ def ramp(bias, **options) -> Ramp:
 
 
 def test_the_tip_stays_below_the_limit_and_steps_become_finer_before_it(curve):
-    twin, rows = WithoutLine(curve, TwinOptions(seed=1)), []
+    twin, rows = WithoutLine(curve, seed=1), []
     measuring = ramp([3.0, 5.0, 9.0, 10.0], stay_below_K=500.0)
     measured = measuring.measure(twin, lambda reading, step: rows.append((reading, step)))
     assert measured.complete

@@ -7,7 +7,7 @@ import pytest
 
 from hotlever.errors import InputError, InstrumentError
 from hotlever.instruments.source_meter import SourceMeter
-from hotlever.instruments.twin import RampCurve, TwinBench, TwinOptions
+from hotlever.instruments.twin import RampCurve, TwinBench
 
 pytest.importorskip("pyvisa")
 
@@ -20,7 +20,7 @@ def resistor(kohm: float = 10.0) -> RampCurve:
 
 @pytest.mark.parametrize("model", ["2450", "2400"])
 def test_both_dialects_set_and_read(model):
-    with TwinBench(resistor(), TwinOptions(noise=0.0, model=model)) as twin:
+    with TwinBench(resistor(), noise=0.0, model=model) as twin:
         meter = SourceMeter.open(twin.source, twin.reader)
         assert f"MODEL {model}" in meter.identity
         assert not twin.output_on
@@ -36,7 +36,7 @@ def test_both_dialects_set_and_read(model):
 
 @pytest.mark.parametrize("model", ["2450", "2400"])
 def test_a_current_at_the_limit_is_said(model):
-    with TwinBench(resistor(), TwinOptions(noise=0.0, model=model)) as twin:
+    with TwinBench(resistor(), noise=0.0, model=model) as twin:
         meter = SourceMeter.open(twin.source)
         meter.start(0.5)
         meter.set_bias(8.0)
@@ -58,7 +58,7 @@ def test_an_instrument_that_refuses_a_command_is_an_error():
 
 def test_another_instrument_is_refused():
     with (
-        TwinBench(resistor(), TwinOptions(model="DMM6500")) as twin,
+        TwinBench(resistor(), model="DMM6500") as twin,
         pytest.raises(InputError, match=r"DMM6500.*Keithley 2450"),
     ):
         SourceMeter.open(twin.source)

@@ -15,7 +15,7 @@ from test_source_meter import resistor
 
 from hotlever.errors import InstrumentError
 from hotlever.instruments.supervisor import Supervisor, Supply
-from hotlever.instruments.twin import TwinBench, TwinOptions
+from hotlever.instruments.twin import TwinBench
 
 pytest.importorskip("pyvisa")
 
@@ -36,7 +36,7 @@ if __name__ == "__main__":
 
 @pytest.fixture
 def twin() -> Iterator[TwinBench]:
-    with TwinBench(resistor(), TwinOptions(noise=0.0)) as bench:
+    with TwinBench(resistor(), noise=0.0) as bench:
         yield bench
 
 

@@ -6,16 +6,16 @@ import pytest
 
 from hotlever import Lever, Probe
 from hotlever.lever.lever import COARSE
-from hotlever.report.transient_pages import TransientOptions, transient_page
+from hotlever.report.transient_pages import transient_page
 
 
 @pytest.mark.slow
 def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path):
     # few pulses and frequencies are as many pages
-    few = TransientOptions(pulses=2, frequencies=7)
+    few = {"pulses": 2, "frequencies": 7}
     progress = []
     lever = Lever(Probe.reference(), COARSE)
-    page = transient_page(lever, lambda *steps: progress.append(steps), few)
+    page = transient_page(lever, lambda *steps: progress.append(steps), **few)
     written = page.write(tmp_path)
     text = written.read_text(encoding="utf-8")
     for heading in ("A step", "A train of pulses", "Time constants", "Small signals", "Harmonics"):

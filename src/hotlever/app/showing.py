@@ -48,7 +48,6 @@ from hotlever.raman.spectrum_tables import corrections_text
 from hotlever.report.estimate_pages import budget_page, estimate_page
 from hotlever.report.report_page import Page
 from hotlever.tasks.commands import arguments_of
-from hotlever.tasks.reporter import Silence
 from hotlever.tasks.spectra import ThermometerOptions, set_up
 from hotlever.types import Array
 
@@ -229,10 +228,10 @@ def spectrum(
         told = {field.name: told[field.name] for field in fields(ThermometerOptions)}
         options = ThermometerOptions(**{**told, "corrections": by_hand})
         try:
-            setup = set_up(Silence(), options)
+            setup = set_up(report, options)
         except HotleverError as error:
             doubt = f"no temperature: {error}"
-            setup = set_up(Silence(), replace(options, calibration=None, calibrate_from=None))
+            setup = set_up(report, replace(options, calibration=None, calibrate_from=None))
     (line,) = measure([counted], setup.options, corrections=setup.corrections)
     table = read_lines([line], setup.thermometer)
     inside = in_window(counted.x, "")

@@ -35,16 +35,6 @@ Heard = Callable[[str, Any], None]
 _alive: weakref.WeakSet[Worker] = weakref.WeakSet()
 
 
-class WorkerLostError(HotleverError):
-    """The process died, or was ended, before it had an answer."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            "the process that worked on this died (too little memory?); what was written before is "
-            "there, please try again"
-        )
-
-
 class Worker:
     """A process that answers calls one after the other; one that died is replaced at the next.
 
@@ -89,9 +79,7 @@ class Worker:
         Raises
         ------
         HotleverError
-            As the function says.
-        WorkerLostError
-            If the process died.
+            As the function says, or if the process died, or was ended, before it had an answer.
         """
         async with self._turn:
             if self.lost:
@@ -103,7 +91,7 @@ class Worker:
                 self._connection.send((self._number, function, arguments))
                 return await self._answer
             except OSError:
-                raise WorkerLostError from None
+                raise _lost() from None
             finally:
                 self._answer = self._heard = None
 
@@ -129,7 +117,7 @@ class Worker:
         elif kind == "failed":
             self._answer.set_exception(HotleverError(content))
         elif kind == "lost":
-            self._answer.set_exception(WorkerLostError())
+            self._answer.set_exception(_lost())
         elif self._heard is not None:
             self._heard(kind, content)
 
@@ -158,6 +146,13 @@ class Worker:
             os.killpg(pid, number)
         with suppress(OSError, ValueError):
             os.kill(pid, number)
+
+
+def _lost() -> HotleverError:
+    return HotleverError(
+        "the process that worked on this died (too little memory?); what was written before is "
+        "there, please try again"
+    )
 
 
 @atexit.register

@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
@@ -20,21 +19,12 @@ from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimate import Estimate, calibrate
 from hotlever.estimate.next_measurement import LinearisedLever, hottest_tips, plan_next
 from hotlever.instruments.source_meter import Reading
+from hotlever.instruments.supervisor import Supervisor
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS
-
-
-class Instrument(Protocol):
-    """What sets a bias and reads; see `hotlever.instruments.supervisor`."""
-
-    def set_bias(self, bias_V: float) -> None:
-        """Set the bias (V)."""
-
-    def read(self) -> Reading:
-        """Return what is shown."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +134,7 @@ class Ramp:
 
     def measure(
         self,
-        instrument: Instrument,
+        instrument: Supervisor,
         record: Callable[[Reading, Step], None],
         wait: Callable[[float], None] = time.sleep,
     ) -> MeasuredRamp:
@@ -152,7 +142,7 @@ class Ramp:
 
         Parameters
         ----------
-        instrument : Instrument
+        instrument : Supervisor
         record : callable
             Called with each reading that counts, and what was known of it before.
         wait : callable

@@ -11,7 +11,7 @@ import socketserver
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
@@ -70,32 +70,18 @@ def drawn_from_priors(probe: Probe, rng: np.random.Generator) -> Probe:
 
 
 @dataclass
-class TwinOptions:
-    """How instruments differ from ideal ones.
-
-    Attributes
-    ----------
-    noise : float
-        Standard error of each reading of a current or voltage, as a share.
-    seed : int
-        Of the noise.
-    model : str
-        Which source meter it says to be.
-    """
-
-    noise: float = 1e-3
-    seed: int = 0
-    model: str = "2450"
-
-
-@dataclass
 class TwinBench:
     """The instruments at one lever, while this context lasts.
 
     Attributes
     ----------
     curve : RampCurve
-    options : TwinOptions
+    noise : float
+        Standard error of each reading of a current or voltage, as a share.
+    seed : int
+        Of the noise.
+    model : str
+        Which source meter it says to be.
     output_on, is_melted : bool
     bias_V : float
         What is set.
@@ -105,7 +91,9 @@ class TwinBench:
     """
 
     curve: RampCurve
-    options: TwinOptions = field(default_factory=TwinOptions)
+    noise: float = 1e-3
+    seed: int = 0
+    model: str = "2450"
     output_on: bool = False
     is_melted: bool = False
     bias_V: float = 0.0
@@ -113,7 +101,7 @@ class TwinBench:
     hottest_K: float = 0.0
 
     def __post_init__(self) -> None:
-        self._rng = np.random.default_rng(self.options.seed)
+        self._rng = np.random.default_rng(self.seed)
         self._lock = threading.Lock()
         self._errors: list[str] = []
         self._servers: list[_Server] = []
@@ -167,7 +155,7 @@ class TwinBench:
         return bias, current, reader
 
     def _noisy(self, value: float) -> float:
-        return value * (1.0 + self.options.noise * float(self._rng.standard_normal()))
+        return value * (1.0 + self.noise * float(self._rng.standard_normal()))
 
     # --- the instruments --------------------------------------------------------------------------
 
@@ -189,7 +177,7 @@ class TwinBench:
         bias, current, _ = self._shown()
         waits = header == "SYST:ERR?" and self._errors
         answers = {
-            "*IDN?": f"KEITHLEY INSTRUMENTS,MODEL {self.options.model},0,twin",
+            "*IDN?": f"KEITHLEY INSTRUMENTS,MODEL {self.model},0,twin",
             "OUTP?": f"{self.output_on:d}",
             "READ?": f"{bias:.8E},{1e-3 * self._noisy(current):.8E}",
             "SOUR:VOLT:ILIM:TRIP?": f"{current >= self.limit_mA:d}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from typing import get_args
 
 import numpy as np
@@ -19,32 +19,8 @@ from hotlever.steps import each
 from hotlever.types import Array, Progress
 
 
-@dataclass(frozen=True)
-class TransientOptions:
-    """What is followed on the page.
-
-    Attributes
-    ----------
-    pulses : int
-        Of the train.
-    per_step : int
-        Points of a curve for each step of the solver.
-    frequencies : int
-        Of spectra and harmonics, from 10 Hz to 10 MHz.
-    """
-
-    pulses: int = 10
-    per_step: int = 8
-    frequencies: int = 49
-
-    @property
-    def frequencies_Hz(self) -> Array:
-        """Evenly spaced in the logarithm."""
-        return np.geomspace(10.0, 1e7, self.frequencies)
-
-
 def transient_page(
-    lever: Lever, progress: Progress | None = None, options: TransientOptions | None = None
+    lever: Lever, progress: Progress | None = None, *, pulses: int = 10, frequencies: int = 49
 ) -> Page:
     """Return the page of a lever in time.
 
@@ -53,7 +29,10 @@ def transient_page(
     lever : Lever
     progress : callable, optional
         Called with the sections done and their number.
-    options : TransientOptions, optional
+    pulses : int
+        Of the train.
+    frequencies : int
+        Of spectra and harmonics, from 10 Hz to 10 MHz.
 
     Raises
     ------
@@ -79,22 +58,23 @@ def transient_page(
             else f"Biases are shares of {highest:.2f} V, that of its knee."
         ),
     )
-    sections: dict[str, Callable[[Page, Lever, list[float], TransientOptions], None]] = {
+    swept_Hz = np.geomspace(10.0, 1e7, frequencies)
+    sections: dict[str, Callable[[Page, Lever, list[float]], None]] = {
         "A step": _step,
-        "A train of pulses": _train,
+        "A train of pulses": partial(_train, count=pulses),
         "Time constants": _time_constants,
-        "Small signals": _small_signals,
-        "Harmonics": _harmonics,
+        "Small signals": partial(_small_signals, frequencies_Hz=swept_Hz),
+        "Harmonics": partial(_harmonics, frequencies_Hz=swept_Hz),
     }
     for heading, section in each(sections.items(), progress):
         page.heading(heading)
-        section(page, lever, biases, options or TransientOptions())
+        section(page, lever, biases)
     return page
 
 
-def _step(page: Page, lever: Lever, biases: list[float], options: TransientOptions) -> None:
+def _step(page: Page, lever: Lever, biases: list[float]) -> None:
     bias = biases[-1]
-    history = simulate(lever, step(bias), per_step=options.per_step)
+    history = simulate(lever, step(bias), per_step=8)
     page.figure("step", figures.history_overview(history), f"The bias is switched to {bias:g} V.")
     times = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
     rows = []
@@ -106,18 +86,16 @@ def _step(page: Page, lever: Lever, biases: list[float], options: TransientOptio
     page.sentences(*filter(None, history.attrs["notes"].split("\n")))
 
 
-def _train(page: Page, lever: Lever, biases: list[float], options: TransientOptions) -> None:
-    wave = pulse(biases[-1], 5.0, 50.0, options.pulses)
-    history = simulate(lever, wave, per_step=options.per_step)
+def _train(page: Page, lever: Lever, biases: list[float], count: int) -> None:
+    wave = pulse(biases[-1], 5.0, 50.0, count)
+    history = simulate(lever, wave, per_step=8)
     page.figure("train", figures.history_overview(history), f"{sentence(wave.text)}")
     accounted_nJ = history.stored_nJ + history.air_stored_nJ + history.lost_nJ
     off = float(np.abs(history.supplied_nJ - accounted_nJ).max() / history.supplied_nJ.max())
     page.text(f"Of the heat supplied all but {off:.0e} is stored or lost.")
 
 
-def _time_constants(
-    page: Page, lever: Lever, biases: list[float], options: TransientOptions
-) -> None:
+def _time_constants(page: Page, lever: Lever, biases: list[float]) -> None:
     columns = {
         source: time_constants(lever, biases, source, count=1) for source in get_args(Source)
     }
@@ -137,21 +115,19 @@ def _time_constants(
     )
 
 
-def _small_signals(
-    page: Page, lever: Lever, biases: list[float], options: TransientOptions
-) -> None:
+def _small_signals(page: Page, lever: Lever, biases: list[float], frequencies_Hz: Array) -> None:
     for bias in (biases[1], biases[-1]):
         (state,) = lever.solve([bias])
-        figure = figures.small_signals(spectrum(state, options.frequencies_Hz))
+        figure = figures.small_signals(spectrum(state, frequencies_Hz))
         page.figure(
             f"spectrum_{bias:g}V", figure, f"At {bias:g} V, with the tip at {state.tip_K:.0f} K."
         )
 
 
-def _harmonics(page: Page, lever: Lever, biases: list[float], options: TransientOptions) -> None:
+def _harmonics(page: Page, lever: Lever, biases: list[float], frequencies_Hz: Array) -> None:
     bias = biases[1]
     drive = 0.05 * bias
-    harmonic_voltages = harmonics(lever, bias, drive, options.frequencies_Hz)
+    harmonic_voltages = harmonics(lever, bias, drive, frequencies_Hz)
     page.figure(
         "harmonics",
         figures.harmonics(harmonic_voltages),

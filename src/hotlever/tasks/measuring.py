@@ -155,12 +155,12 @@ def _instruments(
         raise InputError(f"--reader: found {quoted(reader)} at a twin, expected {TWIN}")
     import numpy as np
 
-    from hotlever.instruments.twin import RampCurve, TwinBench, TwinOptions, drawn_from_priors
+    from hotlever.instruments.twin import RampCurve, TwinBench, drawn_from_priors
 
     seed = int(number) if number else secrets.randbelow(10_000)
     lever = drawn_from_priors(probe, np.random.default_rng(seed))
     reporter.note(f"no instrument but a twin: {TWIN}:{seed} is the same one again")
-    with TwinBench(RampCurve.of_probe(lever), TwinOptions(seed=seed)) as twin:
+    with TwinBench(RampCurve.of_probe(lever), seed=seed) as twin:
         yield twin.source, None if reader is None else twin.reader
         reporter.note(f"the tip of this twin was {twin.hottest_K:.0f} K at its hottest")
 

@@ -3,35 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 from hotlever.types import Progress
 
 
-class Listener(Protocol):
-    """Who hears what was noticed, and how far the work is."""
+class Reporter(Protocol):
+    """The terminal, or a page of the app."""
 
     def note(self, *texts: str) -> None:
         """Say what should be known beside the result."""
 
     def progress(self, label: str) -> AbstractContextManager[Progress]:
         """Show how far the block is, which calls (steps done, steps in all)."""
-
-
-class Silence:
-    """A listener where nobody hears."""
-
-    def note(self, *texts: str) -> None:
-        """Say nothing."""
-
-    def progress(self, label: str) -> AbstractContextManager[Progress]:
-        """Show nothing."""
-        return nullcontext(lambda done, total: None)
-
-
-class Reporter(Listener, Protocol):
-    """The terminal, or a page of the app."""
 
     def give(self, result: str) -> None:
         """Give the result as text."""

@@ -18,7 +18,7 @@ from hotlever.tasks.arguments import (
     refuse,
 )
 from hotlever.tasks.common_steps import draw
-from hotlever.tasks.reporter import Listener, Reporter
+from hotlever.tasks.reporter import Reporter
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,7 +187,7 @@ class Thermometry:
     the thermometer was set up from.
     """
 
-    listener: Listener
+    reporter: Reporter
     options: PeakOptions
     calibration: RamanCalibration | None = None
     thermometer: Thermometer | None = None
@@ -207,12 +207,12 @@ class Thermometry:
         from hotlever.raman import series
         from hotlever.raman.spectrum_tables import check_corrections
 
-        spectra = _read(self.listener, paths)
+        spectra = _read(self.reporter, paths)
         table = self.corrected_by
         elsewhere = check_corrections(self.corrections, [*self.spectra, *spectra], table)
         stray = [f"{table}: passed over {name}, of no folder read here" for name in elsewhere]
-        _note_some(self.listener, stray)
-        lines = _measure(self.listener, spectra, self.options, self.corrections, "spectra")
+        _note_some(self.reporter, stray)
+        lines = _measure(self.reporter, spectra, self.options, self.corrections, "spectra")
         used = [line for line in lines if line.correction.use]
         if not used:
             raise InputError(f"{table}: leaves out every spectrum, expected some to use")
@@ -222,33 +222,33 @@ class Thermometry:
         return lines, series.read_lines(lines, self.thermometer)
 
 
-def _note_some(listener: Listener, texts: Sequence[str], most: int = 20) -> None:
+def _note_some(reporter: Reporter, texts: Sequence[str], most: int = 20) -> None:
     """Tell the first of many notes, at most so many, and how many more there are."""
-    listener.note(*texts[:most])
+    reporter.note(*texts[:most])
     if len(texts) > most:
-        listener.note(f"{len(texts) - most} more such notes")
+        reporter.note(f"{len(texts) - most} more such notes")
 
 
-def _read(listener: Listener, paths: Sequence[Path]) -> list[Spectrum]:
+def _read(reporter: Reporter, paths: Sequence[Path]) -> list[Spectrum]:
     """Read spectra; what a folder holds beside them is noted."""
     from hotlever.raman.spectrum import file_and_label
     from hotlever.raman.spectrum_reading import read_spectra
 
     skipped: list[str] = []
-    with listener.progress("reading") as update:
+    with reporter.progress("reading") as update:
         spectra = read_spectra(paths, skipped, update)
-    _note_some(listener, [f"passed over {line}" for line in skipped])
+    _note_some(reporter, [f"passed over {line}" for line in skipped])
     names = {(spectrum.folder, spectrum.name) for spectrum in spectra}
     files = Counter((folder, file_and_label(name)[0]) for folder, name in names)
     several = {name: count for (_, name), count in sorted(files.items()) if count > 1}
     _note_some(
-        listener, [f"{name}: {count} spectra in one file" for name, count in several.items()]
+        reporter, [f"{name}: {count} spectra in one file" for name, count in several.items()]
     )
     return spectra
 
 
 def _measure(
-    listener: Listener,
+    reporter: Reporter,
     spectra: Sequence[Spectrum],
     options: PeakOptions,
     corrections: Mapping[str, Correction],
@@ -257,12 +257,12 @@ def _measure(
     """Fit the lines of spectra; those of many that have none are noted."""
     from hotlever.raman import series
 
-    with listener.progress(label) as update:
+    with reporter.progress(label) as update:
         lines = series.measure(spectra, options, update, corrections)
     if len(lines) > 1:
         used = [line for line in lines if line.correction.use]
         without = [line.spectrum.name for line in used if line.peak is None]
-        _note_some(listener, [f"{name}: no silicon line" for name in without])
+        _note_some(reporter, [f"{name}: no silicon line" for name in without])
     return lines
 
 
@@ -275,7 +275,7 @@ def calibration_named(name: str | None) -> RamanCalibration | None:
     return published_raman_calibration() if name == "published" else read_raman_calibration(name)
 
 
-def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
+def set_up(reporter: Reporter, asked: ThermometerOptions) -> Thermometry:
     """Set up a thermometer, or only the fit of the line if no calibration is named.
 
     Raises
@@ -298,9 +298,9 @@ def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
     heating = 0.0
     if laser_power is not None and thermal_resistance is not None:
         heating = laser_heating(laser_power, thermal_resistance)
-        listener.note(f"laser heating is estimated as {heating:.2g} K and enters the error")
+        reporter.note(f"laser heating is estimated as {heating:.2g} K and enters the error")
     chosen = calibration_named(asked.calibration)
-    options = _peak_options(listener, chosen, asked.shape, asked.resolution)
+    options = _peak_options(reporter, chosen, asked.shape, asked.resolution)
     by_hand = read_corrections(asked.corrections) if asked.corrections else {}
     corrected_by = str(asked.corrections)
     hot_plate: list[MeasuredLine] = []
@@ -308,14 +308,14 @@ def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
     if asked.calibrate_from:
         stated = asked.temperatures
         table = read_temperatures(stated) if stated else None
-        spectra = _read(listener, asked.calibrate_from)
+        spectra = _read(reporter, asked.calibrate_from)
         source = ", ".join(path.name or str(path) for path in asked.calibrate_from)
-        with listener.progress("hot plate") as update:
+        with reporter.progress("hot plate") as update:
             chosen, hot_plate = series.calibrate_from(
                 spectra, options, table, update, source, by_hand
             )
         options = chosen.options
-        _describe(listener, chosen)
+        _describe(reporter, chosen)
     if chosen is None:
         refuse(
             "needs --calibration or --calibrate-from",
@@ -324,7 +324,7 @@ def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
             laser_power=asked.laser_power,
             law=asked.law != ThermometerOptions.law,
         )
-        return Thermometry(listener, options, corrections=by_hand, corrected_by=corrected_by)
+        return Thermometry(reporter, options, corrections=by_hand, corrected_by=corrected_by)
     if chosen.reference_cm is None and not asked.reference:
         raise InputError(
             "--calibration published: give --reference, a spectrum of your instrument at room "
@@ -335,19 +335,19 @@ def set_up(listener: Listener, asked: ThermometerOptions) -> Thermometry:
     law: Any = asked.law
     thermometer = Thermometer(chosen, law, start, 0.0, heating, asked.stress)
     if asked.reference:
-        lines = _measure(listener, _read(listener, asked.reference), options, by_hand, "reference")
+        lines = _measure(reporter, _read(reporter, asked.reference), options, by_hand, "reference")
         if options.band_evidence is None:
             options = replace(options, band_evidence=series.band_evidence(lines))
         peaks = [(line.peak, line.spectrum.temperature) for line in lines if line.peak]
         thermometer = thermometer.with_reference(peaks)
         spectra += [line.spectrum for line in lines]
     return Thermometry(
-        listener, options, chosen, thermometer, hot_plate, spectra, by_hand, corrected_by
+        reporter, options, chosen, thermometer, hot_plate, spectra, by_hand, corrected_by
     )
 
 
 def _peak_options(
-    listener: Listener,
+    reporter: Reporter,
     calibration: RamanCalibration | None,
     shape: Any,
     resolution: float | None,
@@ -359,7 +359,7 @@ def _peak_options(
         return PeakOptions(shape or "lorentzian", resolution)
     alike = calibration.options
     if shape not in (None, alike.shape) or resolution not in (None, alike.resolution):
-        listener.note(
+        reporter.note(
             f"the calibration was made with the line shape {alike.shape}; "
             "fitting another one shifts the line"
         )
@@ -369,23 +369,23 @@ def _peak_options(
     return replace(alike, shape=shape, resolution=resolution)
 
 
-def _describe(listener: Listener, calibration: RamanCalibration) -> None:
+def _describe(reporter: Reporter, calibration: RamanCalibration) -> None:
     """Tell what the series gave, and plainly where the line is not good enough."""
     line, law = calibration.linear, calibration.anharmonic
     residuals, (low, high) = calibration.residuals(), calibration.range_K
     outside = abs(residuals["linear_K"]) > residuals["band_K"]
-    listener.note(
+    reporter.note(
         f"calibrated from {len(calibration.points)} spectra, {low:g} to {high:g} K: linear "
         f"{line.slope_K_cm:.2f} K cm (rms {line.residual_rms_K:.1f} K), anharmonic rms "
         f"{law.residual_rms_K:.1f} K"
     )
     if outside.any():
         where = ", ".join(f"{t:g}" for t in residuals["temperature_K"][outside])
-        listener.note(
+        reporter.note(
             f"the line leaves the paper's error band at {where} K: the shift is not linear"
         )
     if law.ratio_fixed:
-        listener.note(
+        reporter.note(
             "too few temperatures to tell three- from four-phonon terms: their ratio is the "
             "published one"
         )

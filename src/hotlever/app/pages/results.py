@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
@@ -44,7 +44,7 @@ async def show_result(session: Session, banner: ErrorBanner, name: str, result: 
         if result["kind"] == "calibration":
             budget = partial(give, showing.budget, f"{stem}-budget.html")
             small_button("Uncertainty budget (one sheet)", budget, icon="print")
-    questions = []
+    questions = list[Callable[[], Awaitable[None]]]()
     if result["kind"] == "calibration":
         with ui.card().classes("w-full").props("flat bordered"):
             ui.label("What do I set?").classes("text-bold")
@@ -52,11 +52,21 @@ async def show_result(session: Session, banner: ErrorBanner, name: str, result: 
                 refusal = f"This calibration does not tell. {sentence(doubt)}"
                 ui.label(refusal).classes("remark").props("data-answer=none")
             else:
-                questions = [_Question(session, name, along) for along in _Question.quantities]
+                quantities = {
+                    "tip_K": ("tip temperature", "K", 600.0),
+                    "bias_V": ("bias", "V", 8.0),
+                    "power_mW": ("power", "mW", 2.0),
+                }
+                first = {along: value for along, (*_, value) in quantities.items()}
+                targets = session.choices("asked", first)
+                questions = [
+                    _question(session, name, along, title, unit, targets)
+                    for along, (title, unit, _) in quantities.items()
+                ]
         if questions:
             Proposals(session, banner, name, stem)
-    for question in questions:
-        await question.answer()
+    for answer in questions:
+        await answer()
     with ui.row().classes("w-full gap-3 items-start"):
         for block in result["blocks"]:
             if block["kind"] == "heading":
@@ -79,44 +89,32 @@ async def show_result(session: Session, banner: ErrorBanner, name: str, result: 
                             flat_button(kind, click, label=f"{own} as {kind}").props("size=sm")
 
 
-class _Question:
-    """A number that is asked, and its answer from the calibration."""
+def _question(
+    session: Session, name: str, along: str, title: str, unit: str, targets: dict[str, float]
+) -> Callable[[], Awaitable[None]]:
+    """Ask a number here; return what answers from the calibration for the one that stands there."""
+    with ui.row().classes("w-full items-center"):
+        number = ui.number(f"For a {title} of", value=targets[along])
+        number.props(f"suffix={unit} debounce=150").classes("w-60")
+        said = ui.label().classes("remark col min-w-60").props("aria-live=polite")
+        said.props(f"data-answer={along}")
 
-    #: What can be asked: title, unit, and what is asked at first.
-    quantities: ClassVar = {
-        "tip_K": ("tip temperature", "K", 600.0),
-        "bias_V": ("bias", "V", 8.0),
-        "power_mW": ("power", "mW", 2.0),
-    }
-
-    def __init__(self, session: Session, name: str, along: str) -> None:
-        self._session, self._name, self._along = session, name, along
-        self._targets = session.choices(
-            "asked", {key: at for key, (*_, at) in self.quantities.items()}
-        )
-        title, unit, _ = self.quantities[along]
-        with ui.row().classes("w-full items-center"):
-            value = self._targets[along]
-            self._number = ui.number(f"For a {title} of", value=value, on_change=self.answer)
-            self._number.props(f"suffix={unit} debounce=150").classes("w-60")
-            self._answer = ui.label().classes("remark col min-w-60").props("aria-live=polite")
-            self._answer.props(f"data-answer={along}")
-
-    async def answer(self) -> None:
-        """Answer for the number that stands there."""
-        value, text = self._number.value, ""
+    async def answer() -> None:
+        value, text = number.value, ""
         if value is not None:
-            self._targets[self._along] = value
+            targets[along] = value
             try:
-                arguments = self._name, self._along, value
-                row = await self._session.ask("full", showing.settings, *arguments)
+                row = await session.ask("full", showing.settings, name, along, value)
                 text = (
                     "outside of what was calibrated, or in a jump" if row is None else _answer(row)
                 )
             except HotleverError as error:
                 text = str(error)
-        if value == self._number.value:  # nothing else was typed meanwhile
-            self._answer.set_text(text)
+        if value == number.value:  # nothing else was typed meanwhile
+            said.set_text(text)
+
+    number.on_value_change(answer)
+    return answer
 
 
 def _answer(row: dict[str, float]) -> str:
