@@ -7,7 +7,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from hotlever.files import write_text
+from hotlever.files import FOLDER, check_outputs, write_text
 from hotlever.tasks.arguments import Written, refuse
 from hotlever.tasks.reporter import Reporter
 
@@ -56,9 +56,11 @@ def validate(
     from hotlever.datasets import frame_text
     from hotlever.report.validation_pages import validation_page
 
+    folder = output or Path("validate")
+    if output is None:
+        check_outputs([(folder, FOLDER)])
     with reporter.progress("validate") as update:
         page, compared = validation_page(update)
-    folder = output or Path("validate")
     written = page.write(folder)
     table = frame_text(compared.to_dataframe(), float_format="%.6g")
     write_text(folder / "validation.csv", table)
