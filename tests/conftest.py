@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -122,7 +123,7 @@ def run(
     """Run the command line in an empty folder; returns exit status, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
     # how long something takes depends on the machine
-    monkeypatch.setattr(output, "FIRST_LINE_S", float("inf"))
+    monkeypatch.setattr(output, "_lines", partial(output._lines, first_s=float("inf")))
 
     def call(*arguments: str) -> tuple[int, str, str]:
         with pytest.raises(SystemExit) as ended:

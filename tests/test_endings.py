@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -276,8 +277,8 @@ def test_what_a_stopped_import_says_is_not_an_internal_error(monkeypatch):
 
 
 def test_progress_is_told_in_lines_where_there_is_no_terminal(run, monkeypatch):
-    monkeypatch.setattr(output, "FIRST_LINE_S", 0.0)
-    monkeypatch.setattr(output, "NEXT_LINE_S", 0.0)
+    at_once = partial(output._lines, first_s=0.0, next_s=0.0)
+    monkeypatch.setattr(output, "_lines", at_once)
     status, out, err = run("sweep", "--bias", "1:2:2")
     assert status == 0
     assert out.startswith("bias_V,")

@@ -148,7 +148,7 @@ class Job:
         if kind == "progress":
             self.label, self.done, self.total = content
         elif kind == "note":
-            self.notes = [*self.notes, content][-200:]
+            self.notes = [*self.notes, content][-200:]  # the last ones
         elif kind == "failure":
             self.message = content
         else:

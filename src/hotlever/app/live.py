@@ -122,7 +122,7 @@ class LiveLever:
         """How its states are drawn, and those of all levers of this mesh."""
         number = id(self.space.mesh)
         if number not in _maps:
-            if len(_maps) >= 3:
+            if len(_maps) >= 3:  # for sliders that go back and forth
                 _maps.clear()
             # where it is nearly cold the path of the current is that of the shape
             x = self.branch.states(np.array([0.02 * self.branch.end_u]))

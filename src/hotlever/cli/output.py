@@ -16,9 +16,6 @@ from hotlever.errors import HotleverError
 if TYPE_CHECKING:
     from hotlever.types import Progress
 
-#: When progress is first told in a line, and how long after that again (s).
-FIRST_LINE_S, NEXT_LINE_S = 2.0, 10.0
-
 
 def give(result: str = "") -> None:
     """Print a result, or what was printed before and waits to be written out."""
@@ -98,15 +95,18 @@ def fail(message: str) -> None:
         tell(f"hotlever: {message}")
 
 
-def _lines(label: str) -> Progress:
-    """Return what tells progress in lines, seldom, and not at all of what takes little time."""
-    due = time.monotonic() + FIRST_LINE_S
+def _lines(label: str, first_s: float = 2.0, next_s: float = 10.0) -> Progress:
+    """Return what tells progress in lines, seldom, and not at all of what takes little time.
+
+    The first comes after `first_s` seconds, each of the next `next_s` seconds later.
+    """
+    due = time.monotonic() + first_s
 
     def update(done: int, total: int) -> None:
         nonlocal due
         if time.monotonic() >= due and done < total:
             tell(f"{label}: {done} of {total}")
-            due = time.monotonic() + NEXT_LINE_S
+            due = time.monotonic() + next_s
 
     return update
 

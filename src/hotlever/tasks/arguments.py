@@ -79,7 +79,7 @@ class LeverArguments:
 
 
 @dataclass(frozen=True)
-class DriveOptions:
+class WaveformOptions:
     """A wave form of the bias."""
 
     step: Annotated[str | None, Option(metavar="V", help="Switch the bias on, and leave it.")] = (
@@ -122,7 +122,7 @@ class DriveOptions:
 
 
 @dataclass(frozen=True)
-class HistoryOptions(DriveOptions):
+class HistoryOptions(WaveformOptions):
     """A wave form, and the times that are reported."""
 
     until: Annotated[str | None, Option(metavar="TIME", help="When to stop.")] = None
@@ -133,8 +133,8 @@ class HistoryOptions(DriveOptions):
 
 
 @dataclass(frozen=True)
-class LikeOptions:
-    """What is known beforehand of a lever that is measured."""
+class PriorOptions:
+    """What is known of a lever before it is measured: one like it, its physics, priors and laws."""
 
     probe: Annotated[
         Path | None,
@@ -165,8 +165,8 @@ class LikeOptions:
 
 
 @dataclass(frozen=True)
-class MeasuredOptions(LikeOptions):
-    """The same, and what measurement files do not say themselves."""
+class MeasuredOptions(PriorOptions):
+    """What is known before a lever is measured, and what its files do not say themselves."""
 
     medium: Annotated[
         str | None,
@@ -187,7 +187,7 @@ def _types_of_results(values: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class ManyArguments:
+class DataArguments:
     """Data files of one lever or several, where results go, and who works on them."""
 
     data: Annotated[

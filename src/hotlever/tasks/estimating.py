@@ -13,10 +13,10 @@ from typer import Argument, Option
 from hotlever.errors import ComputationError, HotleverError, InputError, quoted, unknown_name
 from hotlever.files import FOLDER, TABLE, check_outputs, write_text
 from hotlever.tasks.arguments import (
-    DriveOptions,
-    ManyArguments,
+    DataArguments,
     MeasuredOptions,
     Plot,
+    WaveformOptions,
     Written,
     at_most_one,
     check_medium,
@@ -49,10 +49,10 @@ if TYPE_CHECKING:
 
 def fit_files(
     reporter: Reporter,
-    levers: ManyArguments,
+    levers: DataArguments,
     *,
     beforehand: MeasuredOptions,
-    drive: DriveOptions,
+    drive: WaveformOptions,
     observables: Annotated[
         str | None,
         Option(help="Some of current,reader,tip,bridge; all that the file has if left out."),
@@ -164,7 +164,7 @@ def fit_files(
     return 0
 
 
-def _check_levers(levers: ManyArguments) -> bool:
+def _check_levers(levers: DataArguments) -> bool:
     """Refuse ways to work on levers that do not go together; return whether there are several."""
     check_number("--processes", levers.processes, 1, 256)
     at_most_one(processes=levers.processes, scheduler=levers.scheduler)
@@ -214,7 +214,7 @@ def _examine(
 
 def calibrate_files(
     reporter: Reporter,
-    levers: ManyArguments,
+    levers: DataArguments,
     *,
     fit: Annotated[Path | None, Option(help="A fit of this lever (hotlever fit -o).")] = None,
     power_law: Annotated[
@@ -506,7 +506,7 @@ def _calibrated_first(reporter: Reporter, data: Path, beforehand: MeasuredOption
 
 def _estimate_several(
     reporter: Reporter,
-    levers: ManyArguments,
+    levers: DataArguments,
     column: list[str] | None,
     make: Callable[..., Batch],
     results: str,
@@ -520,7 +520,7 @@ def _estimate_several(
     Parameters
     ----------
     reporter : Reporter
-    levers : ManyArguments
+    levers : DataArguments
     column : list of str or None
         Which column of the data is which, as the option says it.
     make : callable

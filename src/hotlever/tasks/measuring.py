@@ -12,7 +12,7 @@ from typer import Option
 
 from hotlever.errors import ComputationError, InputError, counted, excerpt, quoted
 from hotlever.files import write_text
-from hotlever.tasks.arguments import LikeOptions, Written, check_medium
+from hotlever.tasks.arguments import PriorOptions, Written, check_medium
 from hotlever.tasks.common_steps import read_probe
 from hotlever.tasks.parsing import check_number, parse_bias, parse_temperature
 from hotlever.tasks.reporter import Reporter
@@ -68,7 +68,7 @@ def measure_lever(
     compliance: Annotated[
         str, Option(metavar="CURRENT", help="The most that the source lets through.")
     ] = "5mA",
-    beforehand: LikeOptions,
+    beforehand: PriorOptions,
     medium: Annotated[
         str | None, Option(help="vacuum or air; what the probe file says if left out.")
     ] = None,

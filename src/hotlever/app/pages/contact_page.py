@@ -96,7 +96,7 @@ class ContactPlots:
         words = {"x": -0.97 * width, "xanchor": "left", "showarrow": False, "align": "left"}
         for number, (name, top, bottom) in enumerate(drawn.layers):
             corners = [(-width, top), (width, top), (width, bottom), (-width, bottom)]
-            shapes.append(plots.filled(corners, plots.SHADE.format(0.12 + 0.16 * (number % 2))))
+            shapes.append(plots.filled(corners, plots.shade(0.12 + 0.16 * (number % 2))))
             text = name.replace("\n", "<br>").replace(", ", "<br>")
             names.append({"y": (top + bottom) / 2.0, "text": text, **words})
         for (corners, _), colour in zip(drawn.pieces, colours, strict=True):

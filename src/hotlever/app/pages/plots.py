@@ -16,7 +16,13 @@ from hotlever.app.pages.frame import caption
 from hotlever.colours import BLUE, HEAT, VERMILION
 from hotlever.quantities import OBSERVABLES, QUANTITIES
 
-INK, SHADE = "#8a8a8a", "rgba(128,128,128,{:.2f})"
+#: What is drawn on a light page and on a dark one.
+INK = "#8a8a8a"
+
+
+def shade(opacity: float) -> str:
+    """Return a grey that lets through what is behind it."""
+    return f"rgba(128,128,128,{opacity:.2f})"
 
 
 def axes(x: str, y: str, height: int, normal: str = "") -> dict[str, Any]:
@@ -33,7 +39,7 @@ def axes(x: str, y: str, height: int, normal: str = "") -> dict[str, Any]:
         layout[f"{name}axis"] = {
             "title": {"text": title, "standoff": 6},
             "rangemode": "normal" if name in normal else "tozero",
-            "gridcolor": SHADE.format(0.25),
+            "gridcolor": shade(0.25),
             "zeroline": False,
             "linecolor": INK,
         }
@@ -191,7 +197,7 @@ class RampPlots:
         self._current.figure["data"][0] |= points(rows["bias_V"], rows["current_mA"])
         along = rows["band_V"]
         band |= points([*along, *along[::-1]], [*rows["low_K"], *rows["high_K"][::-1]])
-        band["fillcolor"] = SHADE.format(0.3)
+        band["fillcolor"] = shade(0.3)
         tip |= points(along, rows["tip_K"])
         before |= points(rows["bias_V"], rows["foretold_K"])
         limit |= points([0.0, max(rows["bias_V"])], [rows["limit_K"]] * 2)

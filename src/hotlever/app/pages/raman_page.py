@@ -339,7 +339,7 @@ class OneSpectrum:
         tall = {"yref": "paper", "y0": 0, "y1": 1}
         shade = {"type": "rect", **tall, "line": {"width": 0}, "layer": "below"}
         shapes: list[dict[str, Any]] = [
-            {**shade, "fillcolor": plots.SHADE.format(0.25), "x0": x0, "x1": x1}
+            {**shade, "fillcolor": plots.shade(0.25), "x0": x0, "x1": x1}
             for x0, x1 in ((low, first), (last, high))
             if x1 > x0
         ]

@@ -85,7 +85,7 @@ class ReaderPlots:
         bottom = low - above * (thick - low)
         corners = [*zip(sides.tolist(), surface.tolist(), strict=True)]
         below = [*corners, (sides[1], bottom), (sides[0], bottom)]
-        shapes += [plots.filled(below, plots.SHADE.format(0.35)), plots.outlined(outline)]
+        shapes += [plots.filled(below, plots.shade(0.35)), plots.outlined(outline)]
         figure = self._picture.figure
         figure["layout"]["shapes"] = shapes
         figure["layout"]["xaxis"]["range"] = sides.tolist()
