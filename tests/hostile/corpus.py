@@ -22,9 +22,9 @@ from hotlever.lever.transient.waveform import read_waveform
 from hotlever.materials import published
 from hotlever.measurement import Measurement, parse_columns
 from hotlever.probe import Probe
-from hotlever.raman.raman_calibration import published_raman_calibration, read_raman_calibration
 from hotlever.raman.spectrum_reading import read_file
 from hotlever.raman.spectrum_tables import read_bias_log, read_corrections, read_temperatures
+from hotlever.raman.thermometer import published_raman_calibration, read_raman_calibration
 from spectrometer_files import jcamp_bytes, spc_bytes, wdf_bytes
 
 EXAMPLES = Path(__file__).parents[2] / "src" / "hotlever" / "examples"

@@ -13,7 +13,6 @@ import pytest
 
 import synthetic_spectra as synthetic
 from hotlever.figures import raman_figures as figures
-from hotlever.raman.raman_calibration import published_raman_calibration
 from hotlever.raman.series import (
     DIGITS,
     calibrate_from,
@@ -23,7 +22,7 @@ from hotlever.raman.series import (
 )
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.spectrum_reading import read_spectra
-from hotlever.raman.thermometer import Thermometer
+from hotlever.raman.thermometer import Thermometer, published_raman_calibration
 from hotlever.tasks.commands import spread_option
 
 HEADER = (

@@ -14,17 +14,18 @@ from hotlever.errors import InputError
 from hotlever.raman import anharmonic, lineshape
 from hotlever.raman.line_fit import fit_peak
 from hotlever.raman.lineshape import PeakOptions
-from hotlever.raman.raman_calibration import (
-    Point,
-    calibrate_raman,
-    published_raman_calibration,
-    read_raman_calibration,
-)
 from hotlever.raman.series import calibrate_from, measure, read_lines
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.spectrum_reading import read_spectra
 from hotlever.raman.spectrum_tables import read_temperatures
-from hotlever.raman.thermometer import Thermometer, laser_heating
+from hotlever.raman.thermometer import (
+    Point,
+    Thermometer,
+    calibrate_raman,
+    laser_heating,
+    published_raman_calibration,
+    read_raman_calibration,
+)
 from hotlever.spieser2017 import HEATER_STRESS_MPA, RAMAN_CONSTANT_K, RAMAN_SLOPE_K_CM
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.raman import anharmonic
-from hotlever.raman.raman_calibration import published_raman_calibration
+from hotlever.raman.thermometer import published_raman_calibration
 from hotlever.spieser2017 import HOTTEST_TIP_K
 from hotlever.studies.raman_check import conclusion, paper_check
 

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hotlever.errors import InputError
 from hotlever.estimate.noise import CommonCovariance, CommonError, DataErrors
@@ -92,7 +91,6 @@ class Residuals:
         if data_weights is not None:
             self.errors.fix(data_weights[:, self._used])
             self.present = self.errors.present
-        self._lines = Drift(observables, self.present)
         self.common, self._common = common, np.zeros((*self.data.shape, len(common)))
         for number, error in enumerate(common):
             row = self.observables.index(error.observable)
@@ -238,49 +236,22 @@ class Residuals:
         self.errors.take_scatter(difference, values[self.rows], leverage, discrepancy)
 
     def drifting_zeros(self, values: Array, slopes: Array) -> list[str]:
-        """Say of which observables the zeros seem to drift."""
+        """Say of which observables the zeros seem to drift, beyond the scatter.
+
+        Current, reader and bridge have a zero, which gets a straight line over the rows. Residuals
+        at the optimum without lines tell it, less what the parameters could take up instead.
+        """
         if self.size <= slopes.shape[2] + 2 * len(self.rows):
             return []
-        return self._lines.noticed(
-            -self.weighted(values), self.jacobian(slopes), self.errors.weights
-        )
-
-    def rms(self, values: Array) -> dict[str, float]:
-        """Return the rms of data minus prediction by column, for every observable with data."""
-        difference = self.measured[: len(values)] - values
-        difference[self.rows] = self.difference(values)
-        return {
-            column.name: float(np.sqrt(np.nanmean(row**2)))
-            for column, row in zip(FITTED.values(), difference, strict=False)
-            if np.isfinite(row).any()
-        }
-
-
-class Drift:
-    """Straight lines over the rows of some observables.
-
-    Current, reader and bridge have a zero, and get a line; `present`, (k, n), says which data there
-    are. Weights, by which residuals are multiplied, have the same shape.
-    """
-
-    def __init__(self, observables: Sequence[str], present: NDArray[np.bool_]) -> None:
-        self._present, self._names = present, tuple(observables)
-        order = np.linspace(-1.0, 1.0, present.shape[1])
-        self._columns = np.zeros((*present.shape, 2 * len(self._names)))
-        for row, name in enumerate(self._names):
+        order = np.linspace(-1.0, 1.0, self.present.shape[1])
+        zeros = np.zeros((*self.present.shape, 2 * len(self.observables)))
+        for row, name in enumerate(self.observables):
             if name in ("current", "reader", "bridge"):
-                self._columns[row, :, 2 * row] = 1.0
-                self._columns[row, :, 2 * row + 1] = order
-        nonzero = np.any(self._columns, axis=(0, 1))
-        self._columns = self._columns[:, :, nonzero]
-
-    def noticed(self, residual: Array, jacobian: Array, weights: Array) -> list[str]:
-        """Say which observables have a zero that stands out of the scatter.
-
-        By the weighted residual (data minus prediction, N) at the optimum without lines, and by
-        what the parameters could take up instead, (N, m).
-        """
-        columns = (weights[..., None] * self._columns)[self._present]
+                zeros[row, :, 2 * row] = 1.0
+                zeros[row, :, 2 * row + 1] = order
+        zeros = zeros[:, :, np.any(zeros, axis=(0, 1))]
+        residual, jacobian = -self.weighted(values), self.jacobian(slopes)
+        columns = (self.errors.weights[..., None] * zeros)[self.present]
         basis = np.linalg.qr(jacobian)[0]
         columns = columns - basis @ (basis.T @ columns)
         try:
@@ -293,12 +264,22 @@ class Drift:
         influence = inverse @ columns.T * rest
         errors = np.sqrt((influence**2).sum(axis=1))
         out = np.abs(sizes) > 7.0 * errors
-        lines, which = self._columns @ sizes, np.any(self._columns, axis=1) @ out
+        lines, which = zeros @ sizes, np.any(zeros, axis=1) @ out
         return [
             f"{name}: the zero seems to go from {first:+.3g} to {last:+.3g} "
             f"{FITTED[name].unit} along the file"
             for name, first, last, is_out in zip(
-                self._names, *lines[:, [0, -1]].T, which, strict=True
+                self.observables, *lines[:, [0, -1]].T, which, strict=True
             )
             if is_out
         ]
+
+    def rms(self, values: Array) -> dict[str, float]:
+        """Return the rms of data minus prediction by column, for every observable with data."""
+        difference = self.measured[: len(values)] - values
+        difference[self.rows] = self.difference(values)
+        return {
+            column.name: float(np.sqrt(np.nanmean(row**2)))
+            for column, row in zip(FITTED.values(), difference, strict=False)
+            if np.isfinite(row).any()
+        }

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from hotlever.figures.style import BLACK, BLUE, GREEN, VERMILION, figure, panel_letters
 from hotlever.raman.lineshape import WINDOW, Peak, in_window
-from hotlever.raman.raman_calibration import RamanCalibration
 from hotlever.raman.series import MeasuredLine
+from hotlever.raman.thermometer import RamanCalibration
 from hotlever.spieser2017 import RAMAN_ERROR_K, RAMAN_ERROR_SHARE
 from hotlever.studies.raman_check import conclusion
 from hotlever.types import Array

@@ -14,10 +14,9 @@ from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.raman.line_fit import fit_peak, with_hidden_top
 from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
-from hotlever.raman.raman_calibration import Point, RamanCalibration, calibrate_raman
 from hotlever.raman.spectrum import Spectrum, aliases
 from hotlever.raman.spectrum_tables import Correction, of_spectrum
-from hotlever.raman.thermometer import Thermometer
+from hotlever.raman.thermometer import Point, RamanCalibration, Thermometer, calibrate_raman
 from hotlever.steps import each
 from hotlever.types import Progress
 

@@ -46,7 +46,7 @@ from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.kinds import BY_THICKNESS
 from hotlever.materials.silicon import intrinsic_density, inversion_temperature
 from hotlever.probe import Probe, Tip
-from hotlever.raman.raman_calibration import published_raman_calibration
+from hotlever.raman.thermometer import published_raman_calibration
 from hotlever.steps import each
 from hotlever.studies.simulation_based_calibration import MinimosMaterial
 from hotlever.types import Array, Progress

@@ -13,7 +13,7 @@ import xarray as xr
 from hotlever import spieser2017 as paper
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
-from hotlever.raman.raman_calibration import (
+from hotlever.raman.thermometer import (
     Point,
     RamanCalibration,
     calibrate_raman,

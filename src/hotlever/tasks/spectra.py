@@ -24,11 +24,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from hotlever.raman.lineshape import PeakOptions
-    from hotlever.raman.raman_calibration import RamanCalibration
     from hotlever.raman.series import MeasuredLine
     from hotlever.raman.spectrum import Spectrum
     from hotlever.raman.spectrum_tables import Correction
-    from hotlever.raman.thermometer import Thermometer
+    from hotlever.raman.thermometer import RamanCalibration, Thermometer
 
 
 @dataclass(frozen=True)
@@ -268,7 +267,7 @@ def _measure(
 
 def calibration_named(name: str | None) -> RamanCalibration | None:
     """Return the published calibration, the one in a file, or none."""
-    from hotlever.raman.raman_calibration import published_raman_calibration, read_raman_calibration
+    from hotlever.raman.thermometer import published_raman_calibration, read_raman_calibration
 
     if name is None:
         return None
