@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hotlever.estimate import Measurement
-from hotlever.estimate.diagnosis import lack_of_fit_text, run_of_outliers
+from hotlever.estimate.diagnosis import DiagnosisOptions, lack_of_fit_text, run_of_outliers
 from hotlever.estimate.residuals import Residuals
 
 COUNT = 40
@@ -122,3 +122,10 @@ def test_a_fit_says_first_that_its_data_are_not_described(run, tmp_path):
     assert written["reason"] in out
     assert "profiles" not in written
     assert {one["stderr"] for one in written["parameters"].values()} == {None}
+
+
+def test_what_counts_as_described_is_an_option():
+    residuals = compared(0.05 * ALONG**3)
+    assert lack_of_fit_text(residuals, MODEL, DiagnosisOptions(held_scatter=0.017)).endswith(" V")
+    wide = DiagnosisOptions(held_scatter=0.02, usual_scatter=0.02)
+    assert lack_of_fit_text(residuals, MODEL, wide) == ""
