@@ -548,11 +548,7 @@ class EstimateFile(ParameterFields, TipFields):
         square, common = (len(names),) * 2, self.common_noise_covariance
         common = np.zeros(square) if common is None else common
         _array(self.correlation.matrix, square, f"{path}: correlation")
-        _array(
-            np.zeros(square) if common is None else common,
-            square,
-            f"{path}: common_noise_covariance",
-        )
+        _array(common, square, f"{path}: common_noise_covariance")
 
     def content(self) -> dict[str, Any]:
         """Return what is written, in plain values: first of the tip, then of the parameters."""
