@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -56,8 +58,106 @@ def test_of_several_sheets_one_is_asked_for(tmp_path):
 
 def test_a_formula_that_nobody_has_calculated_is_an_error(tmp_path):
     path = workbook(tmp_path / "iv.xlsx", sweep=[*rows(), ["=A4*2", 1.0]])
-    with pytest.raises(InputError, match=r"'sweep', row 8, column 1: a formula without its value"):
+    with pytest.raises(InputError, match=r"cell A8: a formula without its value"):
         read_measurement(path)
+
+
+def test_a_formula_with_its_value_is_a_number(tmp_path):
+    path = rewritten(
+        workbook(tmp_path / "iv.xlsx", sweep=[*rows(), ["=A7*2", 2e3]]),
+        "xl/worksheets/sheet1.xml",
+        (b"<v></v>", b"<v>16.5</v>"),
+        (b"<v />", b"<v>16.5</v>"),
+    )
+    assert read_measurement(path).bias_V[-1] == 16.5
+
+
+def rewritten(path, part, *changes):
+    """Replace bytes in a part of a workbook."""
+    with zipfile.ZipFile(path) as parts:
+        contents = {name: parts.read(name) for name in parts.namelist()}
+    for old, new in changes:
+        contents[part] = contents[part].replace(old, new)
+    with zipfile.ZipFile(path, "w") as parts:
+        for name, content in contents.items():
+            parts.writestr(name, content)
+    return path
+
+
+def test_styles_that_no_program_but_an_instrument_writes_are_no_matter(tmp_path):
+    path = workbook(tmp_path / "iv.xlsx", sweep=rows())
+    fills = (b"<fill><patternFill /></fill>", b"<fill/>")
+    path = rewritten(path, "xl/styles.xml", fills, (b"<patternFill", b"<fill/><patternFill"))
+    assert read_measurement(path).bias_V.tolist() == BIAS.tolist()
+
+
+def test_errors_name_the_row_of_the_sheet(tmp_path):
+    path = workbook(tmp_path / "iv.xlsx", sweep=[*rows(), [], [], ["~9", 1.0]])
+    with pytest.raises(InputError, match=r"line 10: .*'~9'"):
+        read_measurement(path)
+
+
+def test_a_sheet_whose_cells_are_far_apart_is_refused(tmp_path):
+    path = workbook(tmp_path / "iv.xlsx", sweep=rows())
+    path = rewritten(path, "xl/worksheets/sheet1.xml", (b'r="B7"', b'r="XFD190000"'))
+    with pytest.raises(InputError, match="190000 rows and 16384 columns, expected at most"):
+        read_measurement(path)
+
+
+def old_workbook(path, rows):
+    """Write a sheet of an .xls file: numbers and words in the records of BIFF 8."""
+
+    def record(kind, content=b""):
+        return struct.pack("<HH", kind, len(content)) + content
+
+    def begin(kind):
+        return record(0x809, struct.pack("<HHHHII", 0x600, kind, 0, 1997, 0, 0))
+
+    cells = b""
+    for row, values in enumerate(rows):
+        for column, value in enumerate(values):
+            place = struct.pack("<HHH", row, column, 0)
+            if isinstance(value, str):
+                text = struct.pack("<HB", len(value), 0) + value.encode("latin-1")
+                cells += record(0x204, place + text)
+            else:
+                cells += record(0x203, place + struct.pack("<d", value))
+    name = struct.pack("<BBBB", 0, 0, 4, 0) + b"Data"
+    offset = len(begin(5)) + len(record(0x85, b"1234" + name)) + 4
+    book = begin(5) + record(0x85, struct.pack("<I", offset) + name) + record(0x0A)
+    book = (book + begin(0x10) + cells + record(0x0A)).ljust(4096, b"\0")
+    # a compound file: one sector of the table of sectors, one of names, then those of the book
+    sectors = len(book) // 512
+    header = struct.pack(
+        "<8s16xHHHHH6xIIII", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", 0x3E, 3, 0xFFFE, 9, 6, 0, 1, 1, 0
+    )
+    header += struct.pack("<IIIII", 4096, 0xFFFFFFFE, 0, 0xFFFFFFFE, 0)
+    header += struct.pack("<I", 0) + b"\xff" * 4 * 108
+    follows = [0xFFFFFFFD, 0xFFFFFFFE, *range(3, 2 + sectors), 0xFFFFFFFE]
+    table = struct.pack(f"<{len(follows)}I", *follows).ljust(512, b"\xff")
+
+    def entry(name, kind, child, start, size):
+        text = (name + "\0").encode("utf-16-le")
+        links = struct.pack("<BBIII", kind, 1, 0xFFFFFFFF, 0xFFFFFFFF, child)
+        return (text.ljust(64, b"\0") + struct.pack("<H", len(text)) + links).ljust(
+            116, b"\0"
+        ) + struct.pack("<IQ", start, size)
+
+    names = entry("Root Entry", 5, 1, 0xFFFFFFFE, 0)
+    names += entry("Workbook", 2, 0xFFFFFFFF, 2, len(book))
+    path.write_bytes(header + table + names.ljust(512, b"\0") + book)
+    return path
+
+
+def test_an_old_workbook_is_read(tmp_path):
+    pytest.importorskip("python_calamine")
+    table = [["Time", "AI", "AV", "RES"]]
+    table += [[0.5 * n, i, v, "#REF"] for n, (i, v) in enumerate(zip(CURRENT, BIAS, strict=True))]
+    path = old_workbook(tmp_path / "iv.xls", table)
+    data = read_measurement(path, {"V_b (V)": "AV", "I_h (A)": "AI"})
+    assert data.bias_V.tolist() == BIAS.tolist()
+    np.testing.assert_allclose(data.current_mA, 1e3 * CURRENT, rtol=1e-15)
+    assert not any("'#REF'" in note for note in data.notes)
 
 
 def test_an_empty_cell_is_no_value(tmp_path):
@@ -127,6 +227,63 @@ def test_a_dataset_exported_by_xarray_is_read(tmp_path):
     assert measured.series_resistance_ohm == 5600.0
 
 
+def test_packed_numbers_are_unpacked(tmp_path):
+    """As netCDF's conventions have it; a gap is no value."""
+    h5py = pytest.importorskip("h5py")
+    path = hdf5(tmp_path / "iv.nc", root=sweep())
+    with h5py.File(path, "r+") as file:
+        del file["I_h"]
+        file["I_h"] = np.array([14, -999, 94, 1178], dtype=np.int16)
+        packing = {"units": "mA", "scale_factor": 1e-3, "add_offset": 5e-4, "_FillValue": [-999]}
+        file["I_h"].attrs.update(packing)
+    data = read_measurement(path)
+    np.testing.assert_allclose(data.current_mA, [0.0145, np.nan, 0.0945, 1.1785], rtol=1e-12)
+
+
+def test_a_table_of_fields_is_one_of_its_own(tmp_path):
+    """Two of the same fields, as PyTables writes them, do not take each other's place."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "iv.h5"
+    with h5py.File(path, "w") as file:
+        for name, scale in (("down", 1.3), ("up", 1.0)):
+            pairs = list(zip(BIAS, 1e3 * scale * CURRENT, strict=True))
+            file[name] = np.array(pairs, dtype=[("V_b (V)", float), ("I_h (mA)", float)])
+    assert file_groups(path) == ["/down", "/up"]
+    data = read_measurement(path, {"group": "/up"})
+    np.testing.assert_allclose(data.current_mA, 1e3 * CURRENT, rtol=1e-15)
+
+
+def test_a_unit_may_be_an_array_of_one(tmp_path):
+    units = {"V_b": (BIAS, [b"V"]), "I_h": (CURRENT, ["A"])}
+    data = read_measurement(hdf5(tmp_path / "iv.h5", root=units))
+    np.testing.assert_allclose(data.current_mA, 1e3 * CURRENT, rtol=1e-15)
+
+
+@pytest.mark.parametrize("lies", [False, True])
+def test_the_longer_side_of_an_array_is_the_rows(tmp_path, lies):
+    array = np.stack([BIAS, 1e3 * CURRENT], axis=1)
+    path = hdf5(tmp_path / "iv.h5", root={"data": (array.T if lies else array, "")})
+    data = read_measurement(path, {"V_b (V)": "data 1", "I_h (mA)": "data 2"})
+    assert data.bias_V.tolist() == BIAS.tolist()
+
+
+def test_an_array_beside_a_column_has_as_many_rows(tmp_path):
+    array = np.outer(CURRENT, [1.0, 1.1, 1.2, 1.3, 1.4, 1.5])
+    path = hdf5(tmp_path / "iv.h5", root={"V_b": (BIAS, "V"), "data": (array, "A")})
+    data = read_measurement(path, {"I_h": "data 2"})
+    np.testing.assert_allclose(data.current_mA, 1.1e3 * CURRENT, rtol=1e-15)
+
+
+def test_an_unknown_compression_is_named(tmp_path, monkeypatch):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "iv.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("V_b", data=BIAS, compression="lzf")
+    monkeypatch.setattr(h5py.h5z, "filter_avail", lambda code: False)
+    with pytest.raises(InputError, match="'/V_b' is compressed by 'lzf', expected gzip"):
+        read_measurement(path)
+
+
 # --- MATLAB ---------------------------------------------------------------------------------------
 
 
@@ -164,6 +321,19 @@ def test_a_matlab_file_of_version_7_3_is_read(tmp_path):
     assert data.bias_V.tolist() == BIAS.tolist()
 
 
+def test_matlab_counts_along_columns_and_says_what_is_empty(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "iv.mat"
+    square = np.outer(1e3 * CURRENT, [1.0, 1.1, 1.2, 1.3])
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in (("V_b", BIAS[None]), ("I_h", square.T), ("notes", np.zeros(2))):
+            file[name] = values
+            file[name].attrs["MATLAB_class"] = b"double"
+        file["notes"].attrs["MATLAB_empty"] = 1
+    data = read_measurement(path, {"V_b (V)": "V_b", "I_h (mA)": "I_h 2"})
+    np.testing.assert_allclose(data.current_mA, 1.1e3 * CURRENT, rtol=1e-15)
+
+
 # --- what cannot be read --------------------------------------------------------------------------
 
 
@@ -193,7 +363,7 @@ def test_a_file_without_numbers_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("module", "extra", "content"),
     [
-        ("openpyxl", "excel", b"PK\x03\x04 xl/workbook.xml"),
+        ("python_calamine", "excel", b"PK\x03\x04 xl/workbook.xml"),
         ("h5py", "hdf5", b"\x89HDF\r\n\x1a\n"),
     ],
 )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 
 import numpy as np
 import pytest
 
 from hotlever import InputError, read_measurement
+from hotlever.measurement import file_groups
 from hotlever.measurement.columns import parse_columns
 
 NOTE = "V_b (V): 8\rR_s (kOhm): 5.6\rOperator: Zoë\r"
@@ -78,3 +80,53 @@ def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"curve\.ibw: .*pip install 'hotlever\[igor\]'") as error:
         read_measurement(path)
     assert "\n" not in str(error.value)
+
+
+def experiment(path, *records):
+    """Write records: their kinds, and their contents or the files that have them."""
+    with path.open("wb") as file:
+        for kind, content in records:
+            content = content if isinstance(content, bytes) else content.read_bytes()
+            file.write(struct.pack("<HHi", kind, 0, len(content)) + content)
+    return path
+
+
+def test_the_waves_of_a_folder_of_an_experiment_are_a_table(tmp_path):
+    bias = written(tmp_path / "bias.ibw", np.array([1.0, 2.0, 4.0, 8.0]), "V_b", "V", note="")
+    current = written(tmp_path / "current.ibw", 1e-4 * CURRENT, "I_h", "A")
+    other = written(tmp_path / "other.ibw", 5e-5 * CURRENT, "I_h", "A", note="")
+    folder = b"second".ljust(32, b"\0")
+    path = experiment(
+        tmp_path / "all.pxp",
+        (2, b"the history"),
+        (3, bias),
+        (3, current),
+        (9, folder),
+        (3, bias),
+        (3, other),
+        (10, b""),
+    )
+    assert file_groups(path) == ["/", "/second"]
+    data = read_measurement(path, {"group": "/"})
+    assert data.bias_V.tolist() == [1.0, 2.0, 4.0, 8.0]
+    np.testing.assert_allclose(data.current_mA, 0.1 * CURRENT, rtol=1e-14)
+    data = read_measurement(path, {"group": "/second"})
+    np.testing.assert_allclose(data.current_mA, 0.05 * CURRENT, rtol=1e-14)
+
+
+def test_waves_of_an_experiment_along_a_scale_have_it(tmp_path):
+    scale = (300e-9, -100e-9, "m")
+    path = experiment(
+        tmp_path / "all.pxp",
+        (3, written(tmp_path / "one.ibw", 1e-3 * CURRENT, "I_h", "A", scale)),
+        (3, written(tmp_path / "two.ibw", CURRENT, "V_r", "mV", scale, note="")),
+    )
+    data = read_measurement(path, columns=parse_columns(["D=x"]))
+    np.testing.assert_allclose(data.distance_um, [0.3, 0.2, 0.1, 0.0], atol=1e-15)
+    np.testing.assert_allclose(data.current_mA, CURRENT, rtol=1e-15)
+
+
+def test_a_wave_without_values_says_so(tmp_path):
+    path = written(tmp_path / "empty.ibw", np.zeros(0))
+    with pytest.raises(InputError, match="a wave without values"):
+        read_measurement(path)

@@ -56,6 +56,16 @@ def test_of_several_groups_the_one_that_is_told_is_read(tmp_path):
     assert file_groups(path) == ["sweep 0", "sweep 1"]
 
 
+def test_long_names_of_groups_can_be_told_apart_and_copied(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    path, title = tmp_path / "iv.tdms", "07/09/2012 06:58:23 PM - Analogue input - "
+    with nptdms.TdmsWriter(path) as writer:
+        channels = [nptdms.ChannelObject(f"{title}{name}", "V_b", BIAS) for name in ("all", "some")]
+        writer.write_segment(channels)
+    with pytest.raises(InputError, match=f"'{title}all', '{title}some'; .*'group={title}all'"):
+        read_measurement(path)
+
+
 def test_a_group_of_settings_is_asked_for_too(tmp_path):
     one = [("V_b", "V", BIAS), ("I_h", "Amps", CURRENT)]
     path = written(tmp_path / "iv.tdms", one, [("T_stage", "°C", BIAS)])

@@ -49,6 +49,14 @@ def test_the_reference_probe_is_told_from_its_drawing(run, tmp_path, kind, turn)
     assert (tmp_path / "lever.png").stat().st_size > 10_000
 
 
+def test_a_cell_of_klayouts_own_is_no_lever(run, tmp_path):
+    library = reference_library()
+    library.new_cell("$$$CONTEXT_INFO$$$").add(gdstk.Label("PCELL", (0.0, 0.0)))
+    written(tmp_path / "lever.gds", library)
+    _, out, _ = imported(run, tmp_path, "lever.gds")
+    assert "cell LEVER; others: $$$CONTEXT_INFO$$$" in out
+
+
 def test_without_a_file_name_the_probe_file_is_printed(run, tmp_path):
     written(tmp_path / "lever.gds")
     status, out, _ = run("probe", "import", "lever.gds")

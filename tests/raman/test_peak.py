@@ -151,6 +151,15 @@ def test_cosmic_rays_are_left_out_wherever_they_fall():
         assert peak.centre == pytest.approx(expected.centre, abs=3 * expected.centre_stderr)
 
 
+@pytest.mark.parametrize("seed", [1, 3, 4, 7])
+def test_a_hump_of_the_background_is_no_line(seed):
+    """Of a response as broad as no spectrometer's a line would fit it."""
+    x = np.arange(420.0, 620.0, 1.22)
+    counts = 1350.0 - 0.75 * (x - 520.0) + 130.0 * np.exp(-0.5 * ((x - 528.0) / 20.0) ** 2)
+    with pytest.raises(NoSiliconLine):
+        fit_peak(x, np.random.default_rng(seed).poisson(counts).astype(float))
+
+
 def test_a_sharp_line_on_a_coarse_axis_is_no_cosmic_ray():
     x = np.arange(440.0, 600.0, 3.0)
     peak = fit_peak(x, quiet(x=x, fwhm=4.5, height=5000.0))

@@ -12,6 +12,7 @@ import synthetic_spectra as synthetic
 from hotlever.errors import InputError
 from hotlever.raman.line_fit import fit_peak
 from hotlever.raman.spectrum_reading import read_file
+from hotlever.tables import find_tables
 from spectrometer_files import wdf_bytes
 
 TEMPERATURES = (296.0, 500.0, 800.0, 1137.0)
@@ -278,6 +279,12 @@ def test_a_log_that_names_a_file_of_several_spectra_is_told_so(run, series, hot_
     )
     assert status == 2
     assert "line 2: spectrum 'map.txt' names 4 of them" in err
+
+
+def test_headings_between_two_tabs_stand_above_numbers_between_one(series):
+    text = wire(*series).replace("\t\t", "\t").replace("#X\t#Y\t#Wave\t", "#X\t\t#Y\t\t#Wave\t\t")
+    tables = find_tables(text.encode(), "map.txt")
+    assert {tuple(table.names) for table in tables} == {("#X", "#Y", "#Wave", "#Intensity")}
 
 
 def test_peaks_of_a_series_are_those_of_its_spectra(series, tmp_path):

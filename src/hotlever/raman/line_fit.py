@@ -394,6 +394,8 @@ def _peak(solution: Solution) -> Peak | None:
         LINE_RANGE[0] < centre < LINE_RANGE[1]
         # on an axis in nm, which looks alike, a line is forty times narrower
         and max(0.5 * step, 0.5) < width < _MAX_FWHM
+        # no spectrometer responds so broadly: it is a hump of the background, and no line
+        and resolution < 25.0
         and area > 0.0
     ):
         return None

@@ -1,22 +1,25 @@
 """Binary files of instruments and programs, as the lines of a text table.
 
 Igor Pro's waves (.ibw) have values along a scale of their own, such as a distance, in one column or
-several that may be labelled. LabVIEW's TDMS files have groups of channels, each with properties
-such as its unit; HDF5 files, QCoDeS's among them, have groups of datasets with attributes, MATLAB's
-have variables and structures of them, and workbooks (.xlsx) have sheets. Each group, structure and
-sheet is a table of its own. The libraries that read them come with extras (``hotlever[igor]``,
-``hotlever[tdms]``, ``hotlever[hdf5]``, ``hotlever[excel]``).
+several that may be labelled; its experiments (.pxp) have folders of waves. LabVIEW's TDMS files
+have groups of channels, each with properties such as its unit; HDF5 files, QCoDeS's among them,
+have groups of datasets with attributes, MATLAB's have variables and structures of them, and
+workbooks (.xlsx, .xls) have sheets. Each folder, group, structure and sheet is a table of its own.
+The libraries that read them come with extras (``hotlever[igor]``, ``hotlever[tdms]``,
+``hotlever[hdf5]``, ``hotlever[excel]``).
 """
 
 from __future__ import annotations
 
 import io
 import logging
+import re
+import struct
 import zipfile
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice, zip_longest
 from typing import Any, TypeVar
@@ -96,7 +99,8 @@ def lines_of_binary(
         if format_ is None:
             return None
     take = partial(_lines_of, where=where, group=group, group_stated_by=group_stated_by)
-    return list(enumerate(format_.read(raw, where, take), start=1))
+    numbered = enumerate(format_.read(raw, where, take), start=1)
+    return [(number, line) for number, line in numbered if line]
 
 
 def groups_in(raw: bytes, where: str) -> list[str]:
@@ -118,6 +122,9 @@ def _format_of(raw: bytes) -> _Format | None:
     waves = (b"\0\2", b"\2\0", b"\0\3", b"\3\0", b"\0\5", b"\5\0")
     if raw.startswith(b"TDSm"):
         return _Format("TDMS file", "tdms", "npTDMS", _tdms_groups)
+    # the first record of an experiment may begin as a wave does
+    if _experiment_order(raw):
+        return _Format("Igor experiment", "igor", "igor2", _experiment_groups)
     if raw.startswith(waves):
         return _Format("Igor wave", "igor", "igor2", _igor_groups, named=False)
     # MATLAB's of version 7.3 have a block of their own in front
@@ -125,8 +132,12 @@ def _format_of(raw: bytes) -> _Format | None:
         return _Format("HDF5 file", "hdf5", "h5py", _hdf5_groups)
     if raw.startswith(b"MATLAB 5.0 MAT-file"):
         return _Format("MATLAB file", "hdf5", "scipy", _matlab_groups)
-    if raw.startswith(b"PK") and b"xl/workbook.xml" in raw:
-        return _Format("workbook", "excel", "openpyxl", _excel_groups)
+    # an old workbook is one of the files that Windows' compound files may hold
+    old = raw.startswith(b"\xd0\xcf\x11\xe0") and (
+        "Workbook".encode("utf-16-le") in raw or "Book\0".encode("utf-16-le") in raw
+    )
+    if old or (raw.startswith(b"PK") and b"xl/workbook.xml" in raw):
+        return _Format("workbook", "excel", "python-calamine", _workbook_groups)
     return None
 
 
@@ -135,10 +146,10 @@ def _lines_of(groups: Groups, where: str, group: str | None, group_stated_by: st
     if not groups:
         raise InputError(f"{where}: holds no table of numbers")
     if group is None and len(groups) > 1:
-        most = 6  # that a question names
-        some = ", ".join(map(quoted, islice(groups, most)))
+        most, longest = 6, 120  # that a question names, and characters: of files they are alike
+        some = ", ".join(f"'{excerpt(each, longest)}'" for each in islice(groups, most))
         more = f" and {len(groups) - most} more" if len(groups) > most else ""
-        how = group_stated_by.format(group=excerpt(next(iter(groups))))
+        how = group_stated_by.format(group=excerpt(next(iter(groups)), longest))
         raise InputError(
             f"{where}: {len(groups)} groups, each a measurement of its own: {some}{more}; "
             f"expected {f'one, which {how} says' if how else 'a file of one group'}"
@@ -169,14 +180,11 @@ def _igor_lines(raw: bytes, where: str) -> list[str]:
     numbered. Columns are called by their labels; one alone is called like the wave, and has its
     unit. Several columns may have different units, which the wave does not state.
     """
-    from igor2 import binarywave
-
-    # it says what is wrong by an error too
-    logging.getLogger("igor2").setLevel(logging.CRITICAL)
-    _check_sizes(raw)
-    wave = binarywave.load(io.BytesIO(raw))["wave"]
+    wave = _wave(raw)
     values = wave["wData"]
-    if values.ndim not in (1, 2) or values.dtype.kind not in "iuf" or not values.size:
+    if not values.size:
+        raise InputError(f"{where}: a wave without values, expected numbers")
+    if not _has_columns(values):
         raise InputError(
             f"{where}: a wave of {values.ndim} dimensions and type {values.dtype}, expected "
             "real numbers in one column or several"
@@ -188,10 +196,85 @@ def _igor_lines(raw: bytes, where: str) -> list[str]:
     if scale is not None:
         names.insert(0, scale[0])
         columns.insert(0, scale[1].tolist())
-    note = decode(bytes(wave["note"]), f"{where}: its note")
-    lines = [f"# {line}" for line in note.splitlines() if line.strip()]
-    lines.append("\t".join(names))
+    lines = [*_note(wave, where), "\t".join(names)]
     return lines + ["\t".join(map(repr, row)) for row in zip(*columns, strict=True)]
+
+
+def _wave(raw: bytes) -> dict[str, Any]:
+    from igor2 import binarywave
+
+    # it says what is wrong by an error too
+    logging.getLogger("igor2").setLevel(logging.CRITICAL)
+    _check_sizes(raw)
+    wave: dict[str, Any] = binarywave.load(io.BytesIO(raw))["wave"]
+    return wave
+
+
+def _has_columns(values: Any) -> bool:
+    return bool(values.size and values.ndim in (1, 2) and values.dtype.kind in "iuf")
+
+
+def _note(wave: dict[str, Any], where: str) -> list[str]:
+    """Return a wave's note as comments."""
+    note = decode(bytes(wave["note"]), f"{where}: its note")
+    return [f"# {line}" for line in note.splitlines() if line.strip()]
+
+
+def _experiment_order(raw: bytes) -> str:
+    """Return the order of bytes of an experiment, a file of nothing but records; else ''."""
+    for order in "<>":
+        at = count = 0
+        while at + 8 <= len(raw):
+            kind, _, size = struct.unpack_from(f"{order}HHi", raw, at)
+            if kind & 0x7FFF > 0xFF or size < 0:
+                break
+            at, count = at + 8 + size, count + 1
+        if at == len(raw) and count > 1:
+            return order
+    return ""
+
+
+@contextmanager
+def _experiment_groups(raw: bytes, where: str) -> Iterator[Groups]:
+    """Give the waves of each folder of an experiment, and the scales that they have."""
+    import igor2  # noqa: F401
+
+    order, at, path, known = _experiment_order(raw), 0, ["/"], {"/": _Node.empty()}
+    while at < len(raw):
+        kind, _, size = struct.unpack_from(f"{order}HHi", raw, at)
+        content, at = raw[at + 8 : at + 8 + size], at + 8 + size
+        match kind & 0x7FFF:
+            case 3:
+                _add_wave(known[path[-1]], content, where)
+            case 9:
+                name = f"{path[-1].rstrip('/')}/{_name(content)}"
+                path.append(name)
+                known.setdefault(name, _Node.empty())
+            case 10 if len(path) > 1:
+                path.pop()
+    tables: dict[str, Callable[[], list[str]]] = {}
+    for name, node in known.items():
+        tables |= node.tables(name, where)
+    yield tables
+
+
+def _add_wave(node: _Node, content: bytes, where: str) -> None:
+    """Add the columns of a wave, and its scale, to those of its folder."""
+    wave = _wave(content)
+    values, name = wave["wData"], _name(wave["wave_header"]["bname"])
+    if not _has_columns(values):
+        node.settings.append(f"# left out, no column of real numbers: {name}")
+        return
+    columns = node.columns[len(values)]
+    scale = _scale(wave, len(values))
+    if scale is not None:
+        heading, positions = scale
+        is_other = heading in columns and not np.array_equal(columns[heading], positions)
+        columns[f"{name}: {heading}" if is_other else heading] = positions
+    table = values.reshape(len(values), -1).astype(float)
+    for label, column in zip(_names(wave, table.shape[1]), table.T, strict=True):
+        columns[label if table.shape[1] == 1 else f"{name} {label}"] = column
+    node.settings.extend(_note(wave, where))
 
 
 def _check_sizes(raw: bytes) -> None:
@@ -347,12 +430,15 @@ class _Node:
         What is said of it, as comments.
     columns : dict of int to dict
         Of so many rows each, by their headings.
+    matrices : list of tuple
+        Arrays of two dimensions with their names and units, whose columns are still to be found.
     most : int
         Columns that an array may be; one of more is an image.
     """
 
     settings: list[str]
     columns: dict[int, dict[str, Array]]
+    matrices: list[tuple[str, str, Array]] = field(default_factory=list)
     most: int = 64
 
     @classmethod
@@ -373,16 +459,24 @@ class _Node:
         elif values.ndim == 1:
             self.columns[values.size][heading] = values.astype(float)
         elif min(values.shape) <= self.most:
-            # a row is as many values as there are columns, whichever way the array lies
-            columns = values if values.shape[0] <= self.most < values.shape[1] else values.T
-            for number, column in enumerate(columns, start=1):
-                named = _heading(f"{_cell(name)} {number}", _cell(unit))
-                self.columns[column.size][named] = column.astype(float)
+            self.matrices.append((_cell(name), _cell(unit), values.astype(float)))
         else:
             self.settings.append(f"# left out, an image: {heading}")
 
+    def _add_columns_of_matrices(self) -> None:
+        """Make columns of matrices: as long as a column beside them, else as the longer side."""
+        lengths = set(self.columns)
+        for name, unit, values in self.matrices:
+            rows, width = values.shape
+            beside = (rows in lengths) - (width in lengths)
+            lies = beside < 0 or (beside == 0 and rows < width)
+            for number, column in enumerate(values if lies else values.T, start=1):
+                self.columns[column.size][_heading(f"{name} {number}", unit)] = column
+        self.matrices.clear()
+
     def tables(self, name: str, where: str) -> dict[str, Callable[[], list[str]]]:
         """Return its tables by name, one for each number of rows."""
+        self._add_columns_of_matrices()
         names = {
             rows: name if len(self.columns) == 1 else f"{name} ({rows} rows)"
             for rows in self.columns
@@ -428,29 +522,75 @@ def _walk_hdf5(
         part = group.get(key)
         if key == "#refs#" or part is None:
             continue
-        if isinstance(part, h5py.Group):
+        if isinstance(part, h5py.Group) or _is_table(part):
             inner[key] = part
         elif isinstance(part, h5py.Dataset):
+            _check_filters(part, where)
             _add_dataset(node, key, part)
     tables |= node.tables(name, where)
     for key, part in inner.items():
-        _walk_hdf5(part, f"{name.rstrip('/')}/{_cell(key)}", node.settings, tables, where)
+        path = f"{name.rstrip('/')}/{_cell(key)}"
+        if isinstance(part, h5py.Group):
+            _walk_hdf5(part, path, node.settings, tables, where)
+        else:
+            _check_filters(part, where)
+            table = _Node.empty([*node.settings, *_attributes(part)])
+            for column in part.dtype.names:
+                table.add(column, part[column])
+            tables |= table.tables(path, where)
+
+
+def _check_filters(dataset: Any, where: str) -> None:
+    """Refuse a dataset that is compressed in a way that the library does not know."""
+    import h5py
+
+    properties = dataset.id.get_create_plist()
+    for index in range(properties.get_nfilters()):
+        code, _, _, name = properties.get_filter(index)
+        if not h5py.h5z.filter_avail(code):
+            raise InputError(
+                f"{where}: '{excerpt(dataset.name)}' is compressed by '{excerpt(_decoded(name))}', "
+                "expected gzip or no compression"
+            )
+
+
+def _is_table(part: Any) -> bool:
+    """Whether a part of an HDF5 file is a table of fields, but for MATLAB's complex numbers."""
+    names = getattr(getattr(part, "dtype", None), "names", None)
+    return names is not None and names != ("real", "imag")
 
 
 def _add_dataset(node: _Node, key: str, dataset: Any) -> None:
     # as conventions and programs name that attribute
     names = ("units", "unit", "Units", "Unit")
-    units = (_decoded(dataset.attrs[name]) for name in names if name in dataset.attrs)
-    if dataset.dtype.names:
-        # a table of HDF5: its fields are columns
-        for field in dataset.dtype.names:
-            node.add(field, dataset[field])
-    elif dataset.size is None or dataset.size > MOST_LINES * node.most:
+    said = {name: np.ravel(value)[:1].tolist() for name, value in dataset.attrs.items()}
+    unit = next((_decoded(said[name][0]) for name in names if said.get(name)), "")
+    kind = _decoded(*said.get("MATLAB_class", [""]))
+    if "MATLAB_empty" in said:
+        # its values are the lengths of its sides
+        return
+    if dataset.size is None or dataset.size > MOST_LINES * node.most:
         node.settings.append(f"# left out, too large: {_cell(key)}")
-    elif _decoded(dataset.attrs.get("MATLAB_class", b"")) == "char":
+    elif kind == "char":
         node.add(key, "".join(map(chr, np.ravel(dataset[()]).tolist())))
     else:
-        node.add(key, dataset[()], str(next(units, "")))
+        values = dataset[()]
+        # MATLAB counts along columns first
+        node.add(key, _unpacked(values.T if kind else values, said), str(unit))
+
+
+def _unpacked(values: Any, said: Mapping[str, list[Any]]) -> Any:
+    """Return numbers as netCDF's conventions have them packed: scaled, and gaps as one of them."""
+    numbers = np.asarray(values)
+    packing = {"scale_factor", "add_offset", "_FillValue", "missing_value"} & said.keys()
+    if numbers.dtype.kind not in "iuf" or not packing:
+        return values
+    gaps = [said[name][0] for name in packing & {"_FillValue", "missing_value"} if said[name]]
+    scale, offset = (
+        said[name][0] if said.get(name) else plain
+        for name, plain in (("scale_factor", 1.0), ("add_offset", 0.0))
+    )
+    return np.where(np.isin(numbers, gaps), np.nan, numbers * scale + offset)
 
 
 def _attributes(group: Any) -> list[str]:
@@ -500,61 +640,83 @@ def _walk_matlab(
 
 
 @contextmanager
-def _excel_groups(raw: bytes, where: str) -> Iterator[Groups]:
+def _workbook_groups(raw: bytes, where: str) -> Iterator[Groups]:
     """Give the sheets of a workbook that hold numbers, hidden ones too."""
-    import openpyxl
+    import python_calamine
 
-    with zipfile.ZipFile(io.BytesIO(raw)) as parts:
-        size = sum(part.file_size for part in parts.infolist())
-    if size > LARGEST_TEXT:
-        raise InputError(
-            f"{where}: {size / 1e6:.3g} MB unpacked, expected at most {LARGEST_TEXT / 1e6:.3g} MB"
-        )
-    values = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
-    formulas = openpyxl.load_workbook(io.BytesIO(raw), read_only=True)
+    if raw.startswith(b"PK"):
+        _check_sheets(raw, where)
     try:
-        yield {
-            _cell(sheet.title): partial(_sheet_lines, sheet, formulas[sheet.title], where)
-            for sheet in values.worksheets
-            if any(isinstance(cell, int | float) for row in _cells(sheet) for cell in row)
+        book = python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(raw))
+        sheets = {
+            _cell(each.name): book.get_sheet_by_index(index).to_python(skip_empty_area=False)
+            for index, each in enumerate(book.sheets_metadata)
+            if each.typ == python_calamine.SheetTypeEnum.WorkSheet
         }
-    finally:
-        values.close()
-        formulas.close()
+    except BaseException as error:
+        # what the library, in Rust, has not foreseen is no Exception
+        if type(error).__name__ == "PanicException":
+            raise ValueError(str(error)) from error
+        raise
+    yield {
+        name: partial(_sheet_lines, rows, where)
+        for name, rows in sheets.items()
+        if any(isinstance(cell, int | float) for row in rows for cell in row)
+    }
 
 
-def _cells(sheet: Any) -> Iterator[Sequence[Any]]:
-    rows: Iterator[Sequence[Any]] = sheet.iter_rows(values_only=True)
-    return rows
-
-
-def _sheet_lines(sheet: Any, formulas: Any, where: str) -> list[str]:
-    """Return the rows of a sheet that are not empty.
+def _check_sheets(raw: bytes, where: str) -> None:
+    """Refuse a packed workbook that is too large, or that nobody has calculated.
 
     Raises
     ------
     InputError
-        If a formula has no value, which a program that does not calculate has left out.
+        If so. A formula may lack its value where a program that does not calculate wrote it, and
+        the library, which fills a rectangle, would take it for an empty cell.
     """
-    rows: list[list[str]] = []
-    pairs = zip_longest(_cells(sheet), _cells(formulas), fillvalue=())
-    for number, (row, stated) in enumerate(pairs, start=1):
-        for column, (cell, formula) in enumerate(zip_longest(row, stated), start=1):
-            if cell is None and str(formula or "").startswith("="):
-                raise InputError(
-                    f"{where}: sheet {quoted(sheet.title)}, row {number}, column {column}: a "
-                    "formula without its value, expected a workbook that was saved by what "
-                    "calculates it"
-                )
-        cells = ["" if cell is None else _cell(cell) for cell in row]
-        if any(cells):
-            rows.append(cells)
-        _check_length(len(rows), where)
-    width = max(max(column for column, cell in enumerate(cells, 1) if cell) for cells in rows)
+    with zipfile.ZipFile(io.BytesIO(raw)) as parts:
+        size = sum(part.file_size for part in parts.infolist())
+        if size > LARGEST_TEXT:
+            raise InputError(
+                f"{where}: {size / 1e6:.3g} MB unpacked, expected at most "
+                f"{LARGEST_TEXT / 1e6:.3g} MB"
+            )
+        names = [name for name in parts.namelist() if name.startswith("xl/worksheets/sheet")]
+        for sheet in map(parts.read, names):
+            _check_extent(sheet, where)
+            formula = rb"<(?:\w+:)?c\b([^>]*)>\s*<(?:\w+:)?f\b(?:[^>]*/>|[^<]*</[\w:]+>)\s*"
+            for cell, value in re.findall(formula + rb"(<(?:\w+:)?v\b[^>]*>[^<])?", sheet):
+                if not value and b't="str"' not in cell:
+                    name = re.search(rb'\br="(\w+)"', cell)
+                    raise InputError(
+                        f"{where}: cell {name[1].decode() if name else '?'}: a formula without its "
+                        "value, expected a workbook that was saved by what calculates it"
+                    )
+
+
+def _check_extent(sheet: bytes, where: str) -> None:
+    """Refuse a sheet whose cells are few and far apart: the rectangle around them is filled."""
+    cells = re.findall(rb'<(?:\w+:)?c\b[^>]*\br="([A-Z]{1,3})(\d{1,7})"', sheet)
+    rows = max((int(row) for _, row in cells), default=0)
+    _check_length(rows, where)
+    letters = max((column.rjust(3, b"@") for column, _ in cells), default=b"@@@")
+    width = sum((letter - 64) * 26**power for power, letter in enumerate(reversed(letters)))
+    if rows * width > 64 * MOST_LINES:
+        raise InputError(
+            f"{where}: a sheet of {rows} rows and {width} columns, expected at most "
+            f"{64 * MOST_LINES} cells"
+        )
+
+
+def _sheet_lines(rows: Sequence[Sequence[Any]], where: str) -> list[str]:
+    """Return the rows of a sheet as lines, empty ones too, so that they keep their numbers."""
+    _check_length(len(rows), where)
+    table = [list(map(_cell, row)) for row in rows]
+    width = max(number for cells in table for number, cell in enumerate(cells, start=1) if cell)
     lines = []
-    for cells in rows:
+    for cells in table:
         # words alone in the first cell are what text files have as comments
         alone = cells[0] and not any(cells[1:]) and decimal(cells[0]) is None
-        cells += [""] * (width - len(cells))
-        lines.append(f"# {cells[0]}" if alone else "\t".join(cells[:width]))
+        filled = "\t".join(cells[:width]) if any(cells) else ""
+        lines.append(f"# {cells[0]}" if alone else filled)
     return lines

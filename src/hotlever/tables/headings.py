@@ -322,6 +322,10 @@ def names_above(above: Sequence[Line], dialect: Dialect, width: int) -> tuple[li
         if dialect.separator is None:
             wide = [cell for cell in re.split(r"\t+|\s{2,}", line.strip()) if cell]
             cells = wide if len(wide) == width else cells
+        elif dialect.separator == "\t" and len(cells) != width:
+            # WiRE writes two tabs between its headings, and one between the numbers
+            wide = [cell.strip(' "') for cell in re.split(r"\t+", line.strip())]
+            cells = wide if len(wide) == width else cells
         while len(cells) > width and not cells[-1]:
             cells.pop()
         setting = line.lstrip().startswith("#") and "=" in line

@@ -92,8 +92,8 @@ def text_lines(raw: bytes, where: str, most: int = MOST_LINES, longest: int = 2*
     # packed (.xlsx, .ods) or of old (.xls)
     if raw.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         raise InputError(
-            f"{where}: a workbook such as Excel's, expected .xlsx or a table in text: save the "
-            "sheet as CSV"
+            f"{where}: a workbook such as Excel's, expected .xlsx, .xls or a table in text: save "
+            "the sheet as CSV"
         )
     text = decode(raw, where)
     if re.match(r"(?i)\s*<(?:\?xml|!doctype|!--|html|head|body|table|lsx_)\b", text):
@@ -147,7 +147,7 @@ def _says_no_value(word: str) -> bool:
     """Whether a cell, in small letters and without a sign, says that there is no value."""
     # marks in place of digits, the names of C's libraries for numbers that are none, and errors of
     # spreadsheets in any language
-    marks = r"\*{2,}|#{2,}|nan\(\w*\)|1\.#[a-z]+\d*|#(?:n/a|nv|[^\W\d]+(?:/0)?[!?])"
+    marks = r"\*{2,}|#{2,}|nan\(\w*\)|1\.#[a-z]+\d*|#(?:n/a|nv|ref|[^\W\d]+(?:/0)?[!?])"
     return word in _NO_VALUE or re.fullmatch(marks, word) is not None
 
 

@@ -106,7 +106,8 @@ def read_stream(
     read = gdstk.read_gds if kind == "GDSII" else gdstk.read_oas
     library = read(path, unit=1e-6, tolerance=tolerance_um / scale)
     cells: dict[str, Any] = {each.name: each for each in library.cells}
-    top = [each.name for each in library.top_level()]
+    # a cell of KLayout's own keeps what its cells with parameters were drawn from
+    top = [each.name for each in library.top_level() if each.name != "$$$CONTEXT_INFO$$$"]
     sheet: dict[str, Any] = {"kind": kind, "cells": sorted(cells), "top": sorted(top)}
     sheet["unit_um"] = unit_um or stated_um
     counts: dict[str, int] = {}
