@@ -193,6 +193,25 @@ def test_costs_decide(first, plan):
     assert dear.proposals.what.item() == "bias"
 
 
+def test_a_dimension_is_proposed_once_and_tells_what_its_prior_would():
+    """Of a lever with one dimension known to 1 %, as after it was measured to that."""
+    allowed = {"dimensions": None}
+    plan = plan_next(allowed=allowed, count=40, at_K=500.0, noise={"dimensions": 0.01})
+    names = plan.proposals.what.values.tolist()
+    assert len(names) == len({*names}) < 40
+    assert np.isnan(plan.proposals.bias_V.values).all()
+    assert f"{names[0]}        –" in plan.text()
+    # what was known to 3 % and was measured to 1 % is known to that
+    together = f"± {100.0 / np.sqrt(1.0 / 0.03**2 + 1.0 / 0.01**2):.4f} %"
+    lever = LinearisedLever.of_priors(Probe.reference(), {names[0]: "± 3%"})
+    known = LinearisedLever.of_priors(Probe.reference(), {names[0]: together})
+    gradient = lever.tip(np.array([lever.bias_for(500.0)]))[1]
+    row = lever.dimensions(0.01)[names[0]]
+    measured = lever.information.with_rows(row[None]).stderr(gradient)
+    assert measured == pytest.approx(known.information.stderr(gradient), rel=1e-3)
+    assert measured < 0.99 * lever.information.stderr(gradient)
+
+
 def test_data_that_are_not_described_get_no_proposals(first):
     doubtful = replace(first[1], reason="the current differs")
     with pytest.raises(InputError, match="no lever like this one shows these data"):
@@ -223,7 +242,7 @@ def test_the_command_writes_a_row_for_each_proposal(run, first):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (("--allow", "pulse"), "expected some of bias, reader, spectra"),
+        (("--allow", "pulse"), "expected some of bias, reader, spectra, dimensions"),
         (("--allow", "spectrum"), "did you mean 'spectra'"),
         (("--quantity", "kne"), "did you mean 'knee'"),
         (("--quantity", "knee", "--at", "800K"), "the knee has a temperature of its own"),

@@ -38,6 +38,7 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import METERS, SCALES, THERMOMETER, Prior, as_known, known_beforehand
+from hotlever.probe.probe_parameters import dimensions_of
 from hotlever.quantities import FITTED
 from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.text import BAND, aligned
@@ -91,12 +92,18 @@ class Candidate:
     cost : float
     again : bool
         Whether it may be made several times.
+    what : str
+        What is measured.
+    bias_V : float
+        Where; NaN of a dimension.
     """
 
     kind: str
     rows: Array
     cost: float = 1.0
     again: bool = True
+    what: str = ""
+    bias_V: float = np.nan
 
     def variance_after(self, covariance: Array, gradient: Array) -> float:
         """Return the variance of a quantity after the measurement (Woodbury's identity)."""
@@ -397,6 +404,19 @@ class LinearisedLever:
             return np.inf
         return max(float(values[TIP, 0]), float(refined_values[TIP, 0]))
 
+    def dimensions(self, share: float) -> dict[str, Array]:
+        """Return derivatives (q,) of the uncertain dimensions over errors that are a share of each.
+
+        By their names; without shifts of edges, which are shares of nothing.
+        """
+        rates, own = self._coordinates.rates(self._point), self.probe.values(self.names)
+        rows = np.eye(len(self.names), len(self.names) + len(_SCALED))
+        return {
+            name: rates[number] / (share * own[number]) * rows[number]
+            for number, name in enumerate(self.names)
+            if name in dimensions_of(self.probe) and own[number] > 0.0
+        }
+
     def parameters(self, away: Array) -> Array:
         """Return the parameters (p,) of a lever so far away in their coordinates, (p,)."""
         return self._coordinates.values(self._point + away)
@@ -459,8 +479,8 @@ class LinearisedLever:
 
 #: What is to be known better.
 Aim = Literal["tip", "knee"]
-#: What can be measured, and what that shows beside the current.
-KINDS = {"bias": (), "reader": ("reader",), "spectra": ("tip",)}
+#: What can be measured, and what that shows beside the current; dimensions show themselves.
+KINDS = {"bias": (), "reader": ("reader",), "spectra": ("tip",), "dimensions": ()}
 #: With this probability the tip is no hotter than is said.
 SURE = 0.99
 
@@ -472,11 +492,11 @@ class Plan:
     Attributes
     ----------
     proposals : xarray.Dataset
-        On the dimension ``proposal``, best first: ``what`` of `KINDS`, ``bias_V``, ``gain``, the
-        tip temperature ``tip_K`` expected there, ``tip_limit_K``, which it does not exceed with a
-        probability of 99 %, and ``stderr_now_K`` and ``stderr_then_K``, the standard errors of
-        the ``quantity`` now and after this and all proposals before. The gain is how many kelvins
-        (per unit of cost, if there are costs) this one takes off.
+        On the dimension ``proposal``, best first: ``what`` of `KINDS` or the name of a dimension,
+        ``bias_V``, ``gain``, the tip temperature ``tip_K`` expected there, ``tip_limit_K``, which
+        it does not exceed with a probability of 99 %, and ``stderr_now_K`` and ``stderr_then_K``,
+        the standard errors of the ``quantity`` now and after this and all proposals before. The
+        gain is how many kelvins (per unit of cost, if there are costs) this one takes off.
     errors : xarray.Dataset
         ``tip_K`` and ``tip_limit_K`` on ``bias``, and ``tip_stderr_K``, the standard errors after
         so many proposals, on (``added``, ``bias``).
@@ -513,7 +533,10 @@ class Plan:
         head = ["measure", "V_b (V)", "T_tip (K)", f"{SURE:.0%} below (K)", "then ± (K)"]
         numbers = {"bias_V": 3, "tip_K": 0, "tip_limit_K": 0, "stderr_then_K": 1}
         columns = [
-            [f"{value:.{digits}f}" for value in self.proposals[name].values.tolist()]
+            [
+                "–" if np.isnan(value) else f"{value:.{digits}f}"
+                for value in self.proposals[name].values
+            ]
             for name, digits in numbers.items()
         ]
         rows = zip(self.proposals.what.values.tolist(), *columns, strict=True)
@@ -586,8 +609,9 @@ def plan_next(
     priors : mapping of str to Prior or str, optional
         Of that lever, in place of some of the usual ones.
     allowed : mapping of str to int or None, optional
-        Which of `KINDS` may be measured, and at most how many of each; by default all but the
-        reader, and spectra where the heater is no silicon; these count where the data have them.
+        Which of `KINDS` may be measured, and at most how many of each; by default all but
+        dimensions, the reader, and spectra where the heater is no silicon; the latter two count
+        where the data have them.
     count : int
         Proposals, at most.
     quantity : {"tip", "knee"}
@@ -606,7 +630,8 @@ def plan_next(
         Of one measurement of each kind, such as minutes; all the same by default.
     noise : mapping of str to float, optional
         Standard errors of rows by observable, as shares of what is shown; by default those of the
-        data at hand, or else 0.1 % of a current or voltage, and 2 % of the rise of the tip.
+        data at hand, or else 0.1 % of a current or voltage, and 2 % of the rise of the tip. Of
+        ``dimensions`` that of each, 1 % by default.
 
     Returns
     -------
@@ -657,22 +682,22 @@ def plan_next(
     stays, notes = _errors_that_stay(lever, calibration, np.append(bias, aim_V))
     of_aim = np.array([information.stderr(gradient) for information in after])
     stderr = np.hypot(of_aim, stays[-1])
-    cost = np.array([candidates[number].cost for number in chosen])
-    rows = np.array(chosen) % safe
+    proposed = [candidates[number] for number in chosen]
+    at_V = np.array([each.bias_V for each in proposed])
     columns = {
-        "what": [candidates[number].kind for number in chosen],
-        "bias_V": bias[rows],
-        "gain": -np.diff(stderr) / cost,
-        "tip_K": tip_K[rows],
-        "tip_limit_K": highest_K[rows],
-        "stderr_now_K": np.full(rows.size, stderr[0]),
+        "what": [each.what for each in proposed],
+        "bias_V": at_V,
+        "gain": -np.diff(stderr) / [each.cost for each in proposed],
+        "tip_K": np.interp(at_V, bias[:safe], tip_K[:safe]),
+        "tip_limit_K": np.interp(at_V, bias[:safe], highest_K[:safe]),
+        "stderr_now_K": np.full(at_V.size, stderr[0]),
         "stderr_then_K": stderr[1:],
     }
     counts = sorted({n for n in (0, 1, 2, 5, len(chosen)) if n <= len(chosen)})
     along = np.array([np.hypot(after[n].stderr(by_unknowns), stays[:-1]) for n in counts])
     errors = {"tip_K": tip_K, "tip_limit_K": highest_K}
     return Plan(
-        labelled(columns, "proposal", {"proposal": np.arange(1, rows.size + 1)}),
+        labelled(columns, "proposal", {"proposal": np.arange(1, at_V.size + 1)}),
         labelled(
             {**errors, "tip_stderr_K": (("added", "bias"), along)},
             "bias",
@@ -764,7 +789,8 @@ def _allowed(
     """Return what may be measured; by default what was, and what every such lever shows."""
     if allowed is None:
         observables = {*lever.weights, *(["tip"] if lever.probe.heater_silicon else [])}
-        return {kind: None for kind, of_kind in KINDS.items() if {*of_kind} <= observables}
+        usual = {kind: of_kind for kind, of_kind in KINDS.items() if kind != "dimensions"}
+        return {kind: None for kind, of_kind in usual.items() if {*of_kind} <= observables}
     for kind in allowed:
         if kind == "pulse":
             raise InputError(
@@ -785,19 +811,27 @@ def _candidates(
     costs: Mapping[str, float],
     noise: Mapping[str, float],
 ) -> list[Candidate]:
-    """Return what could be measured: of each kind one at each bias, kind after kind."""
+    """Return what could be measured: of each kind one at each bias, or each dimension once."""
     values, slopes = lever.predict(Rows(bias))
     electrical = [name for name in ("current", "bridge") if name in lever.weights] or ["current"]
     candidates = []
     for kind in kinds:
+        # several spectra at one bias are proposed; a sweep does not return to one
+        cost, again = costs.get(kind, 1.0), kind == "spectra"
+        if kind == "dimensions":
+            candidates += [
+                Candidate(kind, row[None], cost, again, name)
+                for name, row in lever.dimensions(noise.get(kind, 0.01)).items()
+            ]
+            continue
         names = (*electrical, *KINDS[kind])
         numbers = [list(FITTED).index(name) for name in names]
         errors = np.array([lever.noise(name, values, noise.get(name)) for name in names])
         rows = slopes[numbers] / errors[..., None]
-        cost = costs.get(kind, 1.0)
-        # several spectra at one bias are proposed; a sweep does not return to one
-        again = kind == "spectra"
-        candidates += [Candidate(kind, rows[:, row], cost, again) for row in range(bias.size)]
+        candidates += [
+            Candidate(kind, rows[:, row], cost, again, kind, at_V)
+            for row, at_V in enumerate(bias.tolist())
+        ]
     return candidates
 
 

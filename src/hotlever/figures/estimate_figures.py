@@ -559,8 +559,9 @@ def planned_measurements(plan: Plan) -> Figure:
     """
     errors, proposals = plan.errors, plan.proposals
     finite = np.isfinite(errors.tip_limit_K.values)
-    kinds = proposals.what.values.tolist()
-    counts = Counter(zip(kinds, proposals.bias_V.values.tolist(), strict=True))
+    at_bias = proposals.isel(proposal=np.isfinite(proposals.bias_V.values))
+    kinds = at_bias.what.values.tolist()
+    counts = Counter(zip(kinds, at_bias.bias_V.values.tolist(), strict=True))
     style_by_kind = {
         "bias": {"marker": "o", "color": BLUE},
         "reader": {"marker": "s", "color": GREEN},

@@ -379,8 +379,8 @@ def propose(
         str | None,
         Option(
             metavar="KIND[=COUNT],...",
-            help="Some of bias,spectra,reader, and at most how many, as bias=15,spectra=3; bias "
-            "and spectra if left out, and reader where it was measured.",
+            help="Some of bias,spectra,reader,dimensions, and at most how many, as "
+            "bias=15,spectra=3; bias and spectra if left out, and reader where it was measured.",
         ),
     ] = None,
     count: Annotated[
@@ -430,8 +430,8 @@ def propose(
         list[str] | None,
         Option(
             metavar="NAME=SHARE",
-            help="Of a measurement to come, as current=0.2% or tip=1% (of the rise); that of the "
-            "data, or what is usual, if left out; repeated.",
+            help="Of a measurement to come, as current=0.2%, tip=1% (of the rise) or "
+            "dimensions=2%; that of the data, or what is usual, if left out; repeated.",
         ),
     ] = None,
     output: Annotated[

@@ -277,7 +277,7 @@ def parse_costs(texts: Iterable[str] | None, kinds: Sequence[str]) -> dict[str, 
 
 
 def parse_noise(texts: Iterable[str] | None) -> dict[str, float]:
-    """Parse several ``NAME=SHARE``, such as ``current=0.2%``, of observables.
+    """Parse several ``NAME=SHARE``, such as ``current=0.2%``, of observables or dimensions.
 
     Examples
     --------
@@ -287,9 +287,10 @@ def parse_noise(texts: Iterable[str] | None) -> dict[str, float]:
     from hotlever.quantities import OBSERVABLES
 
     noise, expected = dict[str, float](), "NAME=SHARE, such as current=0.2%"
+    names = (*OBSERVABLES, "dimensions")
     for name, text in parse_pairs("--noise", texts, expected).items():
-        if name not in OBSERVABLES:
-            raise unknown_name("observable", name, OBSERVABLES, "--noise")
+        if name not in names:
+            raise unknown_name("observable", name, names, "--noise")
         where = f"--noise {name}"
         share = parse_number(text.removesuffix("%"), where) / 100.0 if text.endswith("%") else 0.0
         if not 1e-6 <= share <= 0.5:
