@@ -30,13 +30,13 @@ from hotlever.cache import CACHE_VARIABLE
 from hotlever.errors import HotleverError
 from hotlever.estimate import Measurement, calibrate
 from hotlever.probe import Probe
-from hotlever.studies.simulation_based_calibration import ALL, draw, measure
+from hotlever.studies.simulation_based_calibration import DEPARTURES, draw, measure
 from hotlever.types import Array
 from problems import processor_time, table
 
 COMMAND = [sys.executable, "-c", "from hotlever.cli import main; main()", "calibrate"]
 #: Outliers are among the mistakes, and another law leaves data that few parameters describe.
-DEPARTED = [name for name in ALL if name not in ("mobility", "outliers")]
+DEPARTED = [name for name in DEPARTURES if name not in ("mobility", "outliers")]
 #: Characters of what is said that the table shows.
 SHOWN = 150
 

@@ -3,7 +3,7 @@
 python benchmarks/published_lever.py search     layouts.toml: layouts that suit what is printed
 python benchmarks/published_lever.py numbers    numbers.csv: what each of them shows of it
 python benchmarks/published_lever.py knee       knee.csv: what carries how much of the 50 K that
-                                                the knee is off, in some of them
+                                                the knee is off, in those with a weight
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hotlever.files import write_text
 from hotlever.materials import PARAMETERS
 from hotlever.materials.departures import DEPARTURES
 from hotlever.studies import published_lever
-from hotlever.studies.knee_study import IN_AIR, SUSPECTS, carried_by, knee_K
+from hotlever.studies.knee_study import Suspect, carried_by, knee_K
 from hotlever.studies.published_lever.ensemble import stored_ensemble
 from hotlever.studies.published_lever.layout_numbers import numbers_of
 from hotlever.studies.published_lever.layout_search import Found, search
@@ -123,20 +123,20 @@ def write_numbers() -> None:
     write_table(FOLDER / "numbers.csv", rows)
 
 
-def write_knee(every: int = 7) -> None:
-    """Compute what each suspect carries in the nearest layout, the reference, and some others.
+def write_knee() -> None:
+    """Compute what each suspect carries in the nearest layout, the reference, and all drawn ones.
 
-    Of these, every so many, and of the reference, the coefficients of laws are left out.
+    Coefficients of laws in the nearest alone.
     """
     found, chosen = stored_layouts(), stored_ensemble()
     drawn = [name for name, layout in found.items() if layout.drawn]
     coefficients = [name for law in DEPARTURES.values() for name in law.names]
     rows: list[dict[str, Any]] = []
-    for name in (chosen.nearest, REFERENCE, *drawn[every // 2 :: every]):
+    for name in (chosen.nearest, REFERENCE, *drawn):
         probe = found[name].probe()
         own_K = knee_K(probe)
-        for suspect in (*SUSPECTS, *(coefficients if name == chosen.nearest else ())):
-            if suspect == IN_AIR:
+        for suspect in (*Suspect, *(coefficients if name == chosen.nearest else ())):
+            if suspect == Suspect.IN_AIR:
                 continue
             try:
                 carried = carried_by(probe, suspect, own_K)
@@ -149,7 +149,7 @@ def write_knee(every: int = 7) -> None:
             parameters = {
                 key: float(carried.fitted.material.model_dump()[key]) for key in PARAMETERS
             }
-            rows.append({"layout": name, "suspect": suspect, **numbers, **parameters})
+            rows.append({"layout": name, "suspect": str(suspect), **numbers, **parameters})
             print(f"{time.process_time():6.0f} s  {name}, {suspect}: {numbers}", flush=True)
         write_table(FOLDER / "knee.csv", rows)
 

@@ -9,7 +9,7 @@ from hotlever.datasets import labelled
 from hotlever.materials import PARAMETERS
 from hotlever.report.reproduce import air_sections as air
 from hotlever.report.reproduce import claim_sections as claims
-from hotlever.report.reproduce.findings import Findings
+from hotlever.report.reproduce.findings import Extent, Findings
 from hotlever.studies.parameter_consistency import FREE, HELD
 
 
@@ -27,8 +27,8 @@ def kinds(page):
     return [block["kind"] for block in page.blocks]
 
 
-def test_lines_above_the_knee_are_judged_by_the_paper_s_spread(quick_page, monkeypatch):
-    monkeypatch.setattr(claims, "_EVERY", 10)
+def test_lines_above_the_knee_are_judged_by_the_paper_s_spread(quick_page):
+    quick_page.extent = Extent(every=10)
     claims.linear_section(quick_page)
     assert kinds(quick_page)[:2] == ["figure", "text"]
     straight, proportional = quick_page.claims
@@ -68,8 +68,8 @@ def test_parameters_are_judged_apart_from_the_doping(page, monkeypatch, scatter,
     assert "the paper's own levers 15%, with n_d held 9%" in claim[3]
 
 
-def test_k_with_a_surface_is_judged_by_what_the_best_one_leaves(quick_page, monkeypatch):
-    monkeypatch.setattr(air, "_FEW_GAPS_UM", (1.0, np.inf))
+def test_k_with_a_surface_is_judged_by_what_the_best_one_leaves(quick_page):
+    quick_page.extent = Extent(gaps_um=(1.0, np.inf))
     air.one_sided_section(quick_page)
     assert set(kinds(quick_page)) == {"figure", "table", "text"}
     [claim] = quick_page.claims

@@ -15,9 +15,9 @@ from hotlever.report.reproduce.findings import Findings
     [
         (vacuum.parameter_section, 1),
         (vacuum.operating_points_section, 2),
-        (vacuum.characteristics_section, 2),
+        (vacuum.characteristics_section, 3),
         (vacuum.heater_section, 1),
-        (vacuum.knee_section, 2),
+        (vacuum.knee_section, 3),
         (vacuum.balance_section, 0),
         (air.disc_section, 2),
     ],

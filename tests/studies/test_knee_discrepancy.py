@@ -14,11 +14,7 @@ from hotlever.measurement import Measurement
 from hotlever.spieser2017 import RAMP
 from hotlever.studies import knee_study as knee
 from hotlever.studies.knee_study import (
-    AWAY,
-    IN_AIR,
-    RAMAN,
-    SUSPECTS,
-    TOGETHER,
+    Suspect,
     by_covariance,
     carried_by,
     measured_carriers,
@@ -41,7 +37,7 @@ def test_a_lever_that_is_as_the_model_carries_nothing():
 
 @pytest.mark.usefixtures("coarse_meshes")
 def test_a_thermoelectric_lever_is_measured_by_its_other_polarity():
-    shift_K, missed, *_ = carried_by(Probe.reference(), AWAY)
+    shift_K, missed, *_ = carried_by(Probe.reference(), Suspect.AWAY)
     lever = Lever(Probe.reference().with_(thermoelectric=True), COARSE)
     there = lever.branch_to(0.0, lowest=-11.0).mirrored.knee
     assert shift_K == pytest.approx(
@@ -59,7 +55,7 @@ def test_the_line_reads_what_the_raman_check_says_it_does():
 
 def test_a_suspect_has_one_thing_more_and_all_together_have_everything():
     probe = Probe.reference().in_medium("air")
-    for suspect in SUSPECTS:
+    for suspect in Suspect:
         lever, by_line = suspect_lever(probe, suspect)
         more = (
             lever.tip is not None,
@@ -71,10 +67,10 @@ def test_a_suspect_has_one_thing_more_and_all_together_have_everything():
             lever.circuit.chip_K_per_mW,
             by_line,
         )
-        assert sum(map(bool, more)) == (8 if suspect == TOGETHER else 1), suspect
-    together = suspect_lever(probe, TOGETHER)[0]
+        assert sum(map(bool, more)) == (8 if suspect == Suspect.TOGETHER else 1), suspect
+    together = suspect_lever(probe, Suspect.TOGETHER)[0]
     assert together.tip.in_air
-    assert not suspect_lever(Probe.reference(), TOGETHER)[0].tip.in_air
+    assert not suspect_lever(Probe.reference(), Suspect.TOGETHER)[0].tip.in_air
 
 
 def test_a_coefficient_of_a_law_is_a_suspect_of_one_standard_deviation():
@@ -103,13 +99,13 @@ def test_the_covariance_of_a_fit_gives_the_knee_a_standard_error_that_goes_with_
 
 
 def test_a_suspect_that_does_not_count_carries_nothing(monkeypatch):
-    carried = {suspect: (1.0 + k, 2.0 + k) for k, suspect in enumerate(SUSPECTS)}
+    carried = {suspect: (1.0 + k, 2.0 + k) for k, suspect in enumerate(Suspect)}
     monkeypatch.setattr(knee, "carried_by", lambda probe, suspect, _: carried[suspect])
     monkeypatch.setattr(knee, "by_covariance", lambda result: 3.0)
     study = knee.compare_suspects(Probe.reference(), None)
-    assert np.isnan(study.shift_K.sel(suspect=IN_AIR))
-    assert study.shift_K.sel(suspect=RAMAN).item() == 2.0
-    assert study.left_K == pytest.approx(study.discrepancy_K - carried[TOGETHER][1])
+    assert np.isnan(study.shift_K.sel(suspect=Suspect.IN_AIR))
+    assert study.shift_K.sel(suspect=Suspect.RAMAN).item() == 2.0
+    assert study.left_K == pytest.approx(study.discrepancy_K - carried[Suspect.TOGETHER][1])
     assert study.stderr_K == 3.0
 
 

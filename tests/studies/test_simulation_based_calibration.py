@@ -14,7 +14,7 @@ from hotlever.materials.kinds import NSilicon
 from hotlever.probe import Probe
 from hotlever.studies import simulation_based_calibration as study
 from hotlever.studies.simulation_based_calibration import (
-    ALL,
+    DEPARTURES,
     ESTIMATE,
     WAYS,
     MinimosMaterial,
@@ -49,7 +49,7 @@ def test_a_departure_that_is_left_out_changes_nothing_else():
     everything, nominal = draw(np.random.default_rng(0), 0, "vacuum")
     probes = {
         name: draw(
-            np.random.default_rng(0), 0, "vacuum", [other for other in ALL if other != name]
+            np.random.default_rng(0), 0, "vacuum", [other for other in DEPARTURES if other != name]
         )[0]
         for name in ("tip", "drawing")
     }

@@ -30,15 +30,8 @@ from hotlever.types import Array, Progress
 
 #: Tip temperatures (K) at which k is compared.
 COLD, HOT = 330.0, 1006.0
-#: Tip temperatures at which k is found.
-_POINTS = 120
 #: Gaps (µm) between a lever and a surface below it, the last of which is none.
 GAPS_UM = (0.5, 1.0, 2.0, 5.0, 10.0, 50.0, np.inf)
-
-#: Points of the Gauss rules of a disc for x and t, and for s.
-_NODES, _WAVES = 120, 400
-#: tanh(s h/r) is one beyond s h/r of this.
-_FLAT = 20.0
 
 
 def find_scale_factor(vacuum: Branch, air: Branch, hottest_K: float = HOT) -> xr.Dataset:
@@ -56,7 +49,7 @@ def find_scale_factor(vacuum: Branch, air: Branch, hottest_K: float = HOT) -> xr
         ``k`` on the dimension ``tip_K``; ``best_k``, the single factor that leaves the smallest
         largest error of T_tip, and ``best_error_K``, that error.
     """
-    tip = np.linspace(COLD, hottest_K, _POINTS)
+    tip = np.linspace(COLD, hottest_K, 120)
     k = air.power(tip) / vacuum.power(tip)
     best = minimize_scalar(
         lambda factor: error_of_one_factor(vacuum, air, factor, hottest_K),
@@ -69,7 +62,7 @@ def find_scale_factor(vacuum: Branch, air: Branch, hottest_K: float = HOT) -> xr
 
 def error_of_one_factor(vacuum: Branch, air: Branch, k: float, hottest_K: float = HOT) -> float:
     """Return the largest error (K) of T(P) in vacuum with the power scaled by one k."""
-    tip = np.linspace(COLD, hottest_K, _POINTS)
+    tip = np.linspace(COLD, hottest_K, 120)
     scaled = vacuum.tip_temperature(air.power(tip) / k)
     return float(np.nanmax(np.abs(scaled - tip)))
 
@@ -179,11 +172,12 @@ def loss_between_planes(distance_over_radius: ArrayLike | None = None) -> xr.Dat
 
 
 def _loss(h: float) -> float:
-    nodes, weights = _gauss(_NODES, 1.0)
-    waves, steps = _gauss(_WAVES, _FLAT / h)
+    nodes, weights = _gauss(120, 1.0)
+    # tanh(s h/r) is one beyond s h/r of 20
+    waves, steps = _gauss(400, 20.0 / h)
     cosines = np.cos(np.outer(nodes, waves))
     kernel = (2.0 / np.pi) * (cosines * (steps * (np.tanh(waves * h) - 1.0))) @ cosines.T
-    solution = np.linalg.solve(np.eye(_NODES) + kernel * weights, np.ones(_NODES))
+    solution = np.linalg.solve(np.eye(nodes.size) + kernel * weights, np.ones(nodes.size))
     return 8.0 * float(weights @ solution)
 
 

@@ -33,20 +33,9 @@ ANNEALING = {
     "annealing_K": "temperature of the annealing",
     "annealing_min": "time of the annealing",
 }
-#: What a designer asks of the heater first, by its name in a shape or a material.
-_OF_SHAPES = ("heater_length_um", "heater_width_um", "scale", "thickness_um")
-_OF_HEATERS = ("n_d", "resistivity")
-#: Of these, what the table of sensitivities shows.
-_TABLE_QUANTITIES = ("knee_K", "knee_mW", "knee_V", "knee_bias_V", "tip_K", "cold_ohm", "k")
-#: Relative change by which a sensitivity is found; for the annealing temperature far smaller.
-_STEP = 0.02
 #: Between the coarse and the default mesh, for differences between levers.
 DESIGN_MESH = MeshOptions(corner=0.1, heater=0.35, lever=0.15, panels=0.6)
-#: Designs that are named of those of which something is not known.
-_MOST_NOTED = 3
 _NO_KNEE = "no knee: the lever voltage rises until something melts"
-#: √(T_tip − T_base) (K^½) of a lever that is called cold.
-_COLD_U = 0.5
 
 
 @dataclass(frozen=True)
@@ -102,11 +91,14 @@ class Design:
         """What a designer asks for first: of a drawing, its dimensions or what it has for them."""
         names = self.numbers
         heater = self.probe.layout().heater.stack
-        of_heater = [full_name(film.material, own) for film in heater for own in _OF_HEATERS]
+        of_heater = [
+            full_name(film.material, own) for film in heater for own in ("n_d", "resistivity")
+        ]
         thickness = [name for name in names if name.startswith("layers.")]
         shape = self.probe.shape
         own = shape.dimensions() if shape.shape == PARAMETRIC_DRAWING else ()
-        first = (*own, *_OF_SHAPES, *thickness, *of_heater, *ANNEALING)
+        of_shape = ("heater_length_um", "heater_width_um", "scale", "thickness_um")
+        first = (*own, *of_shape, *thickness, *of_heater, *ANNEALING)
         # a share of what is zero is nothing
         return tuple(name for name in dict.fromkeys(first) if names.get(name))
 
@@ -166,7 +158,8 @@ def quantities(
     if vacuum.by_power.highest_mW < power_mW:
         vacuum = lever.branch()
     silicon, knee = probe.heater_silicon, vacuum.knee
-    cold = vacuum.point(_COLD_U)
+    # √(T_tip − T_base) (K^½) of a lever that is called cold
+    cold = vacuum.point(0.5)
     values = dict.fromkeys(QUANTITIES, float("nan"))
     if silicon is not None:
         values["inversion_K"] = float(silicon.inversion_temperature())
@@ -277,7 +270,8 @@ def sensitivities(
     columns: dict[str, list[float]] = {f"by_{key}": [] for key in QUANTITIES}
     value = [design.value(name) for name in names]
     for name, here in each(list(zip(names, value, strict=True)), progress):
-        step = 0.1 * _STEP if name == "annealing_K" else _STEP
+        # relative changes
+        step = 0.002 if name == "annealing_K" else 0.02
         high, low = (
             quantities(design.changed({name: here * factor}), power_mW, air)
             for factor in (1.0 + step, 1.0 - step)
@@ -318,14 +312,15 @@ def mesh_note(probe: Probe, power_mW: float) -> str:
 
 def _few(texts: list[str]) -> list[str]:
     """Return the first of many texts, and how many more there are."""
-    more = len(texts) - _MOST_NOTED
-    return texts if more <= 1 else [*texts[:_MOST_NOTED], f"and {more} more"]
+    more = len(texts) - 3
+    return texts if more <= 1 else [*texts[:3], f"and {more} more"]
 
 
 def sensitivity_text(data: xr.Dataset) -> str:
     """Return the sensitivities of a design, see `sensitivities`, as lines of text."""
     base = {key: data[key].item() for key in QUANTITIES}
-    quantities = [key for key in _TABLE_QUANTITIES if np.isfinite(base[key])]
+    some = ("knee_K", "knee_mW", "knee_V", "knee_bias_V", "tip_K", "cold_ohm", "k")
+    quantities = [key for key in some if np.isfinite(base[key])]
     width = max(map(len, data.name.values))
     knee = (
         _NO_KNEE

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -51,41 +52,32 @@ from hotlever.steps import each
 from hotlever.studies.simulation_based_calibration import MinimosMaterial
 from hotlever.types import Array, Progress
 
-#: Diffusion length (µm) of a heater with uniform doping: far below the mesh size.
-_NO_DIFFUSION = 1e-3
-#: Leg resistivity, as a share of the true one, of legs without resistance.
-_NO_RESISTANCE = 1e-3
-#: Tip temperatures (K) over which the highest resistance is looked for, and their number.
-_COLDEST, _POINTS = 400.0, 400
 #: Plausible tips of lithography probes, cones: height (µm) and half-angle (degrees).
 SIZES = ((0.5, 15.0), (0.5, 30.0), (0.7, 20.0), (1.0, 15.0), (1.0, 30.0))
-#: Tips of other scanning probes, as slender as they must be to stand on the reference heater.
-TALL = ((2.0, 15.0), (3.0, 10.0), (5.0, 8.0))
-#: A tip of the usual size of lithography probes.
-TIP = Tip(height_um=0.7, half_angle_deg=20.0)
-#: The row of the ramp with the highest V_l is no further from the knee (K).
-_NEAR_K = 150.0
-#: A change by which derivatives of the knee are differenced, in standard errors.
-_STEP = 0.5
-#: What is read by a line and is curved, what has a tip, and what counts beyond the paper.
-RAMAN, IN_VACUUM, IN_AIR = "curved Raman law", "tip", "tip with its surface in air"
-TOWARDS, AWAY = "thermoelectricity, current to the bridge", "thermoelectricity, current from it"
-RADIATION, CHIP_WARMS, TOGETHER = "radiation", "warm chip, 2 K/mW", "all together"
-#: Other laws: of films, by their thickness or with all that c_κ takes away scattered at surfaces,
-#: whatever the temperature; of carriers as they were measured, and as few as were calculated; and
-#: of their mobility.
-FILM, SURFACES = "κ of a film of this thickness", "κ with all of c_κ by surfaces"
-CARRIERS, FEW_CARRIERS = "carriers of Misiakos and Tsamakis", "0.6 of the carriers of Eq. 7"
-MOBILITY = "mobility of MINIMOS"
-OTHER_LAWS = (FILM, SURFACES, CARRIERS, FEW_CARRIERS, MOBILITY)
-SUSPECTS = (
-    *(RAMAN, *OTHER_LAWS, IN_VACUUM, IN_AIR, TOWARDS, AWAY, RADIATION, CHIP_WARMS),
-    TOGETHER,
-)
-#: What all together have of suspects that exclude each other.
-_IN_TOGETHER = (RAMAN, SURFACES, CARRIERS, MOBILITY, TOWARDS, RADIATION, CHIP_WARMS)
-#: A chip that is usual (K/mW), and what Barber calculated n_i to be at 700 K, over Eq. 7.
-_CHIP_K_PER_MW, _FEW = 2.0, 0.6
+
+
+class Suspect(StrEnum):
+    """What a lever may have beyond the paper's model, or other than it, by what is said of it.
+
+    A line reads what is curved; a tip conducts, and gives heat to the air; thermoelectricity
+    depends on the polarity. Laws differ: κ of a film by its thickness, or with all that c_κ takes
+    away scattered at surfaces, whatever the temperature; carriers as they were measured, or as few
+    as Barber calculated at 700 K; their mobility.
+    """
+
+    RAMAN = "curved Raman law"
+    FILM = "κ of a film of this thickness"
+    SURFACES = "κ with all of c_κ by surfaces"
+    CARRIERS = "carriers of Misiakos and Tsamakis"
+    FEW_CARRIERS = "0.6 of the carriers of Eq. 7"
+    MOBILITY = "mobility of MINIMOS"
+    IN_VACUUM = "tip"
+    IN_AIR = "tip with its surface in air"
+    TOWARDS = "thermoelectricity, current to the bridge"
+    AWAY = "thermoelectricity, current from it"
+    RADIATION = "radiation"
+    CHIP_WARMS = "warm chip, 2 K/mW"
+    TOGETHER = "all together"
 
 
 def knee_of(branch: Branch, which: str = "the lever") -> OperatingPoint:
@@ -132,8 +124,9 @@ def reasons_of_the_knee(lever: Lever) -> xr.Dataset:
         If one of them has no knee.
     """
     material = lever.probe.material
-    ideal_legs = {"a0": _NO_RESISTANCE * material.a0, "a1": _NO_RESISTANCE * material.a1}
-    uniform = {"delta": _NO_DIFFUSION}
+    # a thousandth of the legs' resistivity, and a diffusion length (µm) far below the mesh size
+    ideal_legs = {"a0": 1e-3 * material.a0, "a1": 1e-3 * material.a1}
+    uniform = {"delta": 1e-3}
     levers = {"as it is": {}, "no leg resistance": ideal_legs, "uniform doping": uniform}
     levers["neither"] = ideal_legs | uniform
     # none of these materials is possible, so none is checked
@@ -164,7 +157,7 @@ def steps_to_the_knee(reasons: xr.Dataset) -> list[tuple[str, float]]:
 
 def _highest(branch: Branch, name: str) -> tuple[float, float]:
     """Tip temperatures (K) at the knee and at the first maximum of the resistance."""
-    tip = np.linspace(_COLDEST, branch.hottest_K, _POINTS)
+    tip = np.linspace(400.0, branch.hottest_K, 400)
     curve = CubicSpline(tip, branch.lever_voltage(tip) / branch.current(tip))
     roots = curve.derivative().roots(extrapolate=False)
     maxima = roots[curve(roots, 2) < 0]
@@ -291,30 +284,36 @@ def suspect_lever(probe: Probe, suspect: str) -> tuple[Probe, bool]:
 
     The coefficient of a law's departure, by its name, is a suspect as well.
     """
-    everything = suspect == TOGETHER
-    has = set(_IN_TOGETHER) if everything else {suspect}
-    if suspect == IN_VACUUM or everything:
-        probe = probe.model_copy(update={"tip": TIP})
-    if suspect == IN_AIR or (everything and probe.surroundings.medium == "air"):
-        probe = probe.model_copy(update={"tip": TIP.with_(in_air=True)})
-    if FILM in has:
+    everything = suspect == Suspect.TOGETHER
+    has: set[str] = {suspect}
+    if everything:
+        # the others exclude one of these
+        has = {Suspect.RAMAN, Suspect.SURFACES, Suspect.CARRIERS, Suspect.MOBILITY}
+        has |= {Suspect.TOWARDS, Suspect.RADIATION, Suspect.CHIP_WARMS}
+    # of the usual size of lithography probes
+    tip = Tip(height_um=0.7, half_angle_deg=20.0)
+    if suspect == Suspect.IN_VACUUM or everything:
+        probe = probe.model_copy(update={"tip": tip})
+    if suspect == Suspect.IN_AIR or (everything and probe.surroundings.medium == "air"):
+        probe = probe.model_copy(update={"tip": tip.with_(in_air=True)})
+    if Suspect.FILM in has:
         probe = probe.with_(c_kappa=BY_THICKNESS)
-    if SURFACES in has:
+    if Suspect.SURFACES in has:
         c_kappa = float(probe.values(["c_kappa"])[0])
         probe = _departed(probe, "kappa", lambda T: scattered_at_surfaces(T, c_kappa))
-    if CARRIERS in has:
+    if Suspect.CARRIERS in has:
         probe = _departed(probe, "n_i", _more_carriers)
-    if FEW_CARRIERS in has:
-        probe = probe.with_(intrinsic_scale=_FEW)
-    if CHIP_WARMS in has:
-        probe = probe.with_(chip_K_per_mW=_CHIP_K_PER_MW)
+    if Suspect.FEW_CARRIERS in has:
+        probe = probe.with_(intrinsic_scale=0.6)
+    if Suspect.CHIP_WARMS in has:
+        probe = probe.with_(chip_K_per_mW=2.0)
     if departure_of(suspect) is not None:
         probe = probe.with_(**{suspect: 1.0})
-    if MOBILITY in has:
+    if Suspect.MOBILITY in has:
         probe = probe.with_material("material", MinimosMaterial)
-    effects = ["thermoelectric"] if has & {TOWARDS, AWAY} else []
-    effects += ["radiation"] if RADIATION in has else []
-    return probe.with_physics(effects), RAMAN in has
+    effects = ["thermoelectric"] if has & {Suspect.TOWARDS, Suspect.AWAY} else []
+    effects += ["radiation"] if Suspect.RADIATION in has else []
+    return probe.with_physics(effects), Suspect.RAMAN in has
 
 
 class Carried(NamedTuple):
@@ -347,7 +346,7 @@ def carried_by(probe: Probe, suspect: str, own_K: float | None = None) -> Carrie
         If one of the levers has no knee.
     """
     true, by_line = suspect_lever(probe, suspect)
-    lever, away = Lever(true), suspect == AWAY
+    lever, away = Lever(true), suspect == Suspect.AWAY
     data = Measurement.of_sweep(ramp_of(lever, -1 if away else 1))
     branch = lever.branch_to(0.0, lowest=-paper.RAMP[-1]).mirrored if away else lever.branch()
     apparent_K = knee_of(branch, f"the lever ({suspect})").tip_K
@@ -375,9 +374,9 @@ def steps_at_the_knee(lever: Lever) -> dict[str, float]:
     """
     ramp = lever.sweep(paper.RAMP)
     tip, lever_V, current = (ramp[name].values for name in ("tip_K", "lever_V", "current_mA"))
-    # from rows beyond the knee V_l may rise again
+    # from rows beyond the knee V_l may rise again; its own row is no further away
     knee = lever.branch().knee
-    hottest = np.inf if knee is None else knee.tip_K + _NEAR_K
+    hottest = np.inf if knee is None else knee.tip_K + 150.0
     row = int(np.argmax(np.where(tip < hottest, lever_V, 0.0)))
     steps = {"row_K": float(tip[row])}
     for name, other in (("up", min(row + 1, tip.size - 1)), ("down", max(row - 1, 0))):
@@ -440,18 +439,19 @@ def by_covariance(result: Estimate) -> float:
         branch = Lever(result.probe.with_(**changes), COARSE).branch()
         return float("nan") if branch.knee is None else branch.knee.tip_K
 
+    # by half a standard error to either side
     slopes = []
     for name, error in errors.items():
         value = result.parameters[name].value
-        ends = [knee(**{name: value + way * _STEP * error}) for way in (1.0, -1.0)]
-        slopes.append((ends[0] - ends[1]) / (2.0 * _STEP))
+        ends = [knee(**{name: value + way * error}) for way in (0.5, -0.5)]
+        slopes.append(ends[0] - ends[1])
     return float(np.sqrt(np.array(slopes) @ result.correlation @ slopes))
 
 
 def compare_suspects(
     probe: Probe,
     example: Estimate,
-    suspects: Sequence[str] = SUSPECTS,
+    suspects: Sequence[str] = tuple(Suspect),
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Compute what each suspect carries of the knee's discrepancy, in one medium.
@@ -463,7 +463,7 @@ def compare_suspects(
     example : Estimate
         Of a measurement with noise as the paper's, for the covariance.
     suspects : sequence of str
-        Of `SUSPECTS`.
+        Of `Suspect`.
     progress : callable, optional
         Called with the suspects done and their number.
 
@@ -482,7 +482,7 @@ def compare_suspects(
     """
     shifts, own_K = [], knee_K(probe)
     for suspect in each(suspects, progress):
-        counts = suspect != IN_AIR or probe.surroundings.medium == "air"
+        counts = suspect != Suspect.IN_AIR or probe.surroundings.medium == "air"
         shifts.append(carried_by(probe, suspect, own_K)[:2] if counts else (np.nan, np.nan))
     own, fitted = np.transpose(shifts)
     return labelled(

@@ -39,24 +39,6 @@ from hotlever.units import PER_CM_TO_MILLI_PER_UM
 SPAN_K = HOTTEST_TIP_K - KNEE_PREDICTED_K
 #: How far (K) a line may be off where it is asked how far it reaches.
 WITHIN_K = 10.0
-#: Points of a line, and steps (K) in which its reach is found.
-_POINTS, _STEP_K = 60, 10.0
-#: Values of single dimensions (µm) and parameters in place of the shape's own.
-_VARIED = {
-    "heater_length_um": (3.0, 3.5, 5.0, 6.0),
-    "heater_width_um": (1.0, 2.3, 3.0),
-    "length_um": (30.0, 100.0),
-    "centre_leg_width_um": (3.0, 12.0),
-    "outer_leg_width_um": (2.0, 8.0),
-    "leg_width_um": (3.0, 12.0),
-    "bridge_width_um": (2.5, 6.0),
-    "gap_um": (5.0, 10.0),
-    "thickness_um": (0.2,),
-    "n_d": (1e17, 2e17, 1e18, 2e18),
-    "delta": (0.3, 0.5, 0.75),
-}
-#: Concentrations of boron (cm⁻³).
-_BORON = (1e17, 2e17, 5.75e17, 1e18, 2e18)
 
 
 @dataclass(frozen=True)
@@ -82,16 +64,30 @@ class BranchCase:
 
 def all_cases() -> dict[str, BranchCase]:
     """Return the levers of the study by what is changed."""
+    # single dimensions (µm) and parameters in place of the shape's own
+    varied = {
+        "heater_length_um": (3.0, 3.5, 5.0, 6.0),
+        "heater_width_um": (1.0, 2.3, 3.0),
+        "length_um": (30.0, 100.0),
+        "centre_leg_width_um": (3.0, 12.0),
+        "outer_leg_width_um": (2.0, 8.0),
+        "leg_width_um": (3.0, 12.0),
+        "bridge_width_um": (2.5, 6.0),
+        "gap_um": (5.0, 10.0),
+        "thickness_um": (0.2,),
+        "n_d": (1e17, 2e17, 1e18, 2e18),
+        "delta": (0.3, 0.5, 0.75),
+    }
     cases = {}
     for start in (Probe.reference(), Probe.u_shape()):
         name = start.shape.shape
         cases[name] = BranchCase(start, start.shape, "n", "")
         fields = {*type(start.shape).model_fields, "n_d", "delta"}
-        for key in (key for key in _VARIED if key in fields):
-            for value in _VARIED[key]:
+        for key in (key for key in varied if key in fields):
+            for value in varied[key]:
                 probe = start.with_(**{key: value})
                 cases[f"{name}, {key} = {value:g}"] = BranchCase(probe, probe.shape, "n", key)
-        for n_a in _BORON:
+        for n_a in (1e17, 2e17, 5.75e17, 1e18, 2e18):
             probe = with_heater_of(start, kind="p-silicon", n_d=n_a)
             cases[f"{name}, boron {n_a:g}"] = BranchCase(probe, start.shape, "p", "n_d")
     return cases
@@ -151,9 +147,9 @@ class BranchLine:
         cls, branch: Branch, coldest_K: float, hottest_K: float, *, offset: bool = True
     ) -> BranchLine:
         """Fit a line to a branch; without an offset it passes through the base temperature."""
-        tip = np.linspace(coldest_K, hottest_K, _POINTS)
+        tip = np.linspace(coldest_K, hottest_K, 60)
         power, rise = branch.power(tip), tip - branch.base_temperature_K
-        columns = np.stack([np.full(_POINTS, float(offset)), power], axis=1)
+        columns = np.stack([np.full(tip.size, float(offset)), power], axis=1)
         coefficients = np.linalg.lstsq(columns, rise, rcond=None)[0]
         off = np.abs(rise - columns @ coefficients).max()
         return cls(float(coefficients[0]), float(coefficients[1]), float(off))
@@ -162,7 +158,7 @@ class BranchLine:
 def reach(branch: Branch, coldest_K: float) -> float:
     """Return how far (K) above a temperature a line stays within `WITHIN_K` of the branch."""
     reached, longest = 0.0, min(branch.hottest_K, HOTTEST) - coldest_K
-    for length in [*np.arange(_STEP_K, longest, _STEP_K).tolist(), longest]:
+    for length in [*np.arange(10.0, longest, 10.0).tolist(), longest]:
         if BranchLine.of(branch, coldest_K, coldest_K + length).off_K > WITHIN_K:
             break
         reached = length

@@ -32,18 +32,10 @@ from hotlever.studies.working_point import (
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
-#: Designs that are tried at most, and what the objective may still change by, over its first value.
-MOST_DESIGNS, _ACCURATE = 30, 1e-6
-#: The same of what a reader shows, which changes a little with each mesh.
-_ACCURATE_OF_A_READER = 5e-4
-#: Relative change of a dimension from which on the lever is meshed anew.
-_REMESH_CHANGE = 0.25
+#: Designs that are tried at most.
+MOST_DESIGNS = 30
 #: How near a bound is met: over its range, or over the bound of a quantity.
 _AT_BOUND = 1e-3
-#: An objective where there is no such lever, in first ones: the search steps back from it.
-_NONE = 1e3
-#: What is no number of a design: it is of the experiment.
-_NOT_OF_A_DESIGN = ("base_temperature_K",)
 
 # From and to; None where there is no bound.
 Bounds = tuple[float | None, float | None]
@@ -165,7 +157,8 @@ def _check(probe: Probe, quantity: str, bounds: Mapping[str, Bounds]) -> None:
             f"{reader[0]}: found no surface below the lever, expected surface_gap_um and medium = "
             '"air" in [surroundings] of the probe file'
         )
-    numbers = [name for name in parameters_of(probe) if name not in _NOT_OF_A_DESIGN]
+    # the temperature of the base is of the experiment
+    numbers = [name for name in parameters_of(probe) if name != "base_temperature_K"]
     for name, (low, high) in bounds.items():
         if name not in (*numbers, *QUANTITIES):
             raise unknown_name("name", name, (*numbers, *QUANTITIES))
@@ -225,7 +218,9 @@ class _Search:
             if bound is not None
         ]
         self._reads_distance = not {quantity, *bounds}.isdisjoint(OF_THE_READER)
-        self.accuracy = _ACCURATE_OF_A_READER if self._reads_distance else _ACCURATE
+        # what the objective may still change by, over its first value; what a reader shows changes
+        # a little with each mesh
+        self.accuracy = 5e-4 if self._reads_distance else 1e-6
         self.designs, self._scale, self._least = 0, 1.0, np.inf
         self.best: Array | None = None
         self._similar: SimilarLevers | None = None
@@ -242,7 +237,8 @@ class _Search:
         """Return the quantity in units of the first design's, to be made small."""
         solved = self.solved_or_none(share)
         value = np.nan if solved is None else self._sign * solved.value(self._quantity)
-        return value / self._scale if np.isfinite(value) else _NONE
+        # from where there is no such lever the search steps back
+        return value / self._scale if np.isfinite(value) else 1e3
 
     def objective_by(self, share: Array) -> Array:
         """Return its derivatives by the shares, (p,)."""
@@ -312,7 +308,8 @@ class _Search:
         if self._similar is None:
             return False
         drawn, now = (each.values(self.names) for each in (self._similar.drawn, probe))
-        return bool(np.all(np.abs(now - drawn) <= _REMESH_CHANGE * np.abs(drawn)))
+        # the lever is meshed anew from such a change of a dimension on
+        return bool(np.all(np.abs(now - drawn) <= 0.25 * np.abs(drawn)))
 
     # --- what limits a design ---------------------------------------------------------------------
 

@@ -61,8 +61,6 @@ DEPARTURES = {
     "outliers": "in a third of the levers, one or two currents off by 10 to 50 times the noise",
     "thermometer": "Raman temperatures off together, by 2 % of the rise",
 }
-ALL = tuple(DEPARTURES)
-KINDS = ("iv", "reader", "raman")
 #: Ways of calibrating; all but the estimate need the knee.
 ESTIMATE = "estimate with priors"
 WAYS = (ESTIMATE, "model of the drawing at k", "Eq. 12 at k", "knee at T_i")
@@ -75,7 +73,6 @@ HOT = 400.0
 FINER = MeshOptions(refinement=1.3)
 #: Levels of confidence, and their limits in standard deviations.
 LEVELS = {0.68: 0.994, 0.95: BAND}
-PERCENTILES = (50, 90, 100)
 
 
 @dataclass(frozen=True)
@@ -118,7 +115,10 @@ class MinimosMaterial(Material):
 
 
 def draw(
-    rng: np.random.Generator, number: int, medium: str, departures: Collection[str] = ALL
+    rng: np.random.Generator,
+    number: int,
+    medium: str,
+    departures: Collection[str] = DEPARTURES,
 ) -> tuple[Probe, Probe]:
     """Draw a lever from the priors; return its probe, and the one that is known beforehand.
 
@@ -158,14 +158,14 @@ def measure(
     true: Probe,
     rng: np.random.Generator,
     what: str,
-    departures: Collection[str] = ALL,
+    departures: Collection[str] = DEPARTURES,
     highest: float | None = None,
     noise: float = NOISE,
     laboratory: LaboratoryOptions | None = None,
 ) -> tuple[Measurement, Array, Lever]:
     """Measure a lever up to a bias (V), or as far as it goes; return its true temperatures (K) too.
 
-    Of ``KINDS``, the current is measured alone, with the reader, or with five Raman temperatures,
+    By ``what``, the current is measured alone, with the reader, or with five Raman temperatures,
     with their errors stated; meters have a noise that is a share of what they show.
 
     Raises
@@ -238,7 +238,7 @@ def judge(
     number: int,
     medium: str = "vacuum",
     what: str = "iv",
-    departures: Collection[str] = ALL,
+    departures: Collection[str] = DEPARTURES,
     noise: float = NOISE,
     laws: str = UNCERTAIN,
     rows: int = 101,
@@ -344,13 +344,14 @@ def summary(judged: xr.Dataset) -> xr.Dataset:
     # of data that are not described no error is stated
     ratio = ratio[np.isfinite(ratio).any(axis=1)]
     largest = abs(answered.off_K).max("row").transpose("way", "lever").values
+    percentiles = [50, 90, 100]
     coverage = coverage_by_decile([row[np.isfinite(row)] for row in ratio])
     return labelled(
         {
-            "largest_K": (("way", "percentile"), np.nanpercentile(largest, PERCENTILES, axis=1).T),
+            "largest_K": (("way", "percentile"), np.nanpercentile(largest, percentiles, axis=1).T),
             "coverage": (("level", "decile"), coverage),
         },
-        coordinates={"way": list(WAYS), "percentile": list(PERCENTILES), "level": list(LEVELS)},
+        coordinates={"way": list(WAYS), "percentile": percentiles, "level": list(LEVELS)},
         rms=float(np.sqrt(np.nanmean(ratio**2))),
         everywhere=float(np.mean(np.nanmax(ratio, axis=1) < 2.0)),
         answered=int(answered.sizes["lever"]),

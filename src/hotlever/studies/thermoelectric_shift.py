@@ -47,13 +47,6 @@ from hotlever.types import Array
 HEATS, SIDES = ("Thomson", "Peltier"), ("supply", "ground")
 #: Whether the current flows from the supply through the heater to ground, or back.
 POLARITIES = (1, -1)
-#: Share of the heater's length in which the hot spot is looked for, points there, and the degree
-#: of the polynomial through their temperatures; it has no steps from element to element.
-_INNER, _POINTS, _DEGREE = 0.8, 81, 14
-#: Shares of S at which the linearised equations are looked at, and their weights: Gauss's rule.
-_GAUSS = [
-    (0.5 + 0.5 * x, 0.5 * w) for x, w in zip(*np.polynomial.legendre.leggauss(3), strict=True)
-]
 
 
 # --- where it is hottest --------------------------------------------------------------------------
@@ -86,10 +79,12 @@ def rises_along(space: FullSpace, taper: Taper, x: Array) -> list[Chebyshev]:
     x : ndarray, shape (size + 1, k)
         States, or changes of them; temperatures count from that of the base.
     """
-    half = 0.5 * _INNER * taper.length_um
-    position = np.linspace(-half, half, _POINTS)
+    # in the inner 80 % of the heater
+    half = 0.5 * 0.8 * taper.length_um
+    position = np.linspace(-half, half, 81)
     values = space.rise_at(np.array(taper.centre) + np.outer(position, taper.axis), x)
-    return [Chebyshev.fit(position, T, _DEGREE, domain=(-half, half)) for T in values.T]
+    # a polynomial has no steps from element to element
+    return [Chebyshev.fit(position, T, 14, domain=(-half, half)) for T in values.T]
 
 
 def hot_spot(rise: Chebyshev) -> HotSpot:
@@ -339,9 +334,11 @@ def _shift(way: _Way, plain: State, polarity: int) -> dict[str, Any]:
     """Return a row of `shift_by_heat`."""
     before = hot_spot(way.rises(plain.x)[0])
     x, shift_um = plain.x, np.zeros(len(HEATS) * len(SIDES) + 1)
-    for share, weight in _GAUSS:
+    # shares of S at which the linearised equations are looked at: Gauss's rule from 0 to 1
+    for node, weight in zip(*np.polynomial.legendre.leggauss(3), strict=True):
+        share = 0.5 + 0.5 * node
         equations, x = way.state(polarity * share, plain.bias_V, x)
-        shift_um += weight * way.rates(equations, x, polarity * share)
+        shift_um += 0.5 * weight * way.rates(equations, x, polarity * share)
     equations, x = way.state(polarity, plain.bias_V, x)
     after = hot_spot(way.rises(x)[0])
     heats = way.heats.tested(x, -equations.fluxes(x).charge).values()
@@ -369,21 +366,18 @@ def of_p_silicon(probe: Probe) -> Probe:
     return probe.model_copy(update={"materials": materials})
 
 
-#: The strip (µm): long enough that its ends are those of a strip, and as wide as a heater.
-_LENGTH, _WIDTH, _THICK = 8.0, 1.0, 0.4
-#: Of the self-heated strip (Ω): every temperature has one state.
-_R_S = 20_000.0
+def strip_of(silicon: LowDopedSilicon, length_um: float = 8.0, **circuit: object) -> Probe:
+    """Return a strip of one kind of silicon along x, from the supply to ground.
 
-
-def strip_of(silicon: LowDopedSilicon, **circuit: object) -> Probe:
-    """Return a strip of one kind of silicon along x, from the supply to ground."""
-    half = 0.5 * _WIDTH
-    ends = {"supply": 0.0, "ground": _LENGTH}
+    It is so long that its ends are those of a strip, and as wide as a heater.
+    """
+    half = 0.5
+    ends = {"supply": 0.0, "ground": length_um}
     drawing = Drawing(
-        layers={"silicon": Layer(rectangle(0.0, -half, _LENGTH, half), "strip")},
+        layers={"silicon": Layer(rectangle(0.0, -half, length_um, half), "strip")},
         terminals={name: [(x, -half), (x, half)] for name, x in ends.items()},
-        tip_um=(0.5 * _LENGTH, 0.0),
-        thickness_um=_THICK,
+        tip_um=(0.5 * length_um, 0.0),
+        thickness_um=0.4,
     )
     return Probe.from_sections(
         {
@@ -411,11 +405,13 @@ def self_heated(silicon: LowDopedSilicon, tip: ArrayLike) -> xr.Dataset:
     xarray.Dataset
         ``moved_nm`` on the dimension ``tip_K``: from the middle in the direction of the current.
     """
-    lever = Lever(strip_of(silicon, series_resistance_ohm=_R_S))
+    # with such a resistor every temperature has one state
+    length_um = 8.0
+    lever = Lever(strip_of(silicon, length_um, series_resistance_ohm=20_000.0))
     temperatures = np.asarray(tip, dtype=float)
     branch = lever.branch(temperatures.max())
     rises = temperatures - lever.circuit.base_temperature_K
-    whole = Taper((0.5 * _LENGTH, 0.0), (1.0, 0.0), _LENGTH)
+    whole = Taper((0.5 * length_um, 0.0), (1.0, 0.0), length_um)
     along = rises_along(lever.space, whole, branch.states(np.sqrt(rises)))
     shift_nm = [1e3 * hot_spot(rise).at_um for rise in along]
     return labelled({"moved_nm": shift_nm}, "tip_K", {"tip_K": temperatures})

@@ -29,8 +29,7 @@ from hotlever.lever.transient.modes import slowest_modes
 from hotlever.probe import Circuit, Probe
 from hotlever.types import Array
 
-#: Of any state, of the knee, of both, and of a state with its neighbours in time.
-OF_A_STATE = ("tip_K", "power_mW", "bias_V", "lever_V", "current_mA")
+#: Quantities of the knee, and what they are of any state.
 OF_THE_KNEE = {
     "knee_K": "tip_K",
     "knee_mW": "power_mW",
@@ -40,18 +39,16 @@ OF_THE_KNEE = {
 }
 #: From the working point up to the knee.
 DISTANCES = {"knee_distance_K": "knee_K", "knee_distance_V": "knee_bias_V"}
-TIME_CONSTANT = "time_constant_us"
 #: Of a lever in air over a surface, see `hotlever.lever.reader`.
 OF_THE_READER = ("dV_dz_V_per_um", "dlnR_dz_per_um", "resolution_nm_per_rtHz")
 #: All that may be made least or greatest, or bounded.
-QUANTITIES = (*OF_A_STATE, TIME_CONSTANT, *OF_THE_READER, *OF_THE_KNEE, *DISTANCES)
-
-#: Distance (K^½) of the states that tell how derivatives change at the knee.
-_NEAR_KNEE = 0.3
-#: Relative change of a number by which a time constant is differentiated.
-_STEP = 1e-3
-#: And what a reader shows: of coarse levers, meshed anew, differences are known to some per cent.
-_READER_STEP = 0.05
+QUANTITIES = (
+    *OF_THE_KNEE.values(),
+    "time_constant_us",
+    *OF_THE_READER,
+    *OF_THE_KNEE,
+    *DISTANCES,
+)
 
 
 @dataclass(frozen=True)
@@ -130,7 +127,7 @@ class SolvedDesign:
 
     def value(self, quantity: str) -> float:
         """Return a quantity; NaN of a knee, or a surface below, that does not exist."""
-        if quantity == TIME_CONSTANT:
+        if quantity == "time_constant_us":
             return self._time_constant
         if quantity in OF_THE_READER:
             return getattr(self._signal, quantity, float("nan"))
@@ -138,7 +135,7 @@ class SolvedDesign:
 
     def gradient(self, quantity: str) -> Array:
         """Return its derivatives by the parameters, (p,)."""
-        if quantity == TIME_CONSTANT:
+        if quantity == "time_constant_us":
             return np.array([self._time_constant_by(name) for name in self._names])
         if quantity in OF_THE_READER:
             return np.array([self._reader_by(quantity, name) for name in self._names])
@@ -204,8 +201,8 @@ class SolvedDesign:
     def _place_by(self, u: float, partial: Array) -> Array:
         """Return how the place u of the working point or of the knee moves, (p,)."""
         if u == self.branch.knee_u:
-            # the knee is where V_l stops rising
-            partials, slopes = self._partials(u + _NEAR_KNEE * np.array([-1.0, 1.0]))
+            # the knee is where V_l stops rising; states beside it tell how derivatives change
+            partials, slopes = self._partials(u + 0.3 * np.array([-1.0, 1.0]))
             return np.asarray(-np.diff(partials[:, 0], axis=0)[0] / np.diff(slopes))
         _, by_shown, by_circuit = self._read(self._point.column, u)
         missing = by_shown @ partial + by_circuit
@@ -221,7 +218,7 @@ class SolvedDesign:
     def _time_constant_by(self, name: str) -> float:
         """Return its derivative by a parameter: from levers beside this one, on its mesh moved."""
         value = float(self.probe.values([name])[0])
-        step = _STEP * (abs(value) or 1.0)
+        step = 1e-3 * (abs(value) or 1.0)
         rise_by = self._gradient_of("tip_K", self.u)[self._names.index(name)]
         above, below = (
             self._slowest(self.probe.replace({name: value + way}), self._rise_K + way * rise_by)
@@ -252,7 +249,8 @@ class SolvedDesign:
     def _reader_by(self, quantity: str, name: str) -> float:
         """Return a derivative of what the reader shows, from coarse levers beside this one."""
         value = float(self.probe.values([name])[0])
-        step = _READER_STEP * (abs(value) or 1.0)
+        # levers that are meshed anew differ by some per cent
+        step = 0.05 * (abs(value) or 1.0)
         above, below = (
             SolvedDesign(SimilarLevers(Lever(probe, COARSE)), probe, self._point).value(quantity)
             for probe in (self.probe.with_(**{name: value + way}) for way in (step, -step))

@@ -18,46 +18,36 @@ from hotlever.report.reproduce import paper_sections as vacuum
 from hotlever.report.reproduce.findings import Claim, Findings
 from hotlever.types import Progress
 
-#: Headings and sections, in the order of the page.
+#: Headings and sections, in the order of the paper.
 SECTIONS: dict[str, Callable[[Findings], None]] = {
     "The lever of the paper, from all that is printed of it": layout.layouts_section,
-    "The reference probe": vacuum.probe_section,
+    "The reference probe (Fig. 1)": vacuum.probe_section,
+    "The Raman thermometer (Section III, Fig. 2)": inference.thermometer_section,
+    "Material parameters from a measurement (Section IV, option III)": inference.fit_section,
+    "What each observable adds (options I to III, Figs. 3 and 4, Table I)": inference.data_section,
     "Published parameters and inversion temperatures (Tables I and II)": vacuum.parameter_section,
-    "Published operating points": vacuum.operating_points_section,
+    "The same parameters from other levers? (Table II)": claims.consistency_section,
     "Characteristics in vacuum (Figs. 5 and 6)": vacuum.characteristics_section,
+    "Published operating points (Figs. 6a and 7b)": vacuum.operating_points_section,
     "T(P) above the knee on other levers (Eq. 12)": claims.linear_section,
     "Inside the heater (Fig. 7)": vacuum.heater_section,
-    "Why the knee is not at the inversion temperature": vacuum.knee_section,
-    "Material parameters from a measurement (option III)": inference.fit_section,
-    "What each observable adds (options I to III, Figs. 3 and 4, Table I)": inference.data_section,
-    "The same parameters from other levers? (Table II)": claims.consistency_section,
-    "The Raman thermometer (Fig. 2)": inference.thermometer_section,
+    "Why the knee is not at the inversion temperature (Section IV)": vacuum.knee_section,
+    "Radiation (Section IV)": claims.radiation_section,
+    "Thermoelectricity: which way the hot spot moves (Section IV)": claims.shift_section,
+    "Thermoelectricity: what a fit gains by it (Section IV)": claims.prediction_section,
     "Heat into air depends on the surroundings (Fig. 8)": air.disc_section,
     "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
     "Is air one factor of the power? (Fig. 10b)": air.scale_section,
+    "Where the heat goes (Section V)": air.map_section,
     "A surface on one side (Section V)": air.one_sided_section,
-    "Radiation (Section IV)": claims.radiation_section,
-    "Where the heat goes": air.map_section,
-    "The 50 K that the knee is off (Figs. 6 and 10)": layout.discrepancy_section,
+    "k by size and pressure (Section V)": air.geometry_section,
+    "The 50 K that the knee is off (Figs. 6a and 10a)": layout.discrepancy_section,
+    "Which measurement would decide the 50 K?": layout.next_section,
+    "The missing tip (Conclusions)": air.tip_section,
     "A lever never seen: how wrong is its calibration?": inference.levers_section,
     "Balances": vacuum.balance_section,
-}
-#: Left out of the quick form.
-LONG_SECTIONS: dict[str, Callable[[Findings], None]] = {
-    "k by size and pressure": air.geometry_section,
-    "The missing tip": air.tip_section,
-    "Thermoelectricity: which way the hot spot moves": claims.shift_section,
-    "Thermoelectricity: what a fit gains by it": claims.prediction_section,
     "Mesh": vacuum.mesh_section,
 }
-
-
-#: Sections that take longest, the longest first: with these two processes begin.
-_LONGEST = (
-    "A lever never seen: how wrong is its calibration?",
-    "The same parameters from other levers? (Table II)",
-    "T(P) above the knee on other levers (Eq. 12)",
-)
 
 
 def reproduce_page(quick: bool, progress: Progress) -> Page:
@@ -68,31 +58,33 @@ def reproduce_page(quick: bool, progress: Progress) -> Page:
     Parameters
     ----------
     quick : bool
-        Leave out `LONG_SECTIONS`; others are of fewer levers.
+        Leave out what takes longest; other sections are of fewer levers.
     progress : callable
         Called with the sections done and their number.
     """
-    headings = list(_sections(quick))
-    order = sorted(headings, key=[*_LONGEST, *headings].index)
+    long = {claims.shift_section, claims.prediction_section, vacuum.mesh_section}
+    long |= {air.geometry_section, air.tip_section}
+    headings = [name for name, section in SECTIONS.items() if not (quick and section in long)]
+    # processes begin with those that take longest
+    longest = (inference.levers_section, claims.consistency_section, claims.linear_section)
+    order = sorted(headings, key=lambda heading: SECTIONS[heading] not in longest)
     with local_processes(PROCESSORS) as run:
         done = run(filled_section, [(heading, quick) for heading in order], progress)
     filled = dict(zip(order, done, strict=True))
     page = _shared_page(quick)
     page.heading("What the paper says, and what was found")
     caption = (
-        "Where the layout of the paper's lever matters, the verdict is that of the layouts which "
-        "what is printed leaves, by their weight, and the last column is their range of what "
-        "decides. Other numbers are of the reference probe in this run, from the sections below."
+        "A verdict that depends on the layout of the paper's lever is that of the layouts which "
+        "agree with what is printed (next section): a claim holds if it is true of 95 % of their "
+        "weight or more. The last column is the number that decides, from the least to the largest "
+        "of these layouts. What was found is of the reference probe, in this run, and more of it "
+        "stands in the section that the first column leads to."
     )
     columns = ("where", "the paper says", "verdict", "found", "over the layouts")
-    claims = [claim for heading in headings for claim in filled[heading][1]]
-    page.table(columns, claims, caption, prose=True)
+    rows = [claim for heading in headings for claim in filled[heading][1]]
+    page.table(columns, rows, caption, prose=True)
     page.blocks += [block for heading in headings for block in filled[heading][0]]
     return page
-
-
-def _sections(quick: bool) -> dict[str, Callable[[Findings], None]]:
-    return SECTIONS if quick else SECTIONS | LONG_SECTIONS
 
 
 @cache
@@ -107,5 +99,5 @@ def filled_section(heading: str, quick: bool) -> tuple[list[Block], list[Claim]]
     page = _shared_page(quick)
     page.blocks, page.claims = [], []
     page.heading(heading)
-    _sections(quick)[heading](page)
+    SECTIONS[heading](page)
     return page.blocks, page.claims

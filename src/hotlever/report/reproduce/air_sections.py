@@ -14,13 +14,10 @@ from hotlever.estimate.power_law import EQ12
 from hotlever.lever.air_fields import AirFields
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.heat import thermal_conductivity
-from hotlever.report.reproduce.findings import MANY, Findings
+from hotlever.report.reproduce.findings import Findings
 from hotlever.studies import air_scaling
-from hotlever.studies.air_scaling import COLD, GAPS_UM, HOT
+from hotlever.studies.air_scaling import COLD, HOT
 from hotlever.studies.knee_study import tip_effects
-
-#: Gaps to the surface (µm) of the quick form.
-_FEW_GAPS_UM = (1.0, 10.0, np.inf)
 
 
 def disc_section(page: Findings) -> None:
@@ -40,7 +37,9 @@ def characteristics_section(page: Findings) -> None:
     ramp = page.air.sweep(paper.RAMP)
     page.draw("air_sweep", figures.sweep_overview(ramp))
     knees = {"vacuum": page.lever.knee(), "air": page.air.knee()}
-    curves = {"vacuum": page.lever.sweep(MANY), "air": page.air.sweep(MANY)}
+    curves = {
+        name: one.sweep(page.curve_V) for name, one in (("vacuum", page.lever), ("air", page.air))
+    }
     page.draw("air_iv", figures.iv_curves(curves, knees))
     page.say("knee_in_air", **{medium: knee.squeeze() for medium, knee in knees.items()})
     balance = abs((ramp.end_heat_mW + ramp.air_heat_mW) / ramp.power_mW - 1).max()
@@ -58,7 +57,7 @@ def characteristics_section(page: Findings) -> None:
 def scale_section(page: Findings) -> None:
     """One factor of the power: is it one?"""
     vacuum, air = page.lever.branch(), page.air.branch()
-    ramp, curve = page.air.sweep(paper.RAMP), page.air.sweep(MANY)
+    ramp, curve = page.air.sweep(paper.RAMP), page.air.sweep(page.curve_V)
     hottest = float(ramp.tip_K.max())
     factor = air_scaling.find_scale_factor(vacuum, air, hottest)
     law = EQ12.scaled(paper.K_IN_AIR)
@@ -128,8 +127,7 @@ def _columns_of_k(
 
 def one_sided_section(page: Findings) -> None:
     """k with a surface below the lever."""
-    gaps_um = _FEW_GAPS_UM if page.quick else GAPS_UM
-    study = air_scaling.one_sided_study(page.lever.probe, gaps_um)
+    study = air_scaling.one_sided_study(page.lever.probe, page.extent.gaps_um)
     names = ["free" if np.isinf(gap) else f"{gap:g} µm" for gap in study.gap_um.values]
     curves = {name: study.k.isel(gap_um=number) for number, name in enumerate(names)}
     page.draw("one_sided", figures.scale_factor(curves, paper.K_IN_AIR))

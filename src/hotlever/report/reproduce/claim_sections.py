@@ -10,11 +10,12 @@ import xarray as xr
 from hotlever import figures
 from hotlever import spieser2017 as paper
 from hotlever.estimate import fit
+from hotlever.estimate.summary import parameter_rows
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe.priors import default_priors
 from hotlever.report.reproduce.findings import Findings, example
-from hotlever.report.reproduce.paper_sections import published_biases
+from hotlever.report.reproduce.paper_sections import PARAMETER_COLUMNS, published_biases
 from hotlever.studies.knee_study import described_without
 from hotlever.studies.linear_branch import (
     SPAN_K,
@@ -24,7 +25,6 @@ from hotlever.studies.linear_branch import (
     slope_regression,
 )
 from hotlever.studies.parameter_consistency import (
-    ERRORS,
     FREE,
     GEOMETRIES,
     HELD,
@@ -36,27 +36,12 @@ from hotlever.studies.radiation import radiated_heat, sheet_emissivities
 from hotlever.studies.simulation_based_calibration import NOISE, RAMAN
 from hotlever.studies.thermoelectric_shift import of_p_silicon, self_heated, shift_by_heat
 
-#: Of the quick form: every so many levers, the first geometries, and errors of the model.
-_EVERY, _FIRST, _FEW_ERRORS = 5, 3, ("none", "all")
-#: What explains the slope.
-_EXPLAINED = ("resistance_K_per_mW", "knee_share")
-#: The error of the model that is the same on all levers.
-_SHARED = "mobility"
-#: How near to their mean the paper's levers are said to be.
-_CLAIMED = 0.1
-#: Biases (V) beside those of the published points, the lowest first.
-_BIAS = (4.0, 5.0, 6.0, 9.0, 10.0)
-#: Temperatures (K) of a strip of one doping.
-_STRIP_K = np.arange(500.0, 1301.0, 25.0)
-#: A change of a mean residual by less, relative to it, is none.
-_MATTERS = 0.1
-
 
 def linear_section(page: Findings) -> None:
     """How straight T(P) is above the knee, and what its slope follows."""
-    cases = dict(list(all_cases().items())[:: _EVERY if page.quick else 1])
-    study = linear_branch_study(cases)
-    regression, alone = (slope_regression(study, names) for names in (_EXPLAINED, _EXPLAINED[:1]))
+    cases = dict(list(all_cases().items())[:: page.extent.every])
+    study, explained = linear_branch_study(cases), ("resistance_K_per_mW", "knee_share")
+    regression, alone = (slope_regression(study, names) for names in (explained, explained[:1]))
     spread = paper.POWER_LAW_SPREAD_K
     page.draw("linear_branches", figures.linear_branches(study, regression, spread))
     solved = study.isel(case=study.knee_K.notnull().values)
@@ -88,17 +73,18 @@ def _tabulate_slopes(page: Findings, solved: xr.Dataset) -> float:
 
 def consistency_section(page: Findings) -> None:
     """The parameters of twins, each fitted by itself, beside those of the paper's levers."""
-    errors = _FEW_ERRORS if page.quick else tuple(ERRORS)
-    geometries = dict(list(GEOMETRIES.items())[: _FIRST if page.quick else None])
-    probe = page.lever.probe
+    errors, probe = page.extent.errors, page.lever.probe
+    geometries = dict(list(GEOMETRIES.items())[: page.extent.geometries])
+    # how near to their mean the paper's levers are said to be
+    claimed = 0.1
     study = consistency_study(probe, geometries, errors)
     published = published_levers()
     numbers: Any = {"count": len(geometries), "common": RAMAN[1]}
     numbers["dimensions"] = default_priors(probe)["thickness_um"].spread
     doping = probe.material.n_d
     page.say("consistency", noise=NOISE, thermometer=RAMAN[0], doping=doping, **numbers)
-    figure = figures.parameter_deviations(study, published, _CLAIMED)
-    page.draw("parameter_deviations", figure, claimed=_CLAIMED)
+    figure = figures.parameter_deviations(study, published, claimed)
+    page.draw("parameter_deviations", figure, claimed=claimed)
     ours, theirs = largest_deviation(study), largest_deviation(published)
     rows = [
         (str(error), str(doping), *_shares(ours.sel(error=error, doping=doping)))
@@ -108,16 +94,17 @@ def consistency_section(page: Findings) -> None:
     rows += [("the paper's", str(way), *_shares(theirs.sel(doping=way))) for way in (FREE, HELD)]
     symbols = [parameter.symbol for parameter in PARAMETERS.values()]
     page.tabulate("consistency", ("errors of the model", "", *symbols), rows)
-    if _SHARED in errors:
-        mean = study.value.sel(error=_SHARED, doping=FREE).mean("lever")
+    # the error of the model that is the same on all levers
+    if "mobility" in errors:
+        mean = study.value.sel(error="mobility", doping=FREE).mean("lever")
         off, symbol = _worst(abs(mean / study.true_value - 1.0))
-        scatter, _ = _worst(ours.sel(error=_SHARED, doping=FREE))
+        scatter, _ = _worst(ours.sel(error="mobility", doping=FREE))
         page.say("consistent_but_wrong", scatter=scatter, off=off, symbol=symbol)
     worst, symbol = _worst(ours.sel(error="all", doping=FREE))
     of_doping = ours.sel(doping=FREE, parameter="n_d")
     page.claim(
         "consistent_parameters",
-        holds=worst < _CLAIMED,
+        holds=worst < claimed,
         **numbers,
         without=_worst(ours.sel(error="none", doping=FREE))[0],
         worst=worst,
@@ -166,7 +153,7 @@ def radiation_section(page: Findings) -> None:
 def shift_section(page: Findings) -> None:
     """The shift of the hot spot, heat by heat, for either kind of silicon."""
     points = published_biases(page.lever)
-    biases = sorted([*_BIAS, *points])
+    biases = sorted([4.0, 5.0, 6.0, 9.0, 10.0, *points])
     n_type = shift_by_heat(page.lever, biases)
     p_type = shift_by_heat(Lever(of_p_silicon(page.lever.probe)), biases)
     page.draw("thermoelectric_shift", figures.thermoelectric_shift(n_type, p_type))
@@ -189,7 +176,7 @@ def shift_section(page: Findings) -> None:
     thomson = at_points.share_nm.sel(heat="Thomson").sum("side")
     silicon = page.lever.probe.heater_silicon
     assert silicon is not None
-    strip = self_heated(silicon, _STRIP_K)
+    strip = self_heated(silicon, np.arange(500.0, 1301.0, 25.0))
     boron = [p_type.sel(polarity=1).sel(bias=bias, method="nearest") for bias in points[:2]]
     page.judge(
         "thermoelectric_direction",
@@ -234,18 +221,20 @@ def prediction_section(page: Findings) -> None:
         for with_it, result in fits.items()
     }
     rows = []
-    for with_it, model in ((False, "without"), (True, "with thermoelectricity")):
+    for with_it, model in ((False, "without"), (True, "with")):
         cells = [f"{value:.3g}" for value in rms[with_it].values()]
-        rows.append([model, *cells, *(f"{value:.4g}" for value in values[with_it])])
-    columns = ["model", *(f"rms {name}" for name in rms[False]), *PARAMETERS]
+        in_units = [value for _, value, _, _ in parameter_rows(fits[with_it])]
+        rows.append([model, *cells, *in_units])
+    columns = ["", "rms I_h (mA)", "rms V_r (V)", "rms T_tip (K)", *PARAMETER_COLUMNS]
     page.tabulate("thermoelectric_fit", columns, rows)
     changes = abs(values[True] / values[False] - 1.0)
-    page.claim(
+    off = described_without(probe).off_K.max().item()
+    page.judge(
         "thermoelectric_prediction",
-        holds=1.0 - rms[True]["tip_K"] / rms[False]["tip_K"] < _MATTERS,
+        off,
         without=rms[False],
         with_it=rms[True],
         symbol=list(PARAMETERS.values())[changes.argmax()].symbol,
         change=changes.max(),
-        off=described_without(probe).off_K.max(),
+        off=off,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import as_file, files
 from typing import Any
@@ -16,16 +17,42 @@ from hotlever import spieser2017 as paper
 from hotlever.estimate import Estimate, Measurement, fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.report.report_page import Page
+from hotlever.studies.air_scaling import GAPS_UM
+from hotlever.studies.parameter_consistency import ERRORS, GEOMETRIES
 from hotlever.studies.published_lever.verdicts import CRITERIA, verdict_on
 
-#: Biases (V) of a curve without visible corners.
-MANY = np.linspace(0.1, paper.RAMP[-1], 110)
-#: Captions, paragraphs and claims by name; in braces what a run finds, and numbers of the paper.
-_TEXTS = tomllib.loads(
-    (files("hotlever") / "report" / "reproduce" / "texts.toml").read_text(encoding="utf-8")
-)
 # Where the paper says what, the verdict, what was found, and its range over the layouts.
 Claim = tuple[str, str, str, str, str]
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How many levers a page is of.
+
+    Attributes
+    ----------
+    every : int
+        Of the levers whose T(P) is followed beyond the knee: every so many.
+    geometries : int
+        Levers of one material, of `hotlever.studies.parameter_consistency.GEOMETRIES`, the first.
+    errors : tuple of str
+        Errors of the model that these have.
+    gaps_um : tuple of float
+        Distances of a surface (µm).
+    levers : int
+        Levers never seen; each is made with either law of the mobility.
+    """
+
+    every: int = 1
+    geometries: int = len(GEOMETRIES)
+    errors: tuple[str, ...] = tuple(ERRORS)
+    gaps_um: tuple[float, ...] = GAPS_UM
+    levers: int = 12
+
+    @classmethod
+    def quick(cls) -> Extent:
+        """Return that of the quick form."""
+        return cls(5, 3, ("none", "all"), (1.0, 10.0, np.inf), 2)
 
 
 class Findings(Page):
@@ -59,7 +86,13 @@ class Findings(Page):
             "drawn for hotlever's reference probe, one more inference.",
         )
         self.lever, self.quick = lever, quick
+        self.extent = Extent.quick() if quick else Extent()
         self.claims: list[Claim] = []
+        # a curve through so many biases (V) has no visible corners
+        self.curve_V = np.linspace(0.1, paper.RAMP[-1], 110)
+        text = files("hotlever") / "report" / "reproduce" / "texts.toml"
+        # captions, paragraphs and claims by name
+        self._texts = tomllib.loads(text.read_text(encoding="utf-8"))
 
     @cached_property
     def air(self) -> Lever:
@@ -73,11 +106,11 @@ class Findings(Page):
 
     def say(self, name: str, /, **numbers: Any) -> None:
         """Add the paragraph of a name."""
-        self.text(_filled(_TEXTS["paragraphs"][name], numbers))
+        self.text(_filled(self._texts["paragraphs"][name], numbers))
 
     def draw(self, name: str, figure: Figure, /, file: str = "", **numbers: Any) -> None:
         """Add a figure with the caption of its name, which is that of its file by default."""
-        self.figure(file or name, figure, _filled(_TEXTS["figures"][name], numbers))
+        self.figure(file or name, figure, _filled(self._texts["figures"][name], numbers))
 
     def tabulate(
         self, name: str, columns: Sequence[str], rows: Sequence[Sequence[str]], /, **numbers: Any
@@ -87,7 +120,7 @@ class Findings(Page):
 
     def caption(self, name: str, /, **numbers: Any) -> str:
         """Return the caption of a table of a name."""
-        return _filled(_TEXTS["tables"][name], numbers)
+        return _filled(self._texts["tables"][name], numbers)
 
     def columns(
         self, name: str, columns: Mapping[str, tuple[xr.DataArray, str]], /, **numbers: Any
@@ -97,10 +130,13 @@ class Findings(Page):
         self.tabulate(name, list(columns), list(zip(*cells, strict=True)), **numbers)
 
     def claim(self, name: str, /, *, holds: bool, **numbers: Any) -> None:
-        """Add the claim of a name that does not go by layouts, and whether it holds in this run."""
+        """Add the claim of a name that does not go by layouts, and whether it holds in this run.
+
+        Its text may say why in ``layouts``.
+        """
         text = self._claim(name, numbers)
         verdict = text["holds"] if holds else f"does not hold, because {text['fails']}"
-        row = text["claim"], verdict, text["ours"], "–"
+        row = text["claim"], verdict, text["ours"], text["layouts"]
         self.claims.append((self.linked(text["where"]), *row))
 
     def judge(self, name: str, value: float, /, **numbers: Any) -> None:
@@ -123,7 +159,7 @@ class Findings(Page):
         self.claims.append((self.linked(text["where"]), *row))
 
     def _claim(self, name: str, numbers: Mapping[str, Any]) -> dict[str, str]:
-        claim = {"holds": "holds", **_TEXTS["claims"][name]}
+        claim = {"holds": "holds", "layouts": "no layout enters", **self._texts["claims"][name]}
         return {key: _filled(words, numbers) for key, words in claim.items()}
 
 

@@ -11,34 +11,23 @@ from hotlever import figures
 from hotlever import spieser2017 as paper
 from hotlever.materials import PARAMETERS
 from hotlever.materials.departures import DEPARTURES, departure_of
+from hotlever.probe.priors import THERMOMETER
 from hotlever.probe.probe_parameters import parameter_named
 from hotlever.report.reproduce.findings import Findings
-from hotlever.studies.knee_study import (
-    FEW_CARRIERS,
-    IN_AIR,
-    RAMAN,
-    SURFACES,
-    TOGETHER,
-    compare_suspects,
-)
+from hotlever.studies.knee_study import Suspect, compare_suspects
 from hotlever.studies.published_lever.ensemble import (
-    BEST,
     SIZES,
     WEIGHED,
     Ensemble,
     stored_ensemble,
 )
-from hotlever.studies.published_lever.knee_suspects import carried
+from hotlever.studies.published_lever.knee_suspects import carried, what_to_measure
 from hotlever.studies.published_lever.layouts import REFERENCE, stored_layouts
 from hotlever.studies.published_lever.statements import SEARCHED
 from hotlever.text import listed
 
-#: The layout that meets Eq. 12 before all else.
-_EQ12_FIRST = "Eq. 12 first"
-#: The one whose laws may depart from the printed ones.
-_UNCERTAIN = "uncertain laws"
-#: What is told of the reference probe in air.
-_SUSPECTS_IN_AIR = (RAMAN, SURFACES, IN_AIR, TOGETHER)
+#: The layouts that meet Eq. 12 before all else, and whose laws may depart from the printed ones.
+_EQ12_FIRST, _UNCERTAIN = "Eq. 12 first", "uncertain laws"
 
 
 def layouts_section(page: Findings) -> None:
@@ -89,7 +78,7 @@ def _of_size(found: Ensemble) -> dict[str, Any]:
     columns = found.numbers[["k_400", "k_893", "k_1150"]].to_dataarray("column")
     growth = columns.sel(column="k_1150") / columns.sel(column="k_400") - 1.0
     drawn = growth.where(found.numbers.drawn)
-    best = found.numbers.sel(layout=[name for name in found.names if name.startswith(BEST)])
+    best = found.numbers.sel(layout=found.best)
     return {
         "best": (best.length_um.min(), best.length_um.max()),
         "squares": (best.square.min(), best.square.max()),
@@ -104,8 +93,11 @@ def _of_size(found: Ensemble) -> dict[str, Any]:
 
 
 def _tabulate_statements(page: Findings, found: Ensemble) -> None:
-    where = {each.name: (each.where, each.words) for each in SEARCHED}
-    where |= {name: (each.where, each.words) for name, each in WEIGHED.items()}
+    where = {each.name: (each.where, f"{each.name}: {each.words}") for each in SEARCHED}
+    where |= {
+        name: (each.where, f"{name}: {each.words.format(may=each.may)}")
+        for name, each in WEIGHED.items()
+    }
     rows = []
     for name in found.deviations.statement.values:
         deviation = abs(found.deviations.sel(statement=name))
@@ -118,7 +110,7 @@ def _tabulate_statements(page: Findings, found: Ensemble) -> None:
                     _cell(deviation.sel(layout=one).item())
                     for one in (found.nearest, REFERENCE, _UNCERTAIN)
                 ),
-                f"{drawn.min().item():.1f} to {drawn.max().item():.1f}",
+                f"{drawn.min().item():.2f} to {drawn.max().item():.2f}",
                 " / ".join(dict.fromkeys(f"{share:.0%}" for share in shares)),
             )
         )
@@ -129,11 +121,18 @@ def _tabulate_statements(page: Findings, found: Ensemble) -> None:
 def _best_like(found: Ensemble, layout: xr.Dataset) -> float:
     """Return the sum of squares of the best layout of the same length."""
     best = found.numbers.square.where(found.numbers.length_um == layout.length_um)
-    return float(best.sel(layout=[name for name in found.names if name.startswith(BEST)]).min())
+    return float(best.sel(layout=found.best).min())
 
 
 def _cell(deviation: float) -> str:
-    return f"{'met' if deviation <= 1.0 else 'off'}, {deviation:.2g}"
+    return f"{'met' if deviation <= 1.0 else 'off'}, {deviation:.2f}"
+
+
+def _missed(found: Ensemble, layout: str) -> str:
+    """Return the statements that a layout misses, the farthest first, and by how much."""
+    deviations = abs(found.deviations.sel(layout=layout)).to_series()
+    worst = deviations[deviations > 1.0].sort_values(ascending=False)
+    return listed([f"{name} ({value:.2f})" for name, value in worst.items()])
 
 
 def _say_tensions(page: Findings, found: Ensemble) -> None:
@@ -144,14 +143,12 @@ def _say_tensions(page: Findings, found: Ensemble) -> None:
     }
     rarely = [f"{name} ({share:.0%})" for name, share in shares.items() if share < 0.5]
     first = found.numbers.sel(layout=_EQ12_FIRST)
-    deviations = abs(found.deviations.sel(layout=_EQ12_FIRST)).to_series()
-    worst = deviations[deviations > 1.0].sort_values(ascending=False)
     page.say(
         "tensions",
         rarely=listed(rarely),
         last=found.range("eq12_last_K"),
         first=first,
-        worst=listed([f"{name} ({value:.1f})" for name, value in worst.items()]),
+        worst=_missed(found, _EQ12_FIRST),
     )
     departed = found.numbers.sel(layout=_UNCERTAIN)
     coefficients = {
@@ -168,6 +165,8 @@ def _say_tensions(page: Findings, found: Ensemble) -> None:
         ),
         most=max(map(abs, coefficients.values())),
         met=found.met(_UNCERTAIN),
+        missed=_missed(found, _UNCERTAIN),
+        eq12=abs(found.deviations.sel(layout=found.nearest, statement="Eq. 12")),
         statements=found.deviations.sizes["statement"],
         squares=(_best_like(found, departed), departed.square),
     )
@@ -214,6 +213,7 @@ def discrepancy_section(page: Findings) -> None:
         ("suspect", "not fitted (K)", "fitted (K)", "off the ramp (K)", "what the fit takes up"),
         rows,
         nearest=nearest,
+        count=found.numbers.drawn.sel(layout=study.layout).sum().item(),
     )
     by_law = [
         (DEPARTURES[str(law)].words, f"± {study.stderr_K.sel(law=law, layout=nearest):.1f}")
@@ -222,22 +222,51 @@ def discrepancy_section(page: Findings) -> None:
     total = np.sqrt((study.stderr_K.sel(layout=nearest) ** 2).sum("law"))
     by_law.append(("all laws", f"± {total:.1f}"))
     page.tabulate("knee_laws", ("law", "may carry (K)"), by_law)
-    alone = study.shift_K.sel(layout=nearest, suspect=study.suspect != TOGETHER)
-    few, film = (study.sel(suspect=name, layout=nearest) for name in (FEW_CARRIERS, SURFACES))
+    alone = study.shift_K.sel(layout=nearest, suspect=study.suspect != Suspect.TOGETHER)
+    few, film = (
+        study.sel(suspect=name, layout=nearest) for name in (Suspect.FEW_CARRIERS, Suspect.SURFACES)
+    )
     page.say(
         "knee_carried",
         most=alone.max(),
         most_of=alone.idxmax("suspect").item(),
-        raman=alone.sel(suspect=RAMAN),
+        raman=alone.sel(suspect=Suspect.RAMAN),
         film=film,
-        film_ramp=_range(study.ramp_K.sel(suspect=SURFACES)),
+        film_ramp=_range(study.ramp_K.sel(suspect=Suspect.SURFACES)),
         few=few,
         few_n_d=paper.PUBLISHED_VALUES["option III"]["n_d"] ** 2 / few.n_d,
-        together=study.shift_K.sel(suspect=TOGETHER, layout=nearest),
+        together=study.shift_K.sel(suspect=Suspect.TOGETHER, layout=nearest),
         total=total,
     )
     if not page.quick:
         _in_air(page)
+
+
+def next_section(page: Findings) -> None:
+    """What to measure next of the nearest layout, for its knee."""
+    probe = stored_layouts()[stored_ensemble().nearest].probe()
+    study = what_to_measure(probe)
+    rows = []
+    for added in study.added.values:
+        cells = []
+        for one in (study.sel(added=added, data=data) for data in study.data.values):
+            which = f", {one.what.item()}" if one.what else ""
+            cells.append(f"± {one.stderr_K:.1f} K{which}")
+        rows.append((str(added), *cells))
+    page.tabulate("knee_next", ("measured next", *study.data.values), rows)
+    (without, together), (spectrum, _), (finer, _), (drawing, _) = study.stderr_K.values
+    page.say(
+        "knee_next",
+        rows=paper.RAMP.size,
+        iv=without,
+        everything=together,
+        scale=THERMOMETER * (paper.KNEE_PREDICTED_K - probe.circuit.base_temperature_K),
+        spectrum=spectrum,
+        at=study.what.values[1, 0],
+        finer=finer,
+        drawing=drawing,
+        sigmas=paper.KNEE_OFF_K / together,
+    )
 
 
 def _of_the_ramp(found: Ensemble) -> dict[str, Any]:
@@ -285,7 +314,11 @@ def _parameters(fitted: xr.Dataset) -> str:
 def _in_air(page: Findings) -> None:
     """What each suspect carries of the reference probe's knee in air."""
     probe = page.lever.probe.in_medium("air")
-    study = compare_suspects(probe, page.fitted_example, _SUSPECTS_IN_AIR)
+    study = compare_suspects(
+        probe,
+        page.fitted_example,
+        (Suspect.RAMAN, Suspect.SURFACES, Suspect.IN_AIR, Suspect.TOGETHER),
+    )
     rows = [
         (str(suspect), *(f"{value.item():+.1f}" for value in both.values()))
         for suspect in study.suspect.values
@@ -293,5 +326,5 @@ def _in_air(page: Findings) -> None:
     ]
     rows.append(("what remains", "", f"{study.left_K:.0f} ± {study.stderr_K:.0f}"))
     page.tabulate("knee_in_air", ("suspect, in air", "not fitted (K)", "fitted (K)"), rows)
-    carried_K = study.shift_K.sel(suspect=IN_AIR).item()
-    page.claim("tip_in_air", holds=carried_K > 0.75 * paper.KNEE_OFF_K, carried=carried_K)
+    carried_K = study.shift_K.sel(suspect=Suspect.IN_AIR).item()
+    page.judge("tip_in_air", carried_K, carried=carried_K)

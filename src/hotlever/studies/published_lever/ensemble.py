@@ -7,7 +7,6 @@ statements make it which have no derivatives and did not guide the search (`WEIG
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -21,7 +20,7 @@ from hotlever import spieser2017 as paper
 from hotlever.datasets import labelled
 from hotlever.materials import PUBLISHED
 from hotlever.materials.silicon import inversion_temperature
-from hotlever.studies.published_lever.layouts import FOLDER, stored_layouts
+from hotlever.studies.published_lever.layouts import stored_layouts, stored_table
 from hotlever.studies.published_lever.statements import SEARCHED
 from hotlever.types import Array
 
@@ -31,17 +30,7 @@ SIZES: dict[str, Callable[[Array], Array]] = {
     "any size in the sphere of air": lambda length: np.ones_like(length),
     "sphere about the tip": lambda length: (length <= paper.SPHERE_UM).astype(float),
 }
-ANY, SMALL = SIZES
-#: How names of the layouts begin that suit best what guided the search, at their length.
-BEST = "best of"
-#: Of "about" and "approximately": half a unit of the digit that counts.
-_LEGS_K, _CROSSING_K, _MISPREDICTED_K = 5.0, 50.0, 50.0
-#: "Approximately a factor of 2", and errors with one or two digits.
-_HALF, _ERRORS = 0.15, 1.5
-#: Half a unit of the last digit of T_i (K).
-_DIGIT_K = 0.5
-#: What a thickness of nominally 400 nm and a length of 4 µm may be off by (µm).
-_THICKNESS_UM, _HEATER_UM = 0.02, 0.5
+ANY = next(iter(SIZES))
 
 
 class Weighed(NamedTuple):
@@ -50,9 +39,13 @@ class Weighed(NamedTuple):
     Attributes
     ----------
     where, words : str
-        As of `hotlever.studies.published_lever.statements.Printed`.
-    deviation : callable
-        From the numbers of a layout, in units of what the statement may be off by.
+        As of `hotlever.studies.published_lever.statements.Printed`; ``{may}`` in the words is what
+        it may be off by.
+    off : callable
+        How far a layout is from it, from its numbers.
+    may : float
+        What the statement may be off by, as it is printed. Of "about" and "approximately" that is
+        half a unit of the digit that counts.
     counts : bool
         Whether it counts in the weight; not what is a dimension itself, or follows from the
         parameters alone.
@@ -60,8 +53,13 @@ class Weighed(NamedTuple):
 
     where: str
     words: str
-    deviation: Callable[[Mapping[str, float]], float]
+    off: Callable[[Mapping[str, float]], float]
+    may: float
     counts: bool = True
+
+    def deviation(self, found: Mapping[str, float]) -> float:
+        """Return how far a layout is from it, in units of what it may be off by."""
+        return self.off(found) / self.may
 
 
 @cache
@@ -79,85 +77,79 @@ WEIGHED: dict[str, Weighed] = {
     "legs at the knee": Weighed(
         "Section IV",
         f"the resistance of the legs raises the knee by about {paper.KNEE_BY_LEGS_K:.0f} K, "
-        f"± {_LEGS_K:.0f} K",
-        lambda found: (found["by_legs_K"] - paper.KNEE_BY_LEGS_K) / _LEGS_K,
+        "± {may:.0f} K",
+        lambda found: found["by_legs_K"] - paper.KNEE_BY_LEGS_K,
+        5.0,
     ),
     "legs prevail": Weighed(
         "Section IV, Fig. 5",
         f"only above {paper.LEGS_PREVAIL_K:.0f} K is the resistance of the legs the larger one, "
-        f"to {_CROSSING_K:.0f} K",
-        lambda found: max(paper.LEGS_PREVAIL_K - found["legs_prevail_K"], 0.0) / _CROSSING_K,
+        "to {may:.0f} K",
+        lambda found: max(paper.LEGS_PREVAIL_K - found["legs_prevail_K"], 0.0),
+        50.0,
     ),
     "option I mispredicts": Weighed(
         "Section I, Fig. 4c",
         f"above {paper.MISPREDICTED_FROM_K:.0f} K option I is up to {paper.MISPREDICTED_K:.0f} K "
-        f"off, ± {_MISPREDICTED_K:.0f} K",
-        lambda found: (found["tip_I_K"] - paper.MISPREDICTED_K) / _MISPREDICTED_K,
+        "off, ± {may:.0f} K",
+        lambda found: found["tip_I_K"] - paper.MISPREDICTED_K,
+        50.0,
     ),
     "heater halved": Weighed(
         "Fig. 7a",
-        "diffusion leaves about half of the heater's length",
-        lambda found: (found["heater_left"] - 0.5) / _HALF,
+        "diffusion leaves about half of the heater's length, ± {may:.0%}",
+        lambda found: found["heater_left"] - 0.5,
+        0.15,
     ),
     "one k": Weighed(
         "Section V, Fig. 10b",
-        f"in air T follows Eq. 12 with P/{paper.K_IN_AIR} within {paper.POWER_LAW_SPREAD_K:.0f} K",
-        lambda found: found["eq12_air_K"] / paper.POWER_LAW_SPREAD_K,
+        f"in air T follows Eq. 12 with P/{paper.K_IN_AIR} within {{may:.0f}} K",
+        lambda found: found["eq12_air_K"],
+        paper.POWER_LAW_SPREAD_K,
     ),
     "knee in air": Weighed(
         "Section V",
         f"the power of the knee in air is {paper.K_IN_AIR} P_th, to that of "
         f"{paper.POWER_LAW_SPREAD_K:.0f} K",
-        lambda found: (
-            (found["knee_air_mW"] / paper.K_IN_AIR - paper.POWER_LAW["threshold_mW"])
-            / (paper.POWER_LAW_SPREAD_K / paper.POWER_LAW["hot_K_per_mW"])
-        ),
+        lambda found: found["knee_air_mW"] / paper.K_IN_AIR - paper.POWER_LAW["threshold_mW"],
+        paper.POWER_LAW_SPREAD_K / paper.POWER_LAW["hot_K_per_mW"],
     ),
     "inversion temperatures": Weighed(
         "Table I",
-        f"T_i follows from n_d and p, to {_DIGIT_K} K",
-        lambda found: _inversion_off_K() / _DIGIT_K,
+        "T_i follows from n_d and p, to {may} K",
+        lambda found: _inversion_off_K(),
+        0.5,
         counts=False,
     ),
     "thickness": Weighed(
         "Section II",
-        f"the lever is nominally {1e3 * paper.THICKNESS_UM:.0f} nm thick, to "
-        f"{1e3 * _THICKNESS_UM:.0f} nm",
-        lambda found: (found["thickness_um"] - paper.THICKNESS_UM) / _THICKNESS_UM,
+        f"the lever is nominally {paper.THICKNESS_UM} µm thick, to {{may}} µm",
+        lambda found: found["thickness_um"] - paper.THICKNESS_UM,
+        0.02,
         counts=False,
     ),
     "heater": Weighed(
         "Section II",
-        f"the heater is {paper.HEATER_LENGTH_UM:.0f} µm long, to {_HEATER_UM} µm",
-        lambda found: (found["heater_length_um"] - paper.HEATER_LENGTH_UM) / _HEATER_UM,
+        f"the heater is {paper.HEATER_LENGTH_UM:.0f} µm long, to {{may}} µm",
+        lambda found: found["heater_length_um"] - paper.HEATER_LENGTH_UM,
+        0.5,
         counts=False,
     ),
     "sphere of air": Weighed(
         "Section V",
         f"the lever fits into {paper.SPHERE_UM:.0f} µm of radius",
-        lambda found: found["length_um"] / (2.0 * paper.SPHERE_UM),
+        lambda found: found["length_um"],
+        2.0 * paper.SPHERE_UM,
         counts=False,
     ),
     "errors of the parameters": Weighed(
         "Table I",
-        f"standard errors of each option are in these proportions, within a factor of {_ERRORS}",
-        lambda found: (
-            np.log(max(found[f"errors_{option}"] for option in ("I", "II", "III")))
-            / np.log(_ERRORS)
-        ),
+        "standard errors of each option are in these proportions, within a factor of 1.5",
+        lambda found: np.log(max(found[f"errors_{option}"] for option in ("I", "II", "III"))),
+        np.log(1.5),
         counts=False,
     ),
 }
-
-
-def _read(name: str) -> dict[str, dict[str, float]]:
-    """Return the rows of a stored table of numbers, by their first column."""
-    with (FOLDER / name).open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    key = next(iter(rows[0]))
-    return {
-        row[key]: {name: float(value) for name, value in row.items() if name != key} for row in rows
-    }
 
 
 @dataclass(frozen=True)
@@ -187,8 +179,12 @@ class Ensemble:
     @property
     def nearest(self) -> str:
         """The layout that is nearest to all that was printed, by the sum of squares."""
-        best = [name for name in self.names if name.startswith(BEST)]
-        return min(best, key=lambda name: float(self._square.sel(layout=name)))
+        return min(self.best, key=lambda name: float(self._square.sel(layout=name)))
+
+    @property
+    def best(self) -> list[str]:
+        """The layouts that suit best what guided the search, at their length."""
+        return [name for name in self.names if name.startswith("best of")]
 
     @property
     def _square(self) -> xr.DataArray:
@@ -219,10 +215,10 @@ class Ensemble:
 @cache
 def stored_ensemble() -> Ensemble:
     """Read the stored numbers, and weigh the layouts."""
-    rows, found = _read("numbers.csv"), stored_layouts()
+    rows, found = stored_table("numbers.csv", "layout"), stored_layouts()
     all_numbers = {
         name: {**row, "length_um": found[name].length_um, **found[name].values}
-        for name, row in rows.items()
+        for name, row in rows.to_dict("index").items()
     }
     statements: dict[str, Callable[[Mapping[str, float]], float]] = {
         each.name: itemgetter(each.name) for each in SEARCHED
@@ -230,7 +226,7 @@ def stored_ensemble() -> Ensemble:
     statements |= {name: each.deviation for name, each in WEIGHED.items()}
     deviations = xr.DataArray(
         [[float(of(numbers)) for of in statements.values()] for numbers in all_numbers.values()],
-        coords={"layout": list(rows), "statement": list(statements)},
+        coords={"layout": list(all_numbers), "statement": list(statements)},
     )
     columns = {
         name: [numbers[name] for numbers in all_numbers.values()]
@@ -241,8 +237,8 @@ def stored_ensemble() -> Ensemble:
     columns["doping_share"] = (steps["doping"] / sum(steps.values())).tolist()
     columns["share_growth"] = np.divide(columns["share_hot"], columns["share_cold"]).tolist()
     for name in ("drawn", "square"):
-        columns[name] = [getattr(found[layout], name) for layout in rows]
-    numbers = labelled(columns, "layout", {"layout": list(rows)})
+        columns[name] = [getattr(found[layout], name) for layout in all_numbers]
+    numbers = labelled(columns, "layout", {"layout": list(all_numbers)})
     return Ensemble(numbers, deviations, _weights(numbers, deviations))
 
 

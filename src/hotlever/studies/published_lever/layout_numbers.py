@@ -20,8 +20,9 @@ from hotlever.materials import PARAMETERS, published
 from hotlever.probe import Probe
 from hotlever.studies.air_scaling import error_of_one_factor, find_scale_factor
 from hotlever.studies.knee_study import (
-    IN_VACUUM,
+    Suspect,
     carried_by,
+    described_without,
     reasons_of_the_knee,
     steps_at_the_knee,
     steps_to_the_knee,
@@ -34,18 +35,10 @@ from hotlever.studies.published_lever.statements import LAST_V, MAIN, OPTIONS, S
 from hotlever.studies.radiation import radiated_heat
 from hotlever.studies.thermoelectric_shift import shift_by_heat
 
-#: Tip temperatures (K) at which k is told.
-K_AT = (400.0, 600.0, 800.0, paper.KNEE_PREDICTED_K, 1150.0)
-#: Up to where the resistances of heater and legs are compared (K).
-_CROSSING_TO_K = 1600.0
 #: Power (mW) up to which Eq. 12 has data on the hot branch.
 WELL_COVERED_MW = 3.3
-#: Points of a curve.
-_POINTS = 120
 #: Groups of parameters that are said to be decoupled.
-_GROUPS = {"c_kappa": 0, "a0": 1, "a1": 1, "delta": 2, "n_d": 2, "p": 2}
-#: A gap (µm) between lever and surface at which k is told too.
-_GAP_UM = 1.0
+GROUPS = {"c_kappa": 0, "a0": 1, "a1": 1, "delta": 2, "n_d": 2, "p": 2}
 
 
 def numbers_of(layout: Layout) -> dict[str, float]:
@@ -57,14 +50,15 @@ def numbers_of(layout: Layout) -> dict[str, float]:
         If one of its levers cannot be solved.
     """
     levers = {option: Lever(layout.probe(option)) for option in OPTIONS}
-    main = levers[MAIN]
-    branch = main.branch(_CROSSING_TO_K)
+    # as far as the resistances of heater and legs are compared
+    main, to_K = levers[MAIN], 1600.0
+    branch = main.branch(to_K)
     return {
         **_deviations(layout),
         **_points(main),
         **_knee(main, branch),
         **_power(main, branch),
-        **_resistances(main, branch),
+        **_resistances(main, branch, to_K),
         **_options(levers),
         **_errors(layout),
         **_air(main, branch),
@@ -111,7 +105,7 @@ def _knee(main: Lever, branch: Branch) -> dict[str, float]:
 
 
 def _power(main: Lever, branch: Branch) -> dict[str, float]:
-    power = np.linspace(0.05, paper.HOTTEST_MW, _POINTS)
+    power = np.linspace(0.05, paper.HOTTEST_MW, 120)
     off = branch.tip_temperature(power) - EQ12.tip_temperature(power)
     last = main.sweep([LAST_V])
     knee = branch.knee
@@ -129,8 +123,8 @@ def _power(main: Lever, branch: Branch) -> dict[str, float]:
     }
 
 
-def _resistances(main: Lever, branch: Branch) -> dict[str, float]:
-    tip = np.linspace(600.0, min(branch.hottest_K, _CROSSING_TO_K), _POINTS)
+def _resistances(main: Lever, branch: Branch, to_K: float) -> dict[str, float]:
+    tip = np.linspace(600.0, min(branch.hottest_K, to_K), 120)
     parts = dataset_of_branch(main.probe, branch, branch.u_at(tip))
     ratio = (parts.legs_ohm / parts.heater_ohm).values
     over = np.flatnonzero(ratio >= 1.0)
@@ -176,7 +170,7 @@ def _errors(layout: Layout) -> dict[str, float]:
     """Errors and correlations of the options' parameters, by one noise for all observables."""
     found: dict[str, float] = {}
     names = tuple(PARAMETERS)
-    groups = np.array([_GROUPS[name] for name in names])
+    groups = np.array([GROUPS[name] for name in names])
     apart = groups[:, None] != groups
     for option, rows in (("I", [1]), ("II", [1, 2]), ("III", [1, 2, 3])):
         probe = layout.probe(option)
@@ -199,11 +193,12 @@ def _errors(layout: Layout) -> dict[str, float]:
 
 def _air(main: Lever, branch: Branch) -> dict[str, float]:
     lever = main.in_medium("air")
+    tips_of_k = (400.0, 600.0, 800.0, paper.KNEE_PREDICTED_K, 1150.0)
     ramp = lever.sweep(paper.RAMP)
     hottest = ramp.tip_K.values[-1].item()
-    air = lever.branch(max(hottest, K_AT[-1]) + 20.0)
+    air = lever.branch(max(hottest, tips_of_k[-1]) + 20.0)
     factor = find_scale_factor(branch, air, hottest)
-    tips = np.linspace(330.0, hottest, _POINTS)
+    tips = np.linspace(330.0, hottest, 120)
     power = air.power(tips)
 
     def off_law(k: float) -> float:
@@ -216,7 +211,7 @@ def _air(main: Lever, branch: Branch) -> dict[str, float]:
         raise ComputationError("the lever has no knee")
     by_knee = knee.power_mW / own.power_mW
     return {
-        **{f"k_{tip:.0f}": float(air.power(tip) / branch.power(tip)) for tip in K_AT},
+        **{f"k_{tip:.0f}": float(air.power(tip) / branch.power(tip)) for tip in tips_of_k},
         "best_k": factor.best_k.item(),
         "best_k_K": factor.best_error_K.item(),
         "printed_k_K": error_of_one_factor(branch, air, paper.K_IN_AIR, hottest),
@@ -240,7 +235,6 @@ def _beyond(main: Lever) -> dict[str, float]:
     ]
     moved = shift_by_heat(main, biases).moved_nm
     near = _one_sided(main.probe)
-    tip = carried_by(main.probe, IN_VACUUM).shift_K
     return {
         "radiated_uW": 1e3 * radiated.radiated_mW.item(),
         "radiated_share": (radiated.radiated_mW / radiated.power_mW).item(),
@@ -248,11 +242,13 @@ def _beyond(main: Lever) -> dict[str, float]:
         "shift_along_nm": float(moved.sel(polarity=1).max()),
         "one_sided_K": near.best_error_K.item(),
         "one_sided_growth": float(near.k.max() / near.k.min() - 1.0),
-        "tip_carries_K": tip,
+        "tip_carries_K": carried_by(main.probe, Suspect.IN_VACUUM).shift_K,
+        "tip_in_air_K": carried_by(main.probe.in_medium("air"), Suspect.IN_AIR).shift_K,
+        "without_heat_carried_K": described_without(main.probe).off_K.max().item(),
     }
 
 
 def _one_sided(probe: Probe) -> Any:
     lever = Lever(probe, COARSE)
-    over = Lever(probe.with_(surface_gap_um=_GAP_UM).in_medium("air"), COARSE, space=lever.space)
+    over = Lever(probe.with_(surface_gap_um=1.0).in_medium("air"), COARSE, space=lever.space)
     return find_scale_factor(lever.branch(), over.branch())

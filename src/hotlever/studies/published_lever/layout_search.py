@@ -79,8 +79,6 @@ DRAWN: dict[str, Drawn] = {
     "thickness_um": Drawn(paper.THICKNESS_UM, 0.025),
     "series_resistance_ohm": Drawn(5600.0, 0.1),
 }
-#: What is estimated too where the laws are known to within their departures alone.
-LAWS = {name: Drawn(0.0, 1.0) for departure in DEPARTURES.values() for name in departure.names}
 
 
 @dataclass(frozen=True)
@@ -167,7 +165,7 @@ class Found:
     Attributes
     ----------
     values : dict of str to float
-        Of `DRAWN`, and of `LAWS` if they were estimated.
+        Of `DRAWN`, and coefficients of laws if they were estimated.
     square : float
         Sum of squares at the optimum, in units of variances.
     evaluations : int
@@ -208,7 +206,11 @@ def search(
         If the start cannot be solved.
     """
     options = options or SearchOptions()
-    unknowns = DRAWN | LAWS if uncertain_laws else DRAWN
+    unknowns = dict(DRAWN)
+    if uncertain_laws:
+        # laws are known to within their departures alone
+        coefficients = [name for law in DEPARTURES.values() for name in law.names]
+        unknowns |= dict.fromkeys(coefficients, Drawn(0.0, 1.0))
     errors, expected = np.zeros(len(SEARCHED)), np.zeros(len(unknowns))
     if rng is not None:
         errors = rng.uniform(-1.0, 1.0, errors.size)

@@ -8,6 +8,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+import pandas as pd
 from pydantic import Field
 
 from hotlever.materials import published
@@ -49,6 +50,12 @@ def reference(names: Iterable[str]) -> Layout:
     values = dict(zip(names, probe.values(list(names)).tolist(), strict=True))
     length = probe.values(["length_um"]).item()
     return Layout(name=REFERENCE, length_um=length, values=values, drawn=False, square=0.0)
+
+
+def stored_table(name: str, *keys: str) -> pd.DataFrame:
+    """Return a table of numbers as ``benchmarks/published_lever.py`` writes it, by some columns."""
+    with (FOLDER / name).open(encoding="utf-8") as file:
+        return pd.read_csv(file, index_col=list(keys))
 
 
 @cache

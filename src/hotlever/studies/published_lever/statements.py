@@ -28,13 +28,9 @@ OPTIONS = {
 }
 MAIN = next(iter(OPTIONS))
 #: Half a unit of the last digit of printed voltages (V) and currents (mA).
-DIGIT_V, DIGIT_MA = 0.005, 0.005
-_PLATEAU, _KNEE, _HOT = paper.OPERATING_POINTS
+HALF_DIGIT = 0.005
 #: A reading of the knee off the ramp: half of what its neighbours there are apart (K).
 KNEE_READ_K = 25.0
-#: Powers (mW) and biases (V) at which curves are compared.
-POWERS_MW = np.array([1.0, 2.0, 2.75, 3.3, 4.0])
-BIASES_V = paper.RAMP[[4, 8, 12, 16, 18, 20, 22, 24]]
 #: The bias at which the tip is hottest (V).
 LAST_V = float(paper.RAMP[-1])
 
@@ -63,17 +59,22 @@ class Printed:
     deviation: Callable[[Mapping[str, Readings]], Deviation]
 
 
+def _printed_point(name: str) -> paper.PublishedPoint:
+    """Return a published operating point: the plateau, the knee or the hot one."""
+    return next(point for point in paper.OPERATING_POINTS if point.name == name)
+
+
 def _operating_point(options: Mapping[str, Readings]) -> Deviation:
     values, slopes = options[MAIN].at_tip(paper.KNEE_PREDICTED_K)
-    unit = np.array([DIGIT_V, DIGIT_MA])
-    off = (values[:2, 0] - [_KNEE.lever_V, _KNEE.current_mA]) / unit
-    return off, slopes[:2, 0] / unit[:, None]
+    knee = _printed_point("knee")
+    off = (values[:2, 0] - [knee.lever_V, knee.current_mA]) / HALF_DIGIT
+    return off, slopes[:2, 0] / HALF_DIGIT
 
 
 def _passes(point: paper.PublishedPoint) -> Callable[[Mapping[str, Readings]], Deviation]:
     def deviation(options: Mapping[str, Readings]) -> Deviation:
         at = (point.lever_V, point.current_mA)
-        distance, slopes = options[MAIN].off_point(at, (DIGIT_V, DIGIT_MA))
+        distance, slopes = options[MAIN].off_point(at, (HALF_DIGIT, HALF_DIGIT))
         return np.array([distance]), slopes[None]
 
     return deviation
@@ -81,9 +82,10 @@ def _passes(point: paper.PublishedPoint) -> Callable[[Mapping[str, Readings]], D
 
 def _on_the_ramp(options: Mapping[str, Readings]) -> Deviation:
     circuit, names = options[MAIN].circuit, options[MAIN].linearised.names
-    beyond = circuit.bias(_HOT.lever_V, _HOT.current_mA) - LAST_V
-    unit = circuit.bias(DIGIT_V, DIGIT_MA)
-    by = np.array([circuit.bias_by(name, _HOT.current_mA) for name in names])
+    hot = _printed_point("hot")
+    beyond = circuit.bias(hot.lever_V, hot.current_mA) - LAST_V
+    unit = circuit.bias(HALF_DIGIT, HALF_DIGIT)
+    by = np.array([circuit.bias_by(name, hot.current_mA) for name in names])
     return np.array([max(beyond, 0.0)]) / unit, by[None] * (beyond > 0.0) / unit
 
 
@@ -93,8 +95,9 @@ def _knee(options: Mapping[str, Readings]) -> Deviation:
 
 
 def _power_law(options: Mapping[str, Readings]) -> Deviation:
-    values, slopes = options[MAIN].at_power(POWERS_MW)
-    off = options[MAIN].branch.base_temperature_K + values[3] - EQ12.tip_temperature(POWERS_MW)
+    power_mW = np.array([1.0, 2.0, 2.75, 3.3, paper.HOTTEST_MW])
+    values, slopes = options[MAIN].at_power(power_mW)
+    off = options[MAIN].branch.base_temperature_K + values[3] - EQ12.tip_temperature(power_mW)
     return off / paper.POWER_LAW_SPREAD_K, slopes[3] / paper.POWER_LAW_SPREAD_K
 
 
@@ -110,9 +113,17 @@ def raman_error(rise_K: Any) -> Any:
     return paper.RAMAN_ERROR_K + paper.RAMAN_ERROR_SHARE * rise_K
 
 
+def _beside_main(
+    options: Mapping[str, Readings], option: str
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Return what an option and the main one show at some biases of the ramp."""
+    bias_V = paper.RAMP[[4, 8, 12, 16, 18, 20, 22, 24]]
+    return options[option].at_bias(bias_V), options[MAIN].at_bias(bias_V)
+
+
 def _same_current(option: str) -> Callable[[Mapping[str, Readings]], Deviation]:
     def deviation(options: Mapping[str, Readings]) -> Deviation:
-        (ours, by), (main, main_by) = (options[o].at_bias(BIASES_V) for o in (option, MAIN))
+        (ours, by), (main, main_by) = _beside_main(options, option)
         ratio = ours[1] / main[1]
         slopes = (by[1] - ratio[:, None] * main_by[1]) / main[1][:, None]
         return (ratio - 1.0) / paper.CURRENT_ERROR, slopes / paper.CURRENT_ERROR
@@ -122,7 +133,7 @@ def _same_current(option: str) -> Callable[[Mapping[str, Readings]], Deviation]:
 
 def _same_reader(option: str) -> Callable[[Mapping[str, Readings]], Deviation]:
     def deviation(options: Mapping[str, Readings]) -> Deviation:
-        (ours, by), (main, main_by) = (options[o].at_bias(BIASES_V) for o in (option, MAIN))
+        (ours, by), (main, main_by) = _beside_main(options, option)
         # observables are compared over their largest values
         unit = paper.CURRENT_ERROR * main[2].max()
         return (ours[2] - main[2]) / unit, (by[2] - main_by[2]) / unit
@@ -131,7 +142,7 @@ def _same_reader(option: str) -> Callable[[Mapping[str, Readings]], Deviation]:
 
 
 def _same_tip(options: Mapping[str, Readings]) -> Deviation:
-    (ours, by), (main, main_by) = (options[o].at_bias(BIASES_V) for o in ("n_d held", MAIN))
+    (ours, by), (main, main_by) = _beside_main(options, "n_d held")
     unit = raman_error(main[3])
     return (ours[3] - main[3]) / unit, (by[3] - main_by[3]) / unit[:, None]
 
@@ -141,21 +152,18 @@ SEARCHED: tuple[Printed, ...] = (
     Printed(
         "knee point",
         "Figs. 6a and 7b",
-        f"{_KNEE.lever_V} V and {_KNEE.current_mA} mA at a tip of {paper.KNEE_PREDICTED_K:.0f} K, "
-        "to half a unit of the last digits",
+        "{0.lever_V} V and {0.current_mA} mA at a tip of {1:.0f} K, to half a unit of the last "
+        "digits".format(_printed_point("knee"), paper.KNEE_PREDICTED_K),
         _operating_point,
     ),
-    Printed(
-        "plateau point",
-        "Fig. 7b",
-        f"the I-V curve passes {_PLATEAU.lever_V:.2f} V, {_PLATEAU.current_mA} mA",
-        _passes(_PLATEAU),
-    ),
-    Printed(
-        "hot point",
-        "Fig. 7b",
-        f"the I-V curve passes {_HOT.lever_V} V, {_HOT.current_mA} mA",
-        _passes(_HOT),
+    *(
+        Printed(
+            f"{point.name} point",
+            "Fig. 7b",
+            f"the I-V curve passes {point.lever_V:.2f} V, {point.current_mA} mA",
+            _passes(point),
+        )
+        for point in (_printed_point("plateau"), _printed_point("hot"))
     ),
     Printed(
         "hot point on the ramp",
@@ -173,7 +181,7 @@ SEARCHED: tuple[Printed, ...] = (
     Printed(
         "Eq. 12",
         "Eq. 12, Fig. 6b",
-        f"T(P) within {paper.POWER_LAW_SPREAD_K:.0f} K of it up to {POWERS_MW[-1]:.0f} mW",
+        f"T(P) within {paper.POWER_LAW_SPREAD_K:.0f} K of it up to {paper.HOTTEST_MW:.0f} mW",
         _power_law,
     ),
     Printed(

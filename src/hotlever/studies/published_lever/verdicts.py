@@ -10,9 +10,6 @@ import xarray as xr
 from hotlever import spieser2017 as paper
 from hotlever.studies.published_lever.ensemble import SIZES, Ensemble, stored_ensemble
 
-#: Weight of layouts that is as good as all of them, or none.
-_ALL, _NONE = 0.95, 0.05
-
 
 class Criterion(NamedTuple):
     """A claim holds where a number lies between two limits.
@@ -50,33 +47,41 @@ def _above(column: str, least: float, form: str, unit: str = "") -> Criterion:
     return Criterion(column, least, np.inf, form, unit)
 
 
-_K = (".0f", " K")
 #: By the name of the claim.
 CRITERIA: dict[str, Criterion] = {
     "operating_points": _below("points_off", 0.01, ".2%"),
     # the paper reads it off 25 points
     "simulated_knee": Criterion(
-        "knee_K", paper.KNEE_PREDICTED_K - 10.0, paper.KNEE_PREDICTED_K + 10.0, *_K
+        "knee_K", paper.KNEE_PREDICTED_K - 10.0, paper.KNEE_PREDICTED_K + 10.0, ".0f", " K"
     ),
-    "power_law": _below("eq12_K", paper.POWER_LAW_SPREAD_K, *_K),
+    "power_law": _below("eq12_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
+    "legs_prevail": _above("legs_prevail_K", paper.LEGS_PREVAIL_K - 50.0, ".0f", " K"),
     "heater_length": Criterion("heater_left", 0.35, 0.65, ".0%"),
+    # a part of the 25 K within which temperatures are described
+    "knee_condition": _below("by_voltage_K", 5.0, ".0f", " K"),
     "knee_by_legs": Criterion(
-        "by_legs_K", 0.5 * paper.KNEE_BY_LEGS_K, 1.5 * paper.KNEE_BY_LEGS_K, *_K
+        "by_legs_K", 0.5 * paper.KNEE_BY_LEGS_K, 1.5 * paper.KNEE_BY_LEGS_K, ".0f", " K"
     ),
     "knee_by_doping": Criterion("doping_share", 0.75, 1.25, ".0%"),
     # as large as it must be for the highest V_l to be that of another row
     "knee_misses": _above("ramp_up_current", paper.CURRENT_ERROR, ".2%"),
     "dependent_parameters": _above("coupling_I", 0.8, ".2f"),
     "decoupled_groups": _below("coupling_III", 0.6, ".2f"),
-    "one_factor": _below("eq12_air_K", paper.POWER_LAW_SPREAD_K, *_K),
-    "constant_share": Criterion("share_growth", 0.9, 1.1, ".2f"),
-    "factor_of_the_knee": _below("k_by_knee_K", paper.POWER_LAW_SPREAD_K, *_K),
-    "one_sided": _below("one_sided_K", paper.POWER_LAW_SPREAD_K, *_K),
-    "linear_branch": _below("straight_K", paper.POWER_LAW_SPREAD_K, *_K),
-    "proportional_branch": _below("proportional_K", paper.POWER_LAW_SPREAD_K, *_K),
-    "missing_tip": _above("tip_carries_K", 0.75 * paper.KNEE_OFF_K, "+.1f", " K"),
+    "current_alone": _above("tip_I_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
+    "doping_held": _below("tip_n_d_held_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
+    "one_factor": _below("eq12_air_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
+    "constant_share": Criterion("share_growth", 0.9, 1.1, ".2f", "-fold"),
+    "factor_of_the_knee": _below("k_by_knee_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
+    "one_sided": _below("one_sided_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
+    "linear_branch": _below("straight_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
+    "proportional_branch": _below("proportional_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
+    "missing_tip": _above("tip_carries_K", 0.75 * paper.KNEE_OFF_K, "+.2f", " K"),
+    "tip_in_air": _above("tip_in_air_K", 0.75 * paper.KNEE_OFF_K, "+.2f", " K"),
     "thermoelectric_size": _below("shift_nm", paper.SHIFT_NM, ".0f", " nm"),
     "thermoelectric_direction": _above("shift_along_nm", 0.0, "+.0f", " nm"),
+    "thermoelectric_prediction": _below(
+        "without_heat_carried_K", paper.POWER_LAW_SPREAD_K, ".1f", " K"
+    ),
     "radiation": _below("radiated_share", 1e-3, ".2%"),
 }
 
@@ -95,9 +100,10 @@ def verdict_on(name: str, found: Ensemble | None = None) -> Verdict:
     holds = criterion.holds(found.numbers[criterion.column])
     assert isinstance(holds, xr.DataArray)
     least, *_, most = sorted(found.share(holds, size) for size in SIZES)
-    if least >= _ALL:
+    # so much of the weight is as good as all of it, or none
+    if least >= 0.95:
         words = "holds"
-    elif most <= _NONE:
+    elif most <= 0.05:
         words = "does not hold"
     elif f"{least:.0%}" == f"{most:.0%}":
         words = f"holds for some layouts ({most:.0%} of the weight)"

@@ -36,13 +36,8 @@ from hotlever.raman import anharmonic
 from hotlever.records import Record
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
-_PER_K_PER_W, _ROOM_K = 1e-3, 300.0
-#: To either side of a temperature, for how the resistance changes there (K).
-_STEP_K = 1.0
-#: mW/(µm² K) to W/(m² K).
-_PER_AREA = 1e9
-#: Unit of what lies between zero and one.
-_SHARE = "share"
+#: K/W in K/mW.
+_PER_K_PER_W = 1e-3
 
 
 class PredictedQuantity(NamedTuple):
@@ -55,7 +50,7 @@ class PredictedQuantity(NamedTuple):
     @property
     def is_share(self) -> bool:
         """Whether it lies between zero and one."""
-        return self.unit == _SHARE
+        return self.unit == "share"
 
     @property
     def arguments(self) -> dict[str, bool]:
@@ -122,9 +117,9 @@ def johnson_noise(probe: Probe, *, tip_K: float) -> float:
 
 def temperature_resolution(probe: Probe, *, tip_K: float) -> float:
     """Johnson noise over what the lever's voltage shows of the tip temperature at a current."""
-    branch = Lever(probe, COARSE).branch(tip_K + _STEP_K)
-    around = tip_K + np.array([-_STEP_K, _STEP_K])
-    kohm_per_K = np.diff(branch.lever_voltage(around) / branch.current(around)) / (2.0 * _STEP_K)
+    branch = Lever(probe, COARSE).branch(tip_K + 1.0)
+    around = tip_K + np.array([-1.0, 1.0])
+    kohm_per_K = np.diff(branch.lever_voltage(around) / branch.current(around)) / 2.0
     mV_per_K = 1e3 * branch.current(tip_K) * kohm_per_K[0]
     return _johnson_nV(branch, tip_K) / abs(float(mV_per_K))
 
@@ -164,7 +159,8 @@ def air_coefficient(probe: Probe, *, decay_um: float = np.inf) -> float:
     mean_rise = np.exp(-np.linspace(0.0, behind.max(), 1001) / decay_um).mean()
     area = sum(region.area for region in probe.layout().regions)
     gas = probe.surroundings.gas_conductivity
-    return _PER_AREA * float(heat[0]) * gas / (2.0 * area * float(mean_rise))
+    # from mW/(µm² K) to W/(m² K)
+    return 1e9 * float(heat[0]) * gas / (2.0 * area * float(mean_rise))
 
 
 def layer_conductivity(*, thickness_um: float, temperature_K: float, scale: float) -> float:
@@ -205,7 +201,7 @@ def surface_share(
     interface = _PER_K_PER_W * interface_K_per_W
     below = contact_resistance(radius_um, [kappa], (), interface)
     if tip_K_per_W is None:
-        tip = cold_resistance(EXAMPLE.with_(apex_radius_um=radius_um), _ROOM_K)
+        tip = cold_resistance(EXAMPLE.with_(apex_radius_um=radius_um), 300.0)
     else:
         tip = _PER_K_PER_W * tip_K_per_W
     return (below - interface) / (tip + below)
@@ -227,7 +223,7 @@ def heat_conductance_of_contact(
     interface = 1e9 * interface_m2K_per_W / (np.pi * radius_um**2)
     tip = EXAMPLE.with_(apex_radius_um=radius_um, height_um=height_um)
     below = contact_resistance(radius_um, [kappa], (), interface)
-    return 1e6 / (cold_resistance(tip, _ROOM_K) + below)
+    return 1e6 / (cold_resistance(tip, 300.0) + below)
 
 
 #: By the names that cases have for them.
@@ -235,7 +231,7 @@ QUANTITIES = {
     function.__name__: PredictedQuantity(unit, (function.__doc__ or "").partition(".")[0], function)
     for function, unit in (
         (power_ratio_in_air, "1"),
-        (share_into_air, _SHARE),
+        (share_into_air, "share"),
         (time_constant, "µs"),
         (resistance_ratio, "1"),
         (johnson_noise, "nV/√Hz"),
@@ -247,8 +243,8 @@ QUANTITIES = {
         (raman_softening, "cm⁻¹"),
         (two_sided_contact, "K/W"),
         (spreading_resistance, "K/W"),
-        (surface_share, _SHARE),
-        (surface_share_on_another, _SHARE),
+        (surface_share, "share"),
+        (surface_share_on_another, "share"),
         (heat_conductance_of_contact, "nW/K"),
     )
 }

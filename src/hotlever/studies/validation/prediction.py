@@ -25,11 +25,7 @@ from hotlever.types import Array, Progress
 
 #: Levers that are drawn from the priors of a case.
 DRAWS = 64
-_SEED = 30
-#: Share of the draws that may be no lever, or one that does not show the quantity.
-_MOST_MISSING = 0.25
-#: Verdicts, by the distance of the published number from the median in standard deviations of both.
-_WITHIN = {1.0: "inside 68 %", BAND: "inside 95 %"}
+#: The verdict on a published number that is in no band.
 OUTSIDE = "outside"
 
 
@@ -106,8 +102,10 @@ class PredictedNumber:
 
     def verdict(self, value: float, error: float) -> str:
         """Say where a published value with its standard error is."""
+        # from the median, in standard deviations of both
         off = abs(self.deviation(value, error))
-        return next((text for limit, text in _WITHIN.items() if off <= limit), OUTSIDE)
+        within = {1.0: "inside 68 %", BAND: "inside 95 %"}
+        return next((text for limit, text in within.items() if off <= limit), OUTSIDE)
 
 
 def _transformed(values: Array, is_share: bool) -> Array:
@@ -148,7 +146,7 @@ def predict(case: Case, progress: Progress | None = None) -> PredictedNumber:
     probe, (_, uncertain) = case.probe(), case.numbers()
     of_lever = {} if probe is None else default_priors(as_known(probe, None))
     priors: dict[str, Prior] = {**of_lever, **uncertain}
-    draws = norm.ppf(qmc.LatinHypercube(len(priors), seed=_SEED).random(DRAWS))
+    draws = norm.ppf(qmc.LatinHypercube(len(priors), seed=30).random(DRAWS))
     values, impossible = [], 0
     for draw in each(list(draws), progress):
         drawn = {
@@ -162,7 +160,8 @@ def predict(case: Case, progress: Progress | None = None) -> PredictedNumber:
         except HotleverError:
             continue
     missing = DRAWS - len(values)
-    if missing > _MOST_MISSING * DRAWS:
+    # so many may be no lever, or one that does not show the quantity
+    if missing > 0.25 * DRAWS:
         computed(case)  # says what is wrong, if it is wrong with the lever as it is assumed
         raise ComputationError(
             f"{case.name}: {missing} of {DRAWS} draws from the priors show no {case.quantity}"
