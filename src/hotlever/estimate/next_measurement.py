@@ -410,7 +410,7 @@ class LinearisedLever:
         By their names; without shifts of edges, which are shares of nothing.
         """
         rates, own = self._coordinates.rates(self._point), self.probe.values(self.names)
-        rows = np.eye(len(self.names), len(self.names) + len(_SCALED))
+        rows = np.eye(len(self.names), len(self.names) + len(SCALES))
         return {
             name: rates[number] / (share * own[number]) * rows[number]
             for number, name in enumerate(self.names)
