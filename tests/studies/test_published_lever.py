@@ -12,7 +12,6 @@ from hotlever.studies.published_lever import layout_numbers
 from hotlever.studies.published_lever.ensemble import (
     ANY,
     SIZES,
-    SMALL,
     WEIGHED,
     Ensemble,
     stored_ensemble,
@@ -103,7 +102,8 @@ def test_layouts_scatter_over_both_priors_of_the_size_and_weigh_one_together():
     assert (found.weights.where(~found.numbers.drawn, 0.0) == 0.0).all()
     large = found.numbers.length_um > 60.0
     assert large.any()
-    assert (found.weights.sel(size=SMALL).where(large, 0.0) == 0.0).all()
+    _, small = SIZES
+    assert (found.weights.sel(size=small).where(large, 0.0) == 0.0).all()
     assert found.weights.sel(size=ANY).where(large, 0.0).sum() > 0.0
 
 
