@@ -8,6 +8,8 @@ import xarray as xr
 
 from hotlever.datasets import labelled
 from hotlever.lever.lever import COARSE
+from hotlever.probe.priors import THERMOMETER
+from hotlever.studies.knee_study import Suspect, knee_K
 from hotlever.studies.published_lever import layout_numbers
 from hotlever.studies.published_lever.ensemble import (
     ANY,
@@ -16,6 +18,7 @@ from hotlever.studies.published_lever.ensemble import (
     Ensemble,
     stored_ensemble,
 )
+from hotlever.studies.published_lever.knee_suspects import carried, what_to_measure
 from hotlever.studies.published_lever.layout_search import DRAWN, SearchOptions, Solver, search
 from hotlever.studies.published_lever.layouts import REFERENCE, stored_layouts
 from hotlever.studies.published_lever.statements import MAIN, OPTIONS, SEARCHED
@@ -144,3 +147,27 @@ def test_verdicts_go_by_the_weight_of_layouts(values, words, over):
 def test_every_claim_has_a_number_of_every_layout(name):
     assert np.isfinite(stored_ensemble().numbers[CRITERIA[name].column]).all()
     assert verdict_on(name).words
+
+
+def test_suspects_of_the_knee_are_told_of_every_layout_that_has_a_weight():
+    found, study = stored_ensemble(), carried()
+    drawn = found.numbers.layout[found.numbers.drawn.values]
+    assert {*drawn.values, found.nearest, REFERENCE} == {*study.layout.values}
+    assert {*study.suspect.values} == {*Suspect} - {Suspect.IN_AIR}
+    assert np.isfinite(study[["moved_K", "shift_K", "ramp_K"]].to_dataarray()).all()
+    assert (study.stderr_K.sel(layout=found.nearest) > 0.0).all()
+
+
+@pytest.mark.slow
+def test_a_spectrum_tells_more_of_the_knee_than_a_finer_sweep_where_there_is_none():
+    study = what_to_measure(stored_layouts()[stored_ensemble().nearest].probe())
+    (nothing, _), (spectrum, _), (finer, _), (drawing, _) = study.stderr_K.values
+    assert spectrum < 0.6 * nothing
+    assert spectrum < 0.7 * finer
+    assert finer < nothing
+    assert drawing == pytest.approx(nothing, rel=0.05)
+    together = study.stderr_K.isel(data=1).values
+    # all of the ramp's temperatures have an error in common
+    common = THERMOMETER * (knee_K(stored_layouts()[stored_ensemble().nearest].probe()) - 293.0)
+    assert (together[:2] > common).all()
+    assert (together < 0.6 * nothing).all()
