@@ -54,7 +54,7 @@ class LeverPage(TaskPage):
         self._sections: Sections = {}
         self._turn = 0
         self._opened_for: str | None = None
-        self._held_for = ""
+        self._held_for: str | None = None
         with two_columns("live") as (left, right):
             with left:
                 drop_zone(
