@@ -24,8 +24,8 @@ class Quantity(NamedTuple):
     unit: str
     meaning: str
     symbol: str = ""  #: heads its column in measurement files
-    #: Other headings of its column, in small letters without blanks and marks.
-    headings: tuple[str, ...] = ()
+    #: Other headings of its column, in small letters without marks; a blank stands between two.
+    headings: str = ""
     #: Where the largest value of a column can lie; else its unit is wrong.
     plausible: tuple[float, float] = (0.0, math.inf)
     #: Whether it may be of either sign at a positive bias.
@@ -62,7 +62,7 @@ QUANTITIES = {
             "V",
             "lever voltage",
             "V_l",
-            ("vl", "ul", "vlever", "ulever", "lever", "levervoltage", "hebelspannung"),
+            "vl ul vlever ulever lever levervoltage hebelspannung",
             label="lever voltage V$_l$",
         ),
         Quantity(
@@ -70,10 +70,7 @@ QUANTITIES = {
             "V",
             "bias",
             "V_b",
-            (
-                *("vb", "ub", "vbias", "ubias", "bias", "biasvoltage"),
-                *("vorspannung", "versorgungsspannung"),
-            ),
+            "vb ub vbias ubias bias biasvoltage vorspannung versorgungsspannung",
             (1e-3, 1e3),
             label="bias V$_b$",
         ),
@@ -82,10 +79,7 @@ QUANTITIES = {
             "mA",
             "heater current",
             "I_h",
-            (
-                *("ih", "i", "current", "heatercurrent", "levercurrent"),
-                *("strom", "heizstrom", "heizerstrom", "hebelstrom"),
-            ),
+            "ih i current heatercurrent levercurrent strom heizstrom heizerstrom hebelstrom",
             (1e-9, 1e3),
             small=("µA", 1e3),
             label="heater current I$_h$",
@@ -95,7 +89,7 @@ QUANTITIES = {
             "V",
             "reader voltage",
             "V_r",
-            ("vr", "ur", "vreader", "ureader", "reader", "readervoltage", "readerspannung"),
+            "vr ur vreader ureader reader readervoltage readerspannung",
             (1e-9, 1e3),
             small=("mV", 1e3),
             label="reader voltage V$_r$",
@@ -105,11 +99,8 @@ QUANTITIES = {
             "V",
             "bridge voltage",
             "V_bridge",
-            (
-                *("vbridge", "ubridge", "bridge", "bridgevoltage", "bridgeoutput"),
-                "bridgeoutputvoltage",
-                *("bridgesignal", "ubrücke", "brücke", "brückenspannung", "diagonalspannung"),
-            ),
+            "vbridge ubridge bridge bridgevoltage bridgeoutput bridgeoutputvoltage bridgesignal "
+            "ubrücke brücke brückenspannung diagonalspannung",
             (1e-9, 1e3),
             True,
             ("mV", 1e3),
@@ -120,7 +111,7 @@ QUANTITIES = {
             "K",
             "tip temperature",
             "T_tip",
-            ("ttip", "tip", "tiptemperature", "spitzentemperatur"),
+            "ttip tip tiptemperature spitzentemperatur",
             (0.0, 5e3),
             small=("K", 1.0),
         ),
@@ -129,35 +120,31 @@ QUANTITIES = {
             "K",
             "standard error of the measured tip temperature",
             "dT_tip",
-            ("dttip", "δttip"),
+            "dttip δttip",
         ),
         Quantity(
-            "current_error_mA",
-            "mA",
-            "standard error of the measured current",
-            "dI_h",
-            ("dih", "δih"),
+            "current_error_mA", "mA", "standard error of the measured current", "dI_h", "dih δih"
         ),
         Quantity(
             "reader_error_V",
             "V",
             "standard error of the measured reader voltage",
             "dV_r",
-            ("dvr", "δvr"),
+            "dvr δvr",
         ),
         Quantity(
             "bridge_output_error_V",
             "V",
             "standard error of the measured bridge voltage",
             "dV_bridge",
-            ("dvbridge", "δvbridge"),
+            "dvbridge δvbridge",
         ),
         Quantity(
             "apex_K",
             "K",
             "temperature of the apex",
             "T_apex",
-            ("tapex", "apex", "apextemperature"),
+            "tapex apex apextemperature",
             (0.0, 5e3),
             small=("K", 1.0),
         ),
@@ -166,14 +153,14 @@ QUANTITIES = {
             "K",
             "standard error of the measured temperature of the apex",
             "dT_apex",
-            ("dtapex", "δtapex"),
+            "dtapex δtapex",
         ),
         Quantity(
             "surface_K",
             "K",
             "sample's surface temperature",
             "T_melt",
-            ("tmelt", "meltingpoint", "meltingtemperature", "schmelzpunkt", "schmelztemperatur"),
+            "tmelt meltingpoint meltingtemperature schmelzpunkt schmelztemperatur",
             (0.0, 5e3),
             small=("K", 1.0),
         ),
@@ -182,14 +169,14 @@ QUANTITIES = {
             "K",
             "standard error of the measured surface temperature",
             "dT_melt",
-            ("dtmelt", "δtmelt"),
+            "dtmelt δtmelt",
         ),
         Quantity(
             "distance_um",
             "µm",
             "distance of the apex to the sample, 0 in contact",
             "D",
-            ("d", "distance", "separation", "tipsampledistance", "tipsampleseparation", "abstand"),
+            "d distance separation tipsampledistance tipsampleseparation abstand",
         ),
         # what follows from it
         Quantity("bias", "V", "bias", label="bias V$_b$"),

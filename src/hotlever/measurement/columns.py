@@ -21,7 +21,9 @@ from hotlever.types import Array
 from hotlever.units import TIMES, amount, conversion, name_and_unit, unknown_unit
 
 _SYMBOLS = {
-    heading: measurand.symbol for measurand in MEASURANDS.values() for heading in measurand.headings
+    heading: measurand.symbol
+    for measurand in MEASURANDS.values()
+    for heading in measurand.headings.split()
 }
 #: In place of a quantity: a column that is not used.
 UNUSED = "unused"
