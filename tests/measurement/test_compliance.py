@@ -92,6 +92,15 @@ def test_both_polarities_are_at_the_same_limit(branch):
     np.testing.assert_array_equal(clipped.bias_V, bias[np.abs(current) < limit])
 
 
+def test_the_limits_of_both_polarities_may_be_apart_by_an_offset(branch):
+    bias, current = curve(branch, 30, 1e-3)
+    bias, current = np.append(-bias[::-1], bias), np.append(-current[::-1], current)
+    limit = 0.9 * current.max()
+    low, high = -0.9995 * limit, limit
+    clipped = without_rows_at_compliance(measurement(bias, np.clip(current, low, high)))
+    np.testing.assert_array_equal(clipped.bias_V, bias[(low < current) & (current < high)])
+
+
 def test_a_voltage_at_compliance_is_found_by_the_current_that_goes_on(branch):
     current = np.linspace(0.05, 1.4, 28)
     lever = np.interp(current, *branch.curve(np.linspace(1.0, 30.0, 2000))[:, 1::-1].T)

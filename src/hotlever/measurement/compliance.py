@@ -29,6 +29,8 @@ class ComplianceOptions:
     ----------
     level : float
         Rows are level with the largest magnitude of a column within this share of it.
+    apart : float
+        Share of the largest magnitude within which the limits of both polarities are.
     change : float
         Change that the curve beside them lets expect over several level rows, a share of the
         largest, from which on they are at a limit. About a smooth maximum it is less than 15 times
@@ -55,6 +57,7 @@ class ComplianceOptions:
     """
 
     level: float = 1e-4
+    apart: float = 0.05
     change: float = 2e-3
     change_of_few: float = 1e-2
     several: int = 3
@@ -136,12 +139,15 @@ def _columns(measurement: Measurement, circuit: Circuit | None) -> Iterator[_Col
 
 
 def _at_limit(measurement: Measurement, column: _Column, options: ComplianceOptions) -> Mask:
-    """Return which rows are at a limit, (n,): all that are level, if any sweep is seen to stop."""
+    """Return which rows are at a limit, (n,): those that are level in a sweep that is seen to stop.
+
+    The limit may be a little apart in each polarity, by the meter's offset. Where it is the highest
+    value of all, rows of other sweeps that are level with it are at it too.
+    """
     values, along = column.values, column.along
     usable = np.isfinite(values) & np.isfinite(along)
     level = usable & is_level(np.where(usable, values, np.nan), options)
-    if level.sum() < 2:
-        return np.zeros_like(level)
+    stopped, largest = np.zeros_like(level), np.abs(values[usable]).max(initial=0.0)
     distance = measurement.distance_um
     place = np.zeros(level.shape) if distance is None else np.nan_to_num(distance)
     for each in np.unique(place[usable]):
@@ -149,9 +155,11 @@ def _at_limit(measurement: Measurement, column: _Column, options: ComplianceOpti
         for sweep in sweeps_of(measurement.bias_V[rows]):
             part = rows[sweep]
             part = part[np.argsort(along[part], kind="stable")]
-            if _stops(np.abs(along[part]), np.abs(values[part]), level[part], options):
-                return level
-    return np.zeros_like(level)
+            highest = is_level(values[part], options)
+            near = np.abs(values[part]).max() >= (1.0 - options.apart) * largest
+            if near and _stops(np.abs(along[part]), np.abs(values[part]), highest, options):
+                stopped[part[highest]] = True
+    return stopped | level if (stopped & level).any() else stopped
 
 
 def _stops(x: Array, y: Array, level: Mask, options: ComplianceOptions) -> bool:
