@@ -19,7 +19,7 @@ from hotlever.lever import Lever
 from hotlever.report.report_page import Page
 from hotlever.studies.air_scaling import GAPS_UM
 from hotlever.studies.parameter_consistency import ERRORS, GEOMETRIES
-from hotlever.studies.published_lever.verdicts import CRITERIA, verdict_on
+from hotlever.studies.published_lever.ensemble import CRITERIA, verdict_on
 
 # Where the paper says what, the verdict, what was found, and its range over the layouts.
 Claim = tuple[str, str, str, str, str]
@@ -142,7 +142,7 @@ class Findings(Page):
     def judge(self, name: str, value: float, /, **numbers: Any) -> None:
         """Add the claim of a name by the layouts for which it holds.
 
-        The value is what a `hotlever.studies.published_lever.verdicts.Criterion` judges, of the
+        The value is what a `hotlever.studies.published_lever.ensemble.Criterion` judges, of the
         reference probe in this run.
         """
         text, (words, over_layouts) = self._claim(name, numbers), verdict_on(name)
