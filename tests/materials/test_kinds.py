@@ -13,14 +13,15 @@ from hotlever.materials import KINDS, PARAMETERS, published
 from hotlever.materials.departures import DEPARTURES, PROFILE, SmoothFactor, departure_of
 from hotlever.materials.heat import thermal_conductivity_of_layer
 from hotlever.materials.kinds import LowDopedSilicon, PSilicon
-from hotlever.materials.p_silicon import (
+from hotlever.materials.presets import PRESETS
+from hotlever.materials.sections import material_of
+from hotlever.materials.silicon import (
+    band_gap,
     band_gap_p,
     conductivity_p,
     hole_mobility,
+    inversion_temperature,
 )
-from hotlever.materials.presets import PRESETS
-from hotlever.materials.sections import material_of
-from hotlever.materials.silicon import band_gap, inversion_temperature
 
 OPTION_III = published("option III").material
 #: One material of each kind, and of each choice that a kind offers.

@@ -7,8 +7,7 @@ import pytest
 
 from beyond_the_paper import PHONON_EXPONENT, conductivity, seebeck
 from hotlever.materials import thermopower
-from hotlever.materials.p_silicon import conductivity_p
-from hotlever.materials.silicon import conductivity_low_doped
+from hotlever.materials.silicon import conductivity_low_doped, conductivity_p
 
 
 @pytest.mark.parametrize("kind", ["n-silicon", "p-silicon"])

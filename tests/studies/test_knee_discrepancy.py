@@ -8,7 +8,6 @@ import pytest
 from hotlever import Lever, Probe, fit
 from hotlever.lever.lever import COARSE
 from hotlever.materials.heat import thermal_conductivity
-from hotlever.materials.kinds import BY_THICKNESS
 from hotlever.materials.silicon import intrinsic_density
 from hotlever.measurement import Measurement
 from hotlever.spieser2017 import RAMP
@@ -60,7 +59,7 @@ def test_a_suspect_has_one_thing_more_and_all_together_have_everything():
         more = (
             lever.tip is not None,
             *lever.physics.effects,
-            lever.material.c_kappa == BY_THICKNESS,
+            lever.material.c_kappa == "thickness",
             lever.material.kappa_1,
             lever.material.n_i_1 or lever.material.intrinsic_scale != 1.0,
             isinstance(lever.material, MinimosMaterial),

@@ -15,31 +15,34 @@ from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO, Evaluated, law
 from hotlever.types import Array
 
 #: Coefficients of T⁰, T, T^½, T⁻¹, T⁻² and T⁻³ (K) in Eq. 13, in W cm⁻¹ K⁻¹.
-_A, _B, _C, _D, _E, _F = 2.60e-4, 4.70e-7, 1.48e-7, -6.63e-2, 9.14, -6.50e2
-#: Specific gas constant (J kg⁻¹ K⁻¹) and ratio of specific heats of air.
-GAS_CONSTANT, HEAT_RATIO = 287.05, 1.4
+_EQ_13 = 2.60e-4, 4.70e-7, 1.48e-7, -6.63e-2, 9.14, -6.50e2
+#: Ratio of specific heats of air.
+HEAT_RATIO = 1.4
 #: Standard pressure (mbar).
 ATMOSPHERE = 1013.25
 
 
 def _conductivity(T: Array) -> Array:
     """Eq. 13; in products, since general powers are ten times slower."""
+    a, b, c, d, e, f = _EQ_13
     inverse = 1.0 / T
-    return _A + _B * T + _C * np.sqrt(T) + inverse * (_D + inverse * (_E + inverse * _F))
+    return a + b * T + c * np.sqrt(T) + inverse * (d + inverse * (e + inverse * f))
 
 
 def _slope(T: Array) -> Array:
     """Return the derivative of Eq. 13."""
+    _, b, c, d, e, f = _EQ_13
     inverse = 1.0 / T
-    falling = inverse**2 * (_D + inverse * (2.0 * _E + inverse * 3.0 * _F))
-    return _B + 0.5 * _C * np.sqrt(inverse) - falling
+    falling = inverse**2 * (d + inverse * (2.0 * e + inverse * 3.0 * f))
+    return b + 0.5 * c * np.sqrt(inverse) - falling
 
 
 def _integral(T: Array) -> Array:
     """Return an antiderivative of Eq. 13."""
+    a, b, c, d, e, f = _EQ_13
     inverse = 1.0 / T
-    rising = T * (_A + 0.5 * _B * T + 2.0 / 3.0 * _C * np.sqrt(T))
-    return rising + _D * np.log(T) - inverse * (_E + inverse * 0.5 * _F)
+    rising = T * (a + 0.5 * b * T + 2.0 / 3.0 * c * np.sqrt(T))
+    return rising + d * np.log(T) - inverse * (e + inverse * 0.5 * f)
 
 
 @law(meant_for=(290.0, 1300.0), source="Eq. 13; Kadoya et al., JPCRD 14, 947 (1985)")
@@ -83,11 +86,12 @@ def temperature_jump_length(T: ArrayLike, pressure_mbar: float, accommodation: f
     [0.106, 0.521]
     """
     T = np.asarray(T, dtype=float)
-    c_v = GAS_CONSTANT / (HEAT_RATIO - 1.0)
+    gas_constant = 287.05  # J kg⁻¹ K⁻¹, of air
+    c_v = gas_constant / (HEAT_RATIO - 1.0)
     per_kappa = (
         (2.0 - accommodation)
         / accommodation
-        * np.sqrt(2.0 * np.pi * GAS_CONSTANT * T)
+        * np.sqrt(2.0 * np.pi * gas_constant * T)
         / ((HEAT_RATIO + 1.0) * c_v * 100.0 * pressure_mbar)
     )
     per_kappa *= 1e8  # W cm⁻¹ K⁻¹ to W m⁻¹ K⁻¹, and m to µm

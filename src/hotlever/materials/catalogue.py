@@ -24,10 +24,8 @@ from hotlever.text import aligned
 from hotlever.types import Array
 from hotlever.units import product_conversion, quantity
 
-#: Temperatures of curves (K), and of a layer whose κ follows from its thickness (µm).
-_FROM_K, _TO_K, _STEPS, _LAYER_UM = 250.0, 1300.0, 106, 0.4
+_THIN = "n-silicon, 0.4 µm by thickness"
 #: A preset for the kinds that have no values of their own.
-_THIN = f"n-silicon, {_LAYER_UM:g} µm by thickness"
 _EXAMPLES = {"metal-film": "Pt", "dielectric": "SiN"}
 
 #: Of samples alone: κ (W m⁻¹ K⁻¹), and where it is from.
@@ -47,9 +45,6 @@ _OTHERS = {
         "(CRC, 2019), ch. 6, after Cahill et al.",
     ),
 }
-_AT_K = 300.0
-#: What a number may be (W m⁻¹ K⁻¹).
-LEAST, MOST = 1e-3, 1e4
 
 
 def _example(kind: str) -> Kind:
@@ -129,7 +124,7 @@ def examples() -> dict[str, Kind]:
 
 
 def curves(
-    kinds: Mapping[str, Kind] | None = None, thickness_um: float = _LAYER_UM
+    kinds: Mapping[str, Kind] | None = None, thickness_um: float = 0.4
 ) -> dict[str, tuple[Array, Array, Array | None]]:
     """Return temperature (K), κ (W m⁻¹ K⁻¹) and ρ (Ω cm, or None) of materials, by name.
 
@@ -144,8 +139,8 @@ def curves(
     """
     curves_of = {}
     for name, kind in (examples() if kinds is None else kinds).items():
-        low = max([_FROM_K, *(law.temperature_range[0] for law in kind.stated.values())])
-        T = np.linspace(low, min(_TO_K, kind.highest_K), _STEPS)
+        low = max([250.0, *(law.temperature_range[0] for law in kind.stated.values())])
+        T = np.linspace(low, min(1300.0, kind.highest_K), 106)
         kappa, _ = kind.thermal_conductivity(T, thickness_um)
         rho = None
         if kind.conducts and name != _THIN:
@@ -180,17 +175,17 @@ def sample_conductivity(text: str, where: str) -> float:
     if text in _OTHERS:
         return _OTHERS[text][0]
     if text == "silicon":
-        return 100.0 * float(thermal_conductivity(_AT_K)[0])
+        return 100.0 * float(thermal_conductivity(300.0)[0])
     if text in PRESETS:
         kind = material_of({"kind": PRESETS[text].kind, "preset": text}, text)
-        return 100.0 * kind.thermal_conductivity(np.array(_AT_K), 1.0)[0].item()
+        return 100.0 * kind.thermal_conductivity(np.array(300.0), 1.0)[0].item()
     value, unit = quantity(text)
     if value is None:
         raise unknown_name("material", text, sample_names(), where)
     factor = product_conversion(unit, "W m⁻¹ K⁻¹") if unit else 1.0
-    if factor is None or not LEAST <= factor * value <= MOST:
+    if factor is None or not 1e-3 <= factor * value <= 1e4:
         raise InputError(
             f"{where}: found '{excerpt(text)}', expected a material or its thermal conductivity, "
-            f"{LEAST:g} to {MOST:g} W/(m K)"
+            "0.001 to 10000 W/(m K)"
         )
     return factor * value

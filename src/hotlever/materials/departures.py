@@ -27,17 +27,8 @@ from numpy.typing import ArrayLike
 from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO
 from hotlever.types import Array
 
-#: Correlation length in ln T. Published formulas are powers of T and activated, so that they part
-#: over a factor of two in T; three modes leave less than a hundredth of the variance then.
-CORRELATION_LENGTH = float(np.log(2.0))
-#: Coefficients of each law.
-MODES = 3
-#: Temperatures (K) between which the modes are those of the process, and at which spreads are said.
+#: Temperatures (K) between which the modes are those of the process.
 MODES_FROM, MODES_TO = 300.0, 1300.0
-COLD_K, HOT_K = 300.0, 1000.0
-#: Points by which the integral equation of the modes is solved, and the degree of the polynomials
-#: in ln T that the modes are: both far beyond what smooth modes need.
-_POINTS, _DEGREE = 40, 14
 
 
 @dataclass(frozen=True)
@@ -92,11 +83,11 @@ class SmoothFactor(Departure):
     """
 
     spread_cold: float = 0.0
-    count: int = MODES
+    count: int = 3
 
     def spread(self, T: ArrayLike) -> Array:
-        """Return the standard deviation of δ at temperatures (K)."""
-        share = (np.asarray(T, dtype=float) - COLD_K) / (HOT_K - COLD_K)
+        """Return the standard deviation of δ at temperatures (K), stated at 300 K and 1000 K."""
+        share = (np.asarray(T, dtype=float) - 300.0) / (1000.0 - 300.0)
         return np.asarray(self.spread_cold + share * (self.spread_hot - self.spread_cold))
 
     def modes(self, T: ArrayLike) -> Array:
@@ -105,7 +96,7 @@ class SmoothFactor(Departure):
 
     def hot(self, coefficients: Sequence[float]) -> float:
         """Return δ at 1000 K."""
-        return float(np.asarray(coefficients) @ self.modes(HOT_K))
+        return float(np.asarray(coefficients) @ self.modes(1000.0))
 
     def departed(self, T: Array, coefficients: Sequence[float]) -> tuple[Array, Array]:
         """Return exp(δ) at temperatures (K), and the derivative of δ by the temperature."""
@@ -132,14 +123,16 @@ class SmoothFactor(Departure):
         spread, root = self.spread(np.exp(x)), np.sqrt(weights)
         kernel = spread[:, None] * _correlation(x, x) * spread
         variances, vectors = np.linalg.eigh(root[:, None] * kernel * root)
-        variances, vectors = variances[: -MODES - 1 : -1], vectors[:, : -MODES - 1 : -1]
-        at = chebyshev.chebpts1(2 * _DEGREE)
+        variances, vectors = variances[: -self.count - 1 : -1], vectors[:, : -self.count - 1 : -1]
+        # points and degree are both far beyond what smooth modes need
+        degree = 14
+        at = chebyshev.chebpts1(2 * degree)
         anywhere = np.log(FORMULA_FROM) + 0.5 * (at + 1.0) * _WIDTH
         reach = self.spread(np.exp(anywhere))[:, None] * _correlation(anywhere, x) * spread
         values = reach @ (root[:, None] * vectors) / np.sqrt(variances)
         # the sign of a mode is a convention: it raises the law where that is hot
         values *= np.sign(values[-1])
-        return np.asarray(chebyshev.chebfit(at, values, _DEGREE).T)
+        return np.asarray(chebyshev.chebfit(at, values, degree).T)
 
 
 _WIDTH = float(np.log(FORMULA_TO / FORMULA_FROM))
@@ -153,14 +146,16 @@ def _position(T: Array) -> Array:
 
 def _nodes() -> tuple[Array, Array]:
     """Return points in ln T and weights, of which the sum is one."""
-    points, weights = leggauss(_POINTS)
+    points, weights = leggauss(40)
     low, high = np.log(MODES_FROM), np.log(MODES_TO)
     return low + 0.5 * (points + 1.0) * (high - low), 0.5 * weights
 
 
 def _correlation(x: Array, y: Array) -> Array:
     """Return the correlation of δ between places in ln T, (x, y)."""
-    away = (x[:, None] - y) / CORRELATION_LENGTH
+    # published formulas are powers of T and activated, so that they part over a factor of two in T;
+    # three modes leave less than a hundredth of the variance then
+    away = (x[:, None] - y) / np.log(2.0)
     return np.asarray(np.exp(-0.5 * away**2))
 
 

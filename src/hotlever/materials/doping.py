@@ -12,9 +12,6 @@ from hotlever.errors import InputError
 from hotlever.materials.laws import Evaluated, law
 from hotlever.types import Array
 
-#: Of phosphorus: pre-exponential factor (cm²/s), activation energy over the gas constant (K).
-_FACTOR, _ACTIVATION = 10.5, 85000.0 / 1.98720
-
 
 def tapered_doping(
     distances: ArrayLike, n_d: float, delta: float, *, n_hd: float, front: float = 0.0
@@ -88,8 +85,9 @@ def phosphorus_diffusivity(T: ArrayLike) -> Evaluated:
     '9.3e-13'
     """
     T = np.asarray(T, dtype=float)
-    D = _FACTOR * np.exp(-_ACTIVATION / T)
-    return D, {"T": D * _ACTIVATION / T**2}
+    activation_K = 85000.0 / 1.98720  # the activation energy over the gas constant
+    D = 10.5 * np.exp(-activation_K / T)
+    return D, {"T": D * activation_K / T**2}
 
 
 def diffusion_length(temperature_K: ArrayLike, time_s: ArrayLike) -> Array:

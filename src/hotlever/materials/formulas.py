@@ -20,12 +20,6 @@ from hotlever.errors import excerpt, unknown_name
 from hotlever.materials.laws import Evaluated
 from hotlever.types import Array
 
-#: Characters of a formula, its steps, and how deep they may be nested.
-_LONGEST, _MOST_STEPS, _DEEPEST = 1000, 300, 60
-#: Name of the temperature.
-TEMPERATURE = "T"
-_NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*")
-
 # Value and derivatives, by name.
 Dual = tuple[Any, dict[str, Any]]
 
@@ -42,9 +36,8 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[[Any, Any], Any]]] = {
     "tanh": (np.tanh, lambda x, y: 1.0 - y * y),
     "atan": (np.arctan, lambda x, y: 1.0 / (1.0 + x * x)),
 }
-CONSTANTS = {"pi": np.pi}
 #: What no parameter can be called.
-RESERVED_NAMES = {TEMPERATURE, *FUNCTIONS, *CONSTANTS}
+RESERVED_NAMES = {"T", *FUNCTIONS, "pi"}
 #: Operators, and their derivatives by what stands before and behind them.
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], tuple[Any, Any, Any]]] = {
     ast.Add: lambda x, y: (x + y, 1.0, 1.0),
@@ -67,11 +60,11 @@ class Expression(NamedTuple):
 
         They are not finite where the formula divides by nothing or overflows.
         """
-        values: dict[str, Dual] = {TEMPERATURE: (T, {TEMPERATURE: 1.0})}
+        values: dict[str, Dual] = {"T": (T, {"T": 1.0})}
         values |= {name: (np.float64(parameters[name]), {name: 1.0}) for name in self.names}
         with np.errstate(all="ignore"):
             value, by = _value(self.tree, values)
-        names = (TEMPERATURE, *self.names)
+        names = ("T", *self.names)
         whole = {name: np.broadcast_to(by.get(name, 0.0), T.shape) for name in names}
         return np.broadcast_to(value, T.shape), whole
 
@@ -84,7 +77,7 @@ def names_in(text: str) -> set[str]:
     >>> sorted(names_in("rho0 * exp(1e-3*(T - T0))"))
     ['T0', 'rho0']
     """
-    return set(_NAME.findall(text)) - RESERVED_NAMES
+    return set(re.findall(r"(?<![\w.])[A-Za-z_]\w*", text)) - RESERVED_NAMES
 
 
 def parsed(text: str) -> Expression:
@@ -100,8 +93,8 @@ def parsed(text: str) -> Expression:
     >>> parsed("rho0 * (1 + tcr*(T - 293))").names
     ('rho0', 'tcr')
     """
-    if len(text) > _LONGEST:
-        raise ValueError(f"a formula of {len(text)} characters, expected at most {_LONGEST}")
+    if len(text) > 1000:
+        raise ValueError(f"a formula of {len(text)} characters, expected at most 1000")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -124,10 +117,9 @@ def _check(node: ast.AST, names: dict[str, None], text: str, depth: int, steps: 
     """Refuse what no formula has; collect the names of parameters."""
     steps[0] += 1
     where = f"character {getattr(node, 'col_offset', 0) + 1}"
-    if depth > _DEEPEST or steps[0] > _MOST_STEPS:
+    if depth > 60 or steps[0] > 300:
         raise ValueError(
-            f"{where}: nested too deeply or too long, expected at most {_DEEPEST} levels and "
-            f"{_MOST_STEPS} steps"
+            f"{where}: nested too deeply or too long, expected at most 60 levels and 300 steps"
         )
     inner: list[ast.expr]
     match node:
@@ -182,7 +174,7 @@ def _value(node: ast.AST, values: Mapping[str, Dual]) -> Dual:
         case ast.Constant(value=value):
             return np.float64(_number(value)), {}
         case ast.Name(id=name):
-            return values[name] if name in values else (np.float64(CONSTANTS[name]), {})
+            return values[name] if name in values else (np.float64(np.pi), {})
         case ast.UnaryOp(op=op, operand=operand):
             x, dx = _value(operand, values)
             return (x, dx) if isinstance(op, ast.UAdd) else (-x, _chain((-1.0, dx)))

@@ -26,9 +26,8 @@ STEP = 680.0
 MEAN_FREE_PATH_UM = 0.3
 #: Coefficients A to E of Shomate's equation for solid silicon (J/(mol K), T in 1000 K).
 _SHOMATE = (22.81719, 3.899510, -0.082885, 0.042111, -0.354063)
-#: Molar mass (g/mol) and density (g/cm³) of silicon.
-MOLAR_MASS, DENSITY = 28.0855, 2.329
-_PER_VOLUME = DENSITY / MOLAR_MASS
+#: Density (g/cm³) over molar mass (g/mol) of silicon.
+_PER_VOLUME = 2.329 / 28.0855
 #: Temperature (K) whose enthalpy is zero.
 STANDARD_TEMPERATURE = 298.15
 _SOURCE = "Shomate equation, NIST Chemistry WebBook, SRD 69; Chase, NIST-JANAF (1998)"

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import ConfigDict, model_validator
 
 from hotlever.errors import unknown_name
-from hotlever.materials.formulas import TEMPERATURE
 from hotlever.materials.heat import grey_emission
 from hotlever.materials.laws import Evaluated, Law
 from hotlever.materials.parameters import STATED, Parameter, constant_of, declare
@@ -243,6 +242,6 @@ class Kind(Record):
         for own, law in self.stated.items():
             for name in law.names:
                 if name not in self.parameters:
-                    near = unknown_name("name", name, [*self.parameters, TEMPERATURE])
+                    near = unknown_name("name", name, [*self.parameters, "T"])
                     raise ValueError(f"{own}: {near}; other names need a value in the section")
         return self

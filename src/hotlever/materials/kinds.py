@@ -41,7 +41,6 @@ from hotlever.materials.heat import (
 )
 from hotlever.materials.kind import Kind
 from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
-from hotlever.materials.p_silicon import conductivity_p
 from hotlever.materials.parameters import (
     OF_DIELECTRIC,
     OF_METAL,
@@ -55,6 +54,7 @@ from hotlever.materials.silicon import (
     Carrier,
     conductivity_high_doped,
     conductivity_low_doped,
+    conductivity_p,
     inversion_temperature,
 )
 from hotlever.materials.stated import StatedLaw, number_or_law
@@ -66,19 +66,15 @@ from hotlever.materials.thermopower import (
 )
 from hotlever.types import Array
 
-#: In place of c_κ: κ follows from the thickness.
-BY_THICKNESS = "thickness"
 # What c_κ may be.
 ScaleOrByThickness = Annotated[
     Annotated[float, field_of(OF_SILICON["c_kappa"])] | Literal["thickness"],
     Field(
         union_mode="left_to_right",
-        description=f'scale of the thermal conductivity; or "{BY_THICKNESS}": it follows from the '
+        description='scale of the thermal conductivity; or "thickness": it follows from the '
         "thickness",
     ),
 ]
-#: Share of its resistivity at 300 K that high-doped silicon has when it is colder.
-_LEAST_LEFT = 0.1
 
 
 class Silicon(Kind):
@@ -100,12 +96,12 @@ class Silicon(Kind):
 
     @property
     def _heat(self) -> Law:
-        by_thickness = self.c_kappa == BY_THICKNESS
+        by_thickness = self.c_kappa == "thickness"
         return thermal_conductivity_of_layer if by_thickness else thermal_conductivity
 
     def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
         """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
-        kappa = self._heat(T, thickness_um if self.c_kappa == BY_THICKNESS else self.c_kappa)
+        kappa = self._heat(T, thickness_um if self.c_kappa == "thickness" else self.c_kappa)
         return self._departed("kappa", T, kappa)
 
     def _departed(self, law: str, T: Array, evaluated: Evaluated) -> Evaluated:
@@ -249,11 +245,12 @@ class HighDopedSilicon(Silicon):
     def impossible(self, coldest_K: float) -> str:
         """Say that the straight line of Eq. 11 falls to nothing below 300 K, if it does."""
         resistivity = self.a0 + self.a1 * (coldest_K - 300.0)
-        if resistivity >= _LEAST_LEFT * self.a0:
+        least_left = 0.1  # of the resistivity at 300 K, when it is colder
+        if resistivity >= least_left * self.a0:
             return ""
         return (
             f"a0 = {self.a0:g} and a1 = {self.a1:g} give a resistivity of {resistivity:.3g} Ω cm "
-            f"at {coldest_K:g} K, expected more than {_LEAST_LEFT:g} of a0"
+            f"at {coldest_K:g} K, expected more than {least_left:g} of a0"
         )
 
     @property

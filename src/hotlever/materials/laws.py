@@ -19,9 +19,8 @@ from numpy.typing import ArrayLike
 
 from hotlever.types import Array
 
-Partials = dict[str, Array]
 # What a law returns.
-Evaluated = tuple[Array, Partials]
+Evaluated = tuple[Array, dict[str, Array]]
 
 #: Between these temperatures (K) every law follows its formula to the letter.
 FORMULA_FROM, FORMULA_TO = 200.0, 1700.0

@@ -20,26 +20,11 @@ from hotlever.materials.departures import DEPARTURES, Departure, departure_of
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 
 INVERSION = "inversion_temperature"
+
 #: What the two kinds of silicon are called that the section ``[material]`` describes.
 LOW_DOPED, HIGH_DOPED = "low-doped", "high-doped"
-#: Nominal doping is that good, where the probe file says no better (the makers' own tolerance).
-_DOPING = 0.15
 #: What is known of films of other materials: they differ from the bulk, and from each other.
 _FILM = 0.2
-#: Of the power of the energy in the relaxation time of carriers: half of what lies between acoustic
-#: phonons, −1/2, and the half-way to ionised impurities, 3/2; and of a metal's Seebeck coefficient
-#: (µV/K), which films have another of than the bulk.
-_SCATTERING, _SEEBECK = 0.5, 5.0
-#: Of the emissivity: it depends on the thickness and on the doping.
-_EMISSIVITY = 0.7
-#: What a₁ is.
-_SLOPE = "temperature coefficient of the high-doped resistivity"
-#: What counts in time alone.
-IN_TIME = "in time"
-#: Of coefficients of a law, by their number.
-_SUBSCRIPTS = "₁₂₃"
-#: Units by the endings of names in probe files.
-_UNITS = {"um": "µm", "ohm": "Ω", "V": "V", "K": "K", "deg": "°", "K_per_mW": "K/mW"}
 
 
 class Parameter(NamedTuple):
@@ -59,7 +44,7 @@ class Parameter(NamedTuple):
     relative : bool
         Whether that is a share of the value: a standard deviation of the logarithm.
     counts : str
-        With what it counts alone: `IN_TIME`, or an effect of `hotlever.probe.surroundings`.
+        With what it counts alone: ``in time``, or an effect of `hotlever.probe.surroundings`.
     exact : bool
         Whether no value outside the bounds has a meaning.
     usual : bool
@@ -88,9 +73,6 @@ class Parameter(NamedTuple):
         return self.lower, self.upper
 
 
-_KNOWN = {name: spread for name, (_, spread) in PUBLISHED_SCATTER.items()} | {"n_d": _DOPING}
-
-
 def _table(*rows: Parameter) -> dict[str, Parameter]:
     return {row.name: row for row in rows}
 
@@ -99,7 +81,7 @@ def _emissivity(value: float) -> Parameter:
     return Parameter(
         *("emissivity", "ε", "1", 1.0, 0.0, 1.0),
         "emissivity of a face, which counts with radiation",
-        spread=_EMISSIVITY,
+        spread=0.7,
         counts="radiation",
         exact=True,
         value=value,
@@ -119,7 +101,7 @@ def _coefficients(departure: Departure) -> list[Parameter]:
     """
     return [
         Parameter(
-            *(name, f"{name.rpartition('_')[0]}{_SUBSCRIPTS[number]}", "1", 10.0, -10.0, 10.0),
+            *(name, f"{name.rpartition('_')[0]}{'₁₂₃'[number]}", "1", 10.0, -10.0, 10.0),
             f"departure of the law of the {departure.words}, mode {number + 1}; 0: none",
             spread=1.0,
             relative=False,
@@ -132,14 +114,25 @@ def _coefficients(departure: Departure) -> list[Parameter]:
 #: All parameters of silicon: first the six that the paper fits, in its order.
 OF_SILICON = _table(
     *(
-        Parameter(*row, spread=_KNOWN[row[0]], usual=True)
+        # nominal doping is as good as the makers' own tolerance
+        Parameter(
+            *row, spread=0.15 if row[0] == "n_d" else PUBLISHED_SCATTER[row[0]][1], usual=True
+        )
         for row in (
             ("c_kappa", "c_κ", "1", 1.0, 0.1, 1.5, "scale of the thermal conductivity"),
             ("delta", "Δ", "µm", 1.0, 0.05, 2.0, "diffusion length of the doping profile"),
             ("n_d", "n_d", "cm⁻³", 1e17, 1e16, 1e19, "doping concentration of the heater"),
             ("p", "p", "1", 1.0, 1.0, 4.0, "phonon scattering exponent"),
             ("a0", "a₀", "Ω cm", 1e-4, 1e-4, 1e-2, "high-doped resistivity at 300 K"),
-            ("a1", "a₁", "Ω cm K⁻¹", 1e-6, 0.0, 1e-5, _SLOPE),
+            (
+                "a1",
+                "a₁",
+                "Ω cm K⁻¹",
+                1e-6,
+                0.0,
+                1e-5,
+                "temperature coefficient of the high-doped resistivity",
+            ),
         )
     ),
     Parameter(
@@ -162,7 +155,7 @@ OF_SILICON = _table(
         *("scattering_exponent", "r", "1", 1.0, -1.0, 2.0),
         "power of the energy in the relaxation time of carriers, which counts with "
         "thermoelectricity",
-        spread=_SCATTERING,
+        spread=0.5,
         relative=False,
         counts="thermoelectric",
         value=0.0,
@@ -171,7 +164,7 @@ OF_SILICON = _table(
     Parameter(
         *("heat_capacity_scale", "c_h", "1", 1.0, 0.5, 1.5),
         "scale of the heat capacity, which counts in time",
-        counts=IN_TIME,
+        counts="in time",
         value=1.0,
     ),
     *(row for departure in DEPARTURES.values() for row in _coefficients(departure)),
@@ -202,7 +195,7 @@ OF_METAL = _table(
     Parameter(
         *("seebeck", "S", "µV K⁻¹", 1.0, -100.0, 100.0),
         "Seebeck coefficient, which counts with thermoelectricity",
-        spread=_SEEBECK,
+        spread=5.0,
         relative=False,
         counts="thermoelectric",
         value=0.0,
@@ -353,10 +346,12 @@ def parameter_named(name: str) -> Parameter:
             symbol=f"{declared.symbol} ({material})",
             meaning=f"{declared.meaning}, {material}",
         )
-    ending = max((unit for unit in _UNITS if name.endswith(f"_{unit}")), key=len, default="")
+    # by the endings of names in probe files
+    units = {"um": "µm", "ohm": "Ω", "V": "V", "K": "K", "deg": "°", "K_per_mW": "K/mW"}
+    ending = max((unit for unit in units if name.endswith(f"_{unit}")), key=len, default="")
     stem = name.removesuffix(f"_{ending}")
     words = stem.replace(".", " ").replace("_", " ")
-    return Parameter(name, words, _UNITS.get(ending, "1"), 1.0, -math.inf, math.inf, words)
+    return Parameter(name, words, units.get(ending, "1"), 1.0, -math.inf, math.inf, words)
 
 
 def label(name: str) -> str:

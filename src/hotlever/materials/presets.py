@@ -76,15 +76,16 @@ PRESETS: dict[str, Preset] = {
     ),
 }
 
-#: What kinds of silicon have in place of the paper's values. Lattice mobility exponent of holes:
-#: Arora et al., IEEE Trans. Electron Devices 29, 292 (1982).
-_OF_THEIR_OWN = {"p-silicon": {"p": 2.23}}
 
 # --- the paper's silicon --------------------------------------------------------------------------
 
-_FIELDS: Any = {name: (float, field_of(parameter)) for name, parameter in OF_SILICON.items()}
 #: A record with a number for each parameter of silicon.
-_Numbers: Any = create_model("_Numbers", __base__=Record, __module__=__name__, **_FIELDS)
+_Numbers: Any = create_model(
+    "_Numbers",
+    __base__=Record,
+    __module__=__name__,
+    **dict[str, Any]({name: (float, field_of(each)) for name, each in OF_SILICON.items()}),
+)
 
 
 class Material(_Numbers):
@@ -170,5 +171,7 @@ def usual_values(kind: str) -> dict[str, Any]:
     """Return the values that parameters of a kind have where a probe file leaves them out."""
     if KINDS[kind].family is not OF_SILICON:
         return {}
-    values = REFERENCE.model_dump() | _OF_THEIR_OWN.get(kind, {})
+    # lattice mobility exponent of holes: Arora et al., IEEE Trans. Electron Devices 29, 292 (1982)
+    own = {"p-silicon": {"p": 2.23}}
+    values = REFERENCE.model_dump() | own.get(kind, {})
     return {name: values[name] for name in KINDS[kind].declared if name in values}

@@ -24,10 +24,6 @@ from hotlever.tables import read_table
 from hotlever.text import with_unit
 from hotlever.units import name_and_unit, product_conversion, unknown_unit
 
-#: Names of materials.
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-#: Endings of names of files that hold a table of two columns, the temperature and a property.
-_FILE = re.compile(r".+\.(csv|tsv|txt|dat)", re.IGNORECASE)
 #: The section of stored values in which the classes are named.
 LAWS = "laws"
 
@@ -132,7 +128,8 @@ def materials_of(
     """
     materials = {}
     for name, section in sections.items():
-        if not _NAME.fullmatch(name) or name in (*reserved, LOW_DOPED, HIGH_DOPED):
+        taken = name in (*reserved, LOW_DOPED, HIGH_DOPED)
+        if taken or not re.fullmatch("[A-Za-z][A-Za-z0-9_-]*", name):
             raise InputError(
                 f"{where}: [materials]: {quoted(name)} cannot be the name of a material, expected "
                 "a letter, then letters, digits, - or _; and no section's name"
@@ -235,7 +232,9 @@ def with_tables(values: Mapping[str, Any], folder: Path | None) -> dict[str, Any
     """
     read = dict(values)
     for name, value in values.items():
-        if name in STATED and isinstance(value, str) and _FILE.fullmatch(value.strip()):
+        # a file with a table of two columns, the temperature and the property
+        file = r"(?i).+\.(csv|tsv|txt|dat)"
+        if name in STATED and isinstance(value, str) and re.fullmatch(file, value.strip()):
             try:
                 read[name] = read_law((folder or Path()) / value, name, value)
             except InputError as error:

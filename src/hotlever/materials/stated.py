@@ -33,15 +33,13 @@ from hotlever.records import Record
 from hotlever.text import with_unit
 from hotlever.types import Array
 
-#: Temperatures at which a law is checked, and distance (K) of those between which it is integrated.
-_CHECKED, _STEP_K = 401, 5.0
-#: Gauss's rule of eighth order, on 0 to 1.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-_NODES, _WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
-#: Part of a value that a law may lose while it levels off.
-_MAY_LOSE = 0.5
-#: Rows that a table may have, and temperatures (K).
-_MOST_ROWS, _LEAST_K, _MOST_K = 2000, 1.0, 1e4
+#: Nodes and weights of Gauss's rule of eighth order, on 0 to 1.
+_GAUSS = [
+    (0.5 * (1.0 + node), 0.5 * weight)
+    for node, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True)
+]
+#: Temperatures (K) that a law may be stated for.
+_LEAST_K, _MOST_K = 1.0, 1e4
 
 # A list, which becomes a tuple.
 _Numbers = Annotated[tuple[float, ...], Strict(False), PlainSerializer(list)]
@@ -94,9 +92,8 @@ class StatedLaw(Record):
             return value, by
         slope = by["T"]
         with np.errstate(divide="ignore"):
-            width = np.minimum(
-                LEVELLING, _MAY_LOSE * np.abs(value / np.where(slope, slope, np.nan))
-            )
+            # it loses no more than half of a value while it levels off
+            width = np.minimum(LEVELLING, 0.5 * np.abs(value / np.where(slope, slope, np.nan)))
         width = np.where(np.isfinite(width) & (width > 0.0), width, 1.0)
         beyond = np.tanh(outside / width)
         rise = np.where(np.abs(value) > 0.0, slope * width * beyond, 0.0)
@@ -125,7 +122,7 @@ class StatedLaw(Record):
     ) -> Array:
         """Return the integrals between temperatures (K) of the law or of one of its derivatives."""
         total = np.zeros(np.broadcast_shapes(np.shape(low), np.shape(high)))
-        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+        for node, weight in _GAUSS:
             value, by = self(low + node * (high - low), parameters)
             total += weight * (value if name is None else by[name])
         return np.asarray(total * (high - low))
@@ -139,7 +136,7 @@ class StatedLaw(Record):
         to_K: float,
     ) -> str:
         """Say where its value is none that can be, between temperatures (K); empty if nowhere."""
-        T = np.linspace(from_K, min(to_K, self.temperature_range[1]), _CHECKED)
+        T = np.linspace(from_K, min(to_K, self.temperature_range[1]), 401)
         value, by = self.inside(T, parameters)
         low, high = within
         wrong = ~((value >= low) & (value <= high)) | ~np.isfinite(by["T"])
@@ -209,7 +206,7 @@ class Formula(StatedLaw):
     @property
     def edges(self) -> Array:
         """Temperatures (K) between which it is integrated."""
-        steps = int(np.ceil((self.to_K - self.from_K) / _STEP_K))
+        steps = int(np.ceil((self.to_K - self.from_K) / 5.0))
         return np.linspace(self.from_K, self.to_K, steps + 1)
 
     def inside(self, T: Array, parameters: Mapping[str, float]) -> Evaluated:
@@ -236,10 +233,10 @@ class Table(StatedLaw):
     @model_validator(mode="after")
     def _has_rising_temperatures_with_values(self) -> Self:
         T = self.edges
-        if T.size != len(self.values) or not 2 <= T.size <= _MOST_ROWS:
+        if T.size != len(self.values) or not 2 <= T.size <= 2000:
             raise ValueError(
                 f"{counted(T.size, 'temperature')} and {counted(len(self.values), 'value')}, "
-                f"expected as many, 2 to {_MOST_ROWS}"
+                "expected as many, 2 to 2000"
             )
         if not (np.diff(T) > 0).all():
             row = int((np.diff(T) <= 0).argmax())

@@ -20,27 +20,19 @@ import numpy as np
 from numpy.polynomial.chebyshev import Chebyshev, chebpts1
 from numpy.typing import ArrayLike
 
-from hotlever.materials.laws import Evaluated, Partials, law
-from hotlever.materials.p_silicon import carried_in_p_silicon
+from hotlever.materials.laws import Evaluated, law
 from hotlever.materials.silicon import (
     BOLTZMANN,
     Carried,
     Carrier,
     carried_in_n_silicon,
+    carried_in_p_silicon,
     conducted,
     conductivity_high_doped,
     density_of_states,
 )
 from hotlever.piecewise import hermite_cubic
 from hotlever.types import Array
-
-#: Charge of the carriers, in elementary charges.
-SIGN: dict[Carrier, float] = {"electron": -1.0, "hole": 1.0}
-#: Doping (cm⁻³) of silicon whose own carriers are all that count where κ was measured hot.
-_PURE = 1e12
-#: Up to which ratio of carriers to states the reduced Seebeck coefficient is tabulated; the degree
-#: of the polynomial through the integrals, their points, and the cells of the table.
-_DENSEST, _DEGREE, _POINTS, _CELLS = 1e4, 60, 6000, 2000
 
 
 class _Cubic(NamedTuple):
@@ -55,7 +47,7 @@ class _Cubic(NamedTuple):
     @classmethod
     def of(cls, function: Chebyshev) -> _Cubic:
         """Return a smooth function's, with its values and slopes at the ends of the cells."""
-        ends, cell = np.linspace(0.0, function.domain[1], _CELLS + 1, retstep=True)
+        ends, cell = np.linspace(0.0, function.domain[1], 2001, retstep=True)
         return cls(float(cell), hermite_cubic(ends, function(ends), function.deriv()(ends)).c)
 
     def __call__(self, w: Array) -> tuple[Array, Array]:
@@ -85,11 +77,13 @@ def _reduced_seebeck(scattering_exponent: float) -> _Reduced:
     both over k_B T: ⟨x⟩ − η, with weights x^(r + 3/2) (−∂f/∂x).
     """
     # x = exp(t − exp(−t)): both ends of the integrals fall faster than exponentially
-    t, step = np.linspace(-4.0, 8.0, _POINTS, retstep=True)
+    t, step = np.linspace(-4.0, 8.0, 6000, retstep=True)
     x = np.exp(t - np.exp(-t))
     measure = step * x * (1.0 + np.exp(-t))
-    domain = 0.0, math.log1p(_DENSEST)
-    nodes = 0.5 * (chebpts1(_DEGREE + 1) + 1.0) * domain[1]
+    # up to 1e4 carriers for each state
+    domain = 0.0, math.log1p(1e4)
+    degree = 60
+    nodes = 0.5 * (chebpts1(degree + 1) + 1.0) * domain[1]
     density = np.expm1(nodes)
     eta = _fermi_level(density, x, measure)
     weight = _edge(x, eta) * x ** (scattering_exponent + 1.5) * measure
@@ -97,7 +91,7 @@ def _reduced_seebeck(scattering_exponent: float) -> _Reduced:
     log_x = np.log(x)
     mean, mean_log = weight @ x, weight @ log_x
     rows = mean - eta + np.log(density), weight @ (x * log_x) - mean * mean_log
-    functions = (Chebyshev.fit(nodes, row, _DEGREE, domain=domain) for row in rows)
+    functions = (Chebyshev.fit(nodes, row, degree, domain=domain) for row in rows)
     return _Reduced(*map(_Cubic.of, functions))
 
 
@@ -153,7 +147,7 @@ def seebeck_of_band(
     reduced = _reduced_seebeck(scattering_exponent)
     ratio = density / full
     w = np.log1p(ratio)
-    scale = SIGN[carrier] * BOLTZMANN
+    scale = -BOLTZMANN if carrier == "electron" else BOLTZMANN
     value, slope = reduced.value(w)
     by_ratio = scale * (slope / (1.0 + ratio) - 1.0 / ratio)
     names = set(d_density) | set(d_full)
@@ -165,7 +159,7 @@ def seebeck_of_band(
     return scale * (value - np.log(ratio)), by
 
 
-def _add(to: Partials, by: Partials, factor: Array) -> None:
+def _add(to: dict[str, Array], by: dict[str, Array], factor: Array) -> None:
     """Add derivatives, by name, to others."""
     for name, value in by.items():
         to[name] = to.get(name, np.zeros(())) + factor * value
@@ -173,7 +167,7 @@ def _add(to: Partials, by: Partials, factor: Array) -> None:
 
 def _summed(beside: Iterable[tuple[Evaluated, Evaluated]]) -> Evaluated:
     """Return σ, β and γ, (3, ...), by σ (S cm⁻¹) and S (V/K) of carriers beside each other."""
-    total, total_by = [np.zeros(()) for _ in range(3)], [Partials() for _ in range(3)]
+    total, total_by = [np.zeros(()) for _ in range(3)], [dict[str, Array]() for _ in range(3)]
     for (sigma, d_sigma), (S, d_S) in beside:
         for power in range(3):
             total[power] = total[power] + sigma * S**power
@@ -196,7 +190,8 @@ def _bipolar(summed: Evaluated) -> Evaluated:
 def _beside_pure(T: Array, n: ArrayLike) -> Array:
     """Return the doping at each temperature and, as a second one, that of pure silicon."""
     n = np.broadcast_to(np.asarray(n, dtype=float), np.broadcast_shapes(T.shape, np.shape(n)))
-    return np.stack([n, np.full_like(n, _PURE)])
+    # the carriers of silicon itself are all that count where κ was measured hot
+    return np.stack([n, np.full_like(n, 1e12)])
 
 
 def _less_pure(carried: Sequence[Carried], T: Array, exponent: float) -> Evaluated:

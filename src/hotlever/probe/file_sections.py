@@ -11,7 +11,7 @@ from typing import Any
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text
 from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind
-from hotlever.materials.kinds import BY_THICKNESS, Silicon
+from hotlever.materials.kinds import Silicon
 from hotlever.materials.sections import LAWS, classes_at_hand, materials_of
 from hotlever.materials.stated import names_stated
 from hotlever.probe.circuit import Contact
@@ -123,11 +123,11 @@ def parts_of(
         kind = materials[name]
         stated = isinstance(section, Kind) or "c_kappa" in section
         if isinstance(kind, Silicon) and name in by_thickness and not stated:
-            materials[name] = kind.model_copy(update={"c_kappa": BY_THICKNESS})
+            materials[name] = kind.model_copy(update={"c_kappa": "thickness"})
     parts: dict[str, Any] = {"shape": shape, MATERIALS: materials}
     usual = REFERENCE
     if not by_thickness.isdisjoint({LOW_DOPED, HIGH_DOPED}):
-        usual = REFERENCE.model_copy(update={"c_kappa": BY_THICKNESS})
+        usual = REFERENCE.model_copy(update={"c_kappa": "thickness"})
         parts[MATERIAL] = usual
     for name in (name for name in PARTS if name in values):
         own = usual.model_dump() if name == MATERIAL else {}

@@ -10,7 +10,7 @@ import math
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
-from hotlever.materials.parameters import IN_TIME, own_name, parameter_named
+from hotlever.materials.parameters import own_name, parameter_named
 from hotlever.probe.chip import CHIP, usual_chip
 from hotlever.probe.circuit import MOST_OFFSET_V
 from hotlever.probe.parts import ProbeParts
@@ -82,7 +82,7 @@ def of_materials(
     ['c_kappa', 'delta', 'n_d', 'p', 'a0', 'a1', 'impurity_exponent', 'intrinsic_scale', 'kappa_1']
     """
     usual, effects = usual_parameters(probe), probe.physics.effects
-    counting = {"", *effects, *([IN_TIME] if in_time else [])}
+    counting = {"", *effects, *(["in time"] if in_time else [])}
     table = {
         name: parameter._replace(
             name=name,
@@ -137,7 +137,7 @@ def heat_capacities(probe: ProbeParts) -> tuple[str, ...]:
     return tuple(
         name
         for name, parameter in of_materials(probe, in_time=True).items()
-        if parameter.counts == IN_TIME
+        if parameter.counts == "in time"
     )
 
 

@@ -44,7 +44,6 @@ from hotlever.lever import Branch, Lever, OperatingPoint
 from hotlever.lever.lever import COARSE
 from hotlever.materials.departures import FACTORS, MODES_FROM, MODES_TO, departure_of
 from hotlever.materials.heat import thermal_conductivity
-from hotlever.materials.kinds import BY_THICKNESS
 from hotlever.materials.silicon import intrinsic_density, inversion_temperature
 from hotlever.probe import Probe, Tip
 from hotlever.raman.thermometer import published_raman_calibration
@@ -297,7 +296,7 @@ def suspect_lever(probe: Probe, suspect: str) -> tuple[Probe, bool]:
     if suspect == Suspect.IN_AIR or (everything and probe.surroundings.medium == "air"):
         probe = probe.model_copy(update={"tip": tip.with_(in_air=True)})
     if Suspect.FILM in has:
-        probe = probe.with_(c_kappa=BY_THICKNESS)
+        probe = probe.with_(c_kappa="thickness")
     if Suspect.SURFACES in has:
         c_kappa = float(probe.values(["c_kappa"])[0])
         probe = _departed(probe, "kappa", lambda T: scattered_at_surfaces(T, c_kappa))
