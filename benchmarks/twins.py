@@ -59,7 +59,7 @@ from hotlever.lever.discretisation import chosen_space, energy_between_degrees, 
 from hotlever.lever.full_space import FullSpace
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.parts import PriorTexts
-from hotlever.probe.priors import ALL_LAWS, PAPERS, UNCERTAIN, default_priors, updated
+from hotlever.probe.priors import default_priors, updated
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.studies.simulation_based_calibration import (
     DEPARTURES,
@@ -187,7 +187,7 @@ def judge_heater(
     data, _, solved = measure(lever, rng, "iv", noise=noise)
     exact = {name: _EXACT for name in held if name in default_priors(nominal)}
     try:
-        found = calibrate(data, probe=nominal, priors={ALL_LAWS: laws, **exact, **prior})
+        found = calibrate(data, probe=nominal, priors={"laws": laws, **exact, **prior})
     except HotleverError as error:
         return {"refused": str(error)}
     tip = solved.sweep(found.table.bias_V.values).tip_K.values
@@ -541,7 +541,7 @@ def _drawn(rng: Generator, nominal: Probe, obey: bool) -> Probe:
     bounds, values = parameters_of(nominal, anywhere=True), dict[str, float]()
     known = default_priors(nominal)
     if obey:
-        known = updated(known, {ALL_LAWS: PAPERS}, nominal, "levers")
+        known = updated(known, {"laws": "paper"}, nominal, "levers")
     for name, prior in known.items():
         values[name] = value = prior.at(float(rng.standard_normal()))
         if not bounds[name].lower <= value <= bounds[name].upper:
@@ -602,7 +602,7 @@ def _measured(rng: Generator, true: Probe, branch: Branch) -> tuple[Measurement,
 
 
 def judge_little_known(
-    number: int, medium: str | None = None, laws: str = UNCERTAIN, obey: bool = False
+    number: int, medium: str | None = None, laws: str = "uncertain", obey: bool = False
 ) -> dict[str, Any]:
     """Make the lever of a number, calibrate it, and compare with its true temperature.
 
@@ -637,7 +637,7 @@ def judge_little_known(
     }
     began = time.process_time()
     try:
-        calibration = calibrate(data, probe=probe, priors={ALL_LAWS: laws})
+        calibration = calibrate(data, probe=probe, priors={"laws": laws})
     except Exception as error:  # also what should never come is a result here
         record |= {"outcome": FAILED, "exception": type(error).__name__, "reason": str(error)}
         return record | {"seconds": time.process_time() - began}
@@ -667,7 +667,7 @@ if __name__ == "__main__":
     listed = listed.replace("%", "%%")  # argparse formats its help
     parser.add_argument("--without", nargs="+", choices=DEPARTURES, default=[], help=listed)
     parser.add_argument("--noise", type=float, default=NOISE, help="of meters, a share")
-    parser.add_argument("--laws", choices=(UNCERTAIN, PAPERS), default=UNCERTAIN)
+    parser.add_argument("--laws", choices=("uncertain", "paper"), default="uncertain")
     parser.add_argument("--obey", action="store_true", help="wild levers obey the paper's laws")
     parser.add_argument("--drawn", action="store_true", help="levers whose heaters are off")
     parser.add_argument("--wild", action="store_true", help="levers of which little is known")

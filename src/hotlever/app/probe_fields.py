@@ -34,7 +34,7 @@ from hotlever.probe.drawing.outlines import DrawingError
 from hotlever.probe.drawing.shape import TOLERANCE_UM, DrawnShape
 from hotlever.probe.drawing.sheet import read_sheet
 from hotlever.probe.file_sections import file_text, read_sections
-from hotlever.probe.shapes import DRAWING, EDGE_BIAS, PARAMETRIC, SHAPE_SECTIONS
+from hotlever.probe.shapes import EDGE_BIAS, PARAMETRIC, SHAPE_SECTIONS
 
 # Sections of a probe file by name.
 Sections = dict[str, Any]
@@ -332,7 +332,7 @@ def settable(report: Report, sections: Sections) -> dict[str, Any]:
     shape = str(parts["probe"].get("shape"))
     cards = [_card(("materials", name), section) for name, section in parts["materials"].items()]
     return {
-        "layers": _rows(parts) if shape == DRAWING else [],
+        "layers": _rows(parts) if shape == "drawing" else [],
         "materials": list(parts["materials"]),
         "cards": [_other(name, sections.get(name, {}), own) for name, own in _others(shape)]
         + cards,
@@ -377,7 +377,7 @@ def _new_materials() -> dict[str, str]:
 
 def _others(shape: str) -> Iterator[tuple[str, dict[str, str]]]:
     """Give the sections that are no material, with what their numbers are, for a kind of shape."""
-    if shape == DRAWING:
+    if shape == "drawing":
         meanings = DrawnShape.description()
         yield "probe", {key: meanings[key] for key in ("thickness_um", "tip_um")}
     elif shape in PARAMETRIC:

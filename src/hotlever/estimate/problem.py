@@ -24,9 +24,7 @@ from hotlever.measurement import Measurement, with_measured_circuit
 from hotlever.measurement.data import check_sample
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
-from hotlever.probe.chip import CHIP
 from hotlever.probe.priors import (
-    ALL_DIMENSIONS,
     Prior,
     as_known,
     default_priors,
@@ -110,7 +108,7 @@ class Problem:
             probe.circuit.need_cold_start("a fit in time")
         probe, notes = with_measured_circuit(probe, measurement, options.medium)
         notes += note_on_averages(whole, measurement) + check_sample(measurement, probe)
-        if not in_time and (options.usual_priors or CHIP in options.priors):
+        if not in_time and (options.usual_priors or "chip_K_per_mW" in options.priors):
             # that none is stated says nothing against the usual ones
             probe = as_known(probe, options.priors or None)
         options = options.of(probe, in_time=in_time)
@@ -189,7 +187,7 @@ def _priors(
     without_effect = [
         name
         for name in options.priors
-        if name not in (*priors, ALL_DIMENSIONS) and not is_of_laws(name)
+        if name not in (*priors, "dimensions") and not is_of_laws(name)
     ]
     if without_effect:
         notes.append(

@@ -31,7 +31,6 @@ from hotlever.materials.parameters import is_of_material, own_name
 from hotlever.measurement import Measurement
 from hotlever.piecewise import spline_through
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.chip import CHIP
 from hotlever.probe.surroundings import Surroundings
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.text import BAND
@@ -46,7 +45,7 @@ OF_THE_MEASUREMENT = {
     "gas_conductivity": "air",
     "surface_gap_um": "air",
     "base_temperature_K": "base temperature",
-    CHIP: "base temperature",
+    "chip_K_per_mW": "base temperature",
     "interface_K_per_mW": "contact",
 }
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from hotlever.lever.lever import Lever
 from hotlever.probe import Probe
-from hotlever.probe.priors import ALL_LAWS, PAPERS, draw_values, known_beforehand
+from hotlever.probe.priors import draw_values, known_beforehand
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS
@@ -64,7 +64,7 @@ class RampCurve:
 
 def drawn_from_priors(probe: Probe, rng: np.random.Generator) -> Probe:
     """Return a lever like a probe: what is not known exactly of it is drawn from its priors."""
-    priors = known_beforehand(probe, {ALL_LAWS: PAPERS})
+    priors = known_beforehand(probe, {"laws": "paper"})
     of_lever = {name: priors[name] for name in parameters_of(probe) if name in priors}
     return probe.replace(draw_values(of_lever, rng))
 

@@ -47,7 +47,6 @@ from hotlever.materials import Kind
 from hotlever.materials.air import kirchhoff_variable
 from hotlever.materials.laws import Evaluated
 from hotlever.probe import Probe
-from hotlever.probe.chip import CHIP
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.surroundings import THE_PAPERS, Physics
 from hotlever.types import Array, Index
@@ -355,7 +354,9 @@ class LeverEquations:
             if name in moved:
                 tested[..., column] += moved[name].tested(at_points, weights)
         # by these parameters heat leaves the surface or the leg ends, whatever radiates or touches
-        surface = [name for name in names if name in {GAS, GAP, BASE, CHIP} or self._has_losses]
+        surface = [
+            name for name in names if name in {GAS, GAP, BASE, "chip_K_per_mW"} or self._has_losses
+        ]
         if surface:
             columns = [names.index(name) for name in surface]
             on_surface = self._on_surface(x, surface)
@@ -397,7 +398,7 @@ class LeverEquations:
                 weak[..., column] += air.weak_form(kappa_air - cold)
             elif name == GAP:
                 weak[..., column] += air.change_with_gap(theta)
-            elif name == CHIP:
+            elif name == "chip_K_per_mW":
                 by_chip = -(self.terminals.chip_mW_per_K**2)
                 self.terminals.add_heat_into_chip(weak[..., column], x, by_chip)
         return weak

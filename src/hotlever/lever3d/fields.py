@@ -20,7 +20,7 @@ from hotlever.lever.lever import State
 from hotlever.lever3d.lever import SolidLever, surface_nodes
 from hotlever.lever3d.still_air import ngsolve
 from hotlever.materials.air import temperature_from_kirchhoff
-from hotlever.probe.solid import AIR, material_names
+from hotlever.probe.solid import material_names
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
@@ -59,7 +59,7 @@ def write_solid_vtu(state: State, path: str | os.PathLike[str]) -> None:
     """
     solid = _solid(state).solid
     points, elements = np.array(solid.netgen.Coordinates()), solid.netgen.Elements3D().NumPy()
-    air = elements["nodes"][material_names(solid.netgen) == AIR, :4].astype(np.intp) - 1
+    air = elements["nodes"][material_names(solid.netgen) == "air", :4].astype(np.intp) - 1
     # the image ball is not part of it
     tetrahedra = np.concatenate([solid.vertices[solid.elements.t.T], air])
     used, numbers = np.unique(tetrahedra, return_inverse=True)

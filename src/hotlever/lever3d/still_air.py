@@ -18,7 +18,6 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import LinearOperator
 
 from hotlever.errors import InputError
-from hotlever.probe.solid import AIR, IMAGE, LEVER_SURFACE, SPHERE
 from hotlever.types import Array, Index
 
 
@@ -78,12 +77,12 @@ class OpenAir:
         self.centre, self.radius_um, self.order = centre, radius_um, order
         self.mesh = ng.Mesh(mesh)
         self.mesh.Curve(2)
-        self.space = ng.Periodic(ng.H1(self.mesh, order=order, definedon=f"{AIR}|{IMAGE}"))
+        self.space = ng.Periodic(ng.H1(self.mesh, order=order, definedon="air|image"))
         trial, test = self.space.TnT()
         form = ng.BilinearForm(self.space, symmetric=True)
-        for part in (AIR, IMAGE):
+        for part in ("air", "image"):
             form += ng.grad(trial) * ng.grad(test) * ng.dx(part)
-        form += (1.0 / radius_um) * trial * test * ng.ds(SPHERE)
+        form += (1.0 / radius_um) * trial * test * ng.ds("sphere")
         form.Assemble()
         rows, columns, values = form.mat.COO()
         shape = (self.space.ndof, self.space.ndof)
@@ -103,7 +102,7 @@ class OpenAir:
 
         Returns the degrees of freedom on the body, which θ there determines.
         """
-        surface = self.mesh.Boundaries(LEVER_SURFACE)
+        surface = self.mesh.Boundaries("lever")
         vertices = {vertex.nr for face in surface.Elements() for vertex in face.vertices}
         edges = {edge.nr: edge for face in surface.Elements() for edge in face.edges}
         ordered = [edges[number] for number in sorted(edges)]

@@ -18,11 +18,6 @@ from hotlever.probe.parts import ProbeParts
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
-#: The value of a probe file that says it.
-CHIP = "chip_K_per_mW"
-#: What a holder, glue or a clip usually adds (K/mW), of which nothing is known but its size.
-_HOLDER = 1.0
-
 _Probe = TypeVar("_Probe", bound=ProbeParts)
 
 
@@ -69,14 +64,15 @@ def spreading_K_per_mW(layout: Layout, base_temperature_K: float) -> float:
 
 def usual_chip(probe: ProbeParts) -> float:
     """Return what a chip in its holder usually has (K/mW): spreading, and a holder."""
-    return spreading_K_per_mW(probe.layout(), probe.circuit.base_temperature_K) + _HOLDER
+    # a holder, glue or a clip usually adds as much (K/mW), of which nothing is known but its size
+    return spreading_K_per_mW(probe.layout(), probe.circuit.base_temperature_K) + 1.0
 
 
 def on_usual_chip(probe: _Probe, without: bool = False) -> _Probe:
     """Return a probe on a chip that gets warm as is usual, if its file says nothing of one."""
     if probe.circuit.chip_K_per_mW or without:
         return probe
-    return probe.replace({CHIP: usual_chip(probe)})
+    return probe.replace({"chip_K_per_mW": usual_chip(probe)})
 
 
 def in_pulses(probe: _Probe) -> _Probe:
@@ -85,4 +81,4 @@ def in_pulses(probe: _Probe) -> _Probe:
     if not at_rest:
         return probe
     spreading = spreading_K_per_mW(probe.layout(), probe.circuit.base_temperature_K)
-    return probe if at_rest <= spreading else probe.replace({CHIP: spreading})
+    return probe if at_rest <= spreading else probe.replace({"chip_K_per_mW": spreading})

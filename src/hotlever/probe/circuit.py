@@ -24,24 +24,17 @@ from hotlever.records import Record
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array
 
-#: Largest resistance of a circuit (Ω), smallest of a bridge, and the largest gain.
-_MOST_OHM, _LEAST_OHM, _MOST_GAIN = 1e7, 1e-3, 1e6
 #: Largest offset of an amplifier (V).
 MOST_OFFSET_V = 10.0
-#: Resistance (kΩ) behind which a voltage is held where none is given: ten nano-ohm, far less than
-#: any contact has.
-_NEARLY_NONE = 1e-11
-#: Largest voltage (V) and current (mA) of a held supply.
-_MOST = 1000.0
 
 
-def resistance(meaning: str, default: float) -> Any:
-    """Return the field of a resistor (Ω) that may be none."""
-    return Field(default=default, ge=0, le=_MOST_OHM, description=meaning)
+def resistance(meaning: str, default: float | None, least: float = 0) -> Any:
+    """Return the field of a resistor (Ω), which may be none."""
+    return Field(default=default, ge=least, le=1e7, description=meaning)
 
 
 def _of_bridge(meaning: str) -> Any:
-    return Field(default=None, ge=_LEAST_OHM, le=_MOST_OHM, description=f"of a bridge, {meaning}")
+    return resistance(f"of a bridge, {meaning}", None, least=1e-3)
 
 
 class Contact(Record):
@@ -55,10 +48,10 @@ class Contact(Record):
 
     kind: Literal["supply", "ground", "sense"]
     bias_V: float | None = Field(
-        default=None, ge=-_MOST, le=_MOST, description="of a supply that holds a voltage"
+        default=None, ge=-1000.0, le=1000.0, description="of a supply that holds a voltage"
     )
     current_mA: float | None = Field(
-        default=None, ge=-_MOST, le=_MOST, description="of a supply that holds a current"
+        default=None, ge=-1000.0, le=1000.0, description="of a supply that holds a current"
     )
     series_resistance_ohm: float = resistance("between the terminal and its supply or ground", 0.0)
     base_temperature_K: float | None = Field(
@@ -94,7 +87,8 @@ class Contact(Record):
         """Its conductance (mA/V) and short-circuit current (mA), as Norton has them."""
         if self.current_mA is not None:
             return 0.0, self.current_mA
-        conductance = 1.0 / max(self.series_resistance_ohm / 1000.0, _NEARLY_NONE)
+        # a held voltage is behind at least ten nano-ohm, far less than any contact has
+        conductance = 1.0 / max(self.series_resistance_ohm / 1000.0, 1e-11)
         return conductance, conductance * (self.bias_V or 0.0)
 
 
@@ -163,8 +157,8 @@ class Circuit(Record):
     bridge_lower_ohm: float | None = _of_bridge("from there to ground")
     bridge_gain: float | None = Field(
         default=None,
-        ge=-_MOST_GAIN,
-        le=_MOST_GAIN,
+        ge=-1e6,
+        le=1e6,
         description="of the bridge's amplifier; 1 if left out",
     )
     bridge_offset_V: float = Field(

@@ -16,8 +16,6 @@ from hotlever.materials.sections import LAWS, classes_at_hand, materials_of
 from hotlever.materials.stated import names_stated
 from hotlever.probe.circuit import Contact
 from hotlever.probe.parts import (
-    MATERIAL,
-    MATERIALS,
     PARTS,
     SECTIONS,
     PriorTexts,
@@ -26,8 +24,6 @@ from hotlever.probe.parts import (
 )
 from hotlever.probe.priors import priors_of
 from hotlever.probe.shapes import (
-    DRAWING,
-    DRAWN,
     PARAMETRIC,
     PARAMETRIC_DRAWING,
     SHAPE_SECTIONS,
@@ -41,12 +37,6 @@ from hotlever.records import Record
 from hotlever.spieser2017 import DOI
 from hotlever.text import as_toml
 
-#: Bytes that a probe file may have, and characters of a line: a key of thousands of parts takes
-#: gigabytes to read.
-_LARGEST, _LONGEST_LINE = 1_000_000, 1000
-#: Column in which comments begin.
-_COMMENTS = 32
-
 
 def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read a probe file (TOML).
@@ -56,7 +46,7 @@ def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
     InputError
         If the file cannot be read or is not TOML.
     """
-    return sections_of(read_text(path, largest=_LARGEST), str(path))
+    return sections_of(read_text(path, largest=1_000_000), str(path))
 
 
 def sections_of(text: str, path: str) -> dict[str, Any]:
@@ -68,9 +58,10 @@ def sections_of(text: str, path: str) -> dict[str, Any]:
         If it is not TOML.
     """
     for number, line in enumerate(text.splitlines(), start=1):
-        if len(line) > _LONGEST_LINE:
+        # a key of thousands of parts takes gigabytes to read
+        if len(line) > 1000:
             raise InputError(
-                f"{path}: line {number}: {len(line)} characters, expected at most {_LONGEST_LINE}"
+                f"{path}: line {number}: {len(line)} characters, expected at most 1000"
             )
     try:
         values = tomllib.loads(text)
@@ -109,28 +100,28 @@ def parts_of(
             raise InputError(f"{where}: [{name}] must be a section, found {quoted(section)}")
     if "probe" not in values:
         raise InputError(f"{where}: section [probe] is missing")
-    materials = materials_of(values.get(MATERIALS, {}), where, SECTIONS, folder, classes)
+    materials = materials_of(values.get("materials", {}), where, SECTIONS, folder, classes)
     kinds = {name: kind.kind for name, kind in materials.items()}
     shape = _shape_of(values, where, folder, kinds, like)
     for name in materials:
         if name not in shape.materials:
             raise InputError(
-                f"{where}: [{MATERIALS}.{name}]: no layer is made of it, expected [layers.…] "
+                f"{where}: [materials.{name}]: no layer is made of it, expected [layers.…] "
                 f'with material = "{name}"'
             )
     by_thickness = _other_thickness(shape)
-    for name, section in values.get(MATERIALS, {}).items():
+    for name, section in values.get("materials", {}).items():
         kind = materials[name]
         stated = isinstance(section, Kind) or "c_kappa" in section
         if isinstance(kind, Silicon) and name in by_thickness and not stated:
             materials[name] = kind.model_copy(update={"c_kappa": "thickness"})
-    parts: dict[str, Any] = {"shape": shape, MATERIALS: materials}
+    parts: dict[str, Any] = {"shape": shape, "materials": materials}
     usual = REFERENCE
     if not by_thickness.isdisjoint({LOW_DOPED, HIGH_DOPED}):
         usual = REFERENCE.model_copy(update={"c_kappa": "thickness"})
-        parts[MATERIAL] = usual
+        parts["material"] = usual
     for name in (name for name in PARTS if name in values):
-        own = usual.model_dump() if name == MATERIAL else {}
+        own = usual.model_dump() if name == "material" else {}
         record_class = classes.get(name, PARTS[name])
         parts[name] = record_class.from_values({**own, **values[name]}, f"{where}: [{name}]")
     return parts
@@ -164,7 +155,7 @@ def _shape_of(
         raise InputError(f"{here}: shape is missing (one of: {', '.join(SHAPES)})")
     if not isinstance(name, str) or name not in (*SHAPES, PARAMETRIC_DRAWING):
         raise unknown_name("shape", str(name), SHAPES, here)
-    if name == DRAWING:
+    if name == "drawing":
         # imported here: most probes are drawn by their dimensions
         from hotlever.probe.drawing.shape import DrawnShape
 
@@ -191,9 +182,9 @@ def check_together(probe: ProbeParts, stated: Mapping[str, Any], where: str) -> 
     """
     layout = probe.layout()
     probe.circuit.check(layout.terminal_names, probe.surroundings.medium, where)
-    if MATERIAL in stated and not probe.has_plain_silicon:
+    if "material" in stated and not probe.has_plain_silicon:
         raise InputError(
-            f"{where}: [{MATERIAL}]: no layer is made of it, expected no "
+            f"{where}: [material]: no layer is made of it, expected no "
             "such section, or a layer without a material of its own"
         )
     if probe.monitor is not None:
@@ -228,7 +219,7 @@ def field_of(probe: ProbeParts, name: str) -> tuple[str, str, type[Record]]:
         "probe": type(probe.shape),
         **named,
         **PARTS,
-        MATERIAL: type(probe.material),
+        "material": type(probe.material),
         **wired,
         **{f"layers.{layer}": record for layer, record in probe.shape.layer_records().items()},
     }
@@ -243,14 +234,14 @@ def field_of(probe: ProbeParts, name: str) -> tuple[str, str, type[Record]]:
     own = [part for part in PARTS if getattr(probe, part)]
     # those of a named material have its name before them
     for part in [section] if dot else ["probe", *own, *PARTS]:
-        if part == MATERIAL and not probe.has_plain_silicon:
+        if part == "material" and not probe.has_plain_silicon:
             continue
         if key in keys[part] or (dot and records[part] is PriorTexts):
             return part, key, records[part]
     # a prior has the name of what it is of
     dotted = {*named, *wired}
     if not probe.has_plain_silicon:
-        del keys[MATERIAL]
+        del keys["material"]
     full = [f"{part}.{key}" if part in dotted else key for part in keys for key in keys[part]]
     choices = keys[section] if dot else full
     raise unknown_name("name", key, dict.fromkeys(choices))
@@ -280,11 +271,11 @@ def changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str,
         if key in probe.shape.read_with:
             raise InputError(f"{name} counts when a drawing is read, expected it in the probe file")
         inside, (*above, last) = sections, section.split(".")
-        for part in [MATERIALS] if section in probe.materials else above:
+        for part in ["materials"] if section in probe.materials else above:
             inside = inside.setdefault(part, {})
         if not isinstance(inside.setdefault(last, {}), Mapping):
             # a layer of which no more was said than where it is drawn
-            inside[last] = {DRAWN: inside[last]}
+            inside[last] = {"drawn": inside[last]}
         inside[last][key] = value
         if section in probe.materials:
             useless = type(probe.materials[section]).without_use(inside[last])
@@ -303,7 +294,7 @@ def changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str,
 
 def commented(entry: str, text: str | None) -> str:
     """Return a line of a probe file with a comment, if there is one."""
-    return f"{entry:<{_COMMENTS - 2}}  # {text}" if text else entry
+    return f"{entry:<30}  # {text}" if text else entry
 
 
 def section_lines(
@@ -357,7 +348,7 @@ def file_text(probe: ProbeParts, shape: Mapping[str, Any], meaning: Mapping[str,
 def other_sections(probe: ProbeParts, without: Container[str] = ()) -> str:
     """Return the sections of a probe's file beside those of its shape, some of them left out."""
     lines = []
-    named = {f"{MATERIALS}.{name}": kind for name, kind in probe.materials.items()}
+    named = {f"materials.{name}": kind for name, kind in probe.materials.items()}
     for name, part in (named | probe.parts).items():
         if name in without:
             continue

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from hotlever.errors import InputError, counted
 from hotlever.probe.drawing.edges import outline_edges, terminal_edges
-from hotlever.probe.drawing.layers import BODY, DRAWN, HEATER, REQUIRED, SILICON, terminal_part
+from hotlever.probe.drawing.layers import REQUIRED, terminal_part
 from hotlever.probe.drawing.outlines import (
     DrawingError,
     Ring,
@@ -39,14 +39,8 @@ from hotlever.probe.drawing.sheet import (
 )
 from hotlever.probe.file_sections import other_sections, section_lines
 from hotlever.probe.layout import Point, ring_area
-from hotlever.probe.parts import MATERIAL
 from hotlever.probe.probe import Probe
-from hotlever.probe.shapes import DRAWING
 from hotlever.text import aligned, as_toml
-
-SUPPLY, GROUND, READER = "supply", "ground", "reader"
-#: A film that is heater and legs in one, on a body that is not of silicon.
-FILM = "film"
 
 #: A layer by its name, or outlines.
 Drawn = str | tuple[Ring, ...]
@@ -102,7 +96,7 @@ def infer_layers(
         inferred.doubts.append("no layer holds a closed outline")
         return inferred
     best, film = _body_and_film(best, judged)
-    body = SILICON if film is None else BODY
+    body = "silicon" if film is None else "body"
     inferred.layers[body] = best.name
     touched = len(best.cutters) + len(best.touching)
     verbs = ("lies", "touches") if touched == 1 else ("lie", "touch")
@@ -117,8 +111,8 @@ def infer_layers(
     if film is None:
         _low_doped(best, inferred)
     else:
-        inferred.layers[FILM] = film.name
-        inferred.reasons[FILM] = "it lies on the body, and no layer lies across it"
+        inferred.layers["film"] = film.name
+        inferred.reasons["film"] = "it lies on the body, and no layer lies across it"
         inferred.doubts.append(
             f"layer {film.name} is taken for a film that is heater and legs in one; its thickness, "
             "and what it and the body are made of, the drawing does not say"
@@ -239,10 +233,10 @@ def _low_doped(best: _Silicon, inferred: LayerInference) -> None:
     reason = "the silicon falls apart without it"
     if len(best.cutters) > 1:
         reason += "; of such layers the farthest from the terminals"
-    inferred.layers[HEATER], inferred.reasons[HEATER] = heater, reason
+    inferred.layers["heater"], inferred.reasons["heater"] = heater, reason
     rest = [name for name in best.cutters if name != heater]
     for number, name in enumerate(rest, start=1):
-        part = READER if len(rest) == 1 else f"low-doped-{number}"
+        part = "reader" if len(rest) == 1 else f"low-doped-{number}"
         inferred.layers[part] = name
         inferred.reasons[part] = "the silicon falls apart without it too, nearer to the terminals"
 
@@ -281,7 +275,7 @@ def _terminals(best: _Silicon, sheet: Sheet, inferred: LayerInference) -> None:
             }
     why = "it touches the outline along an edge"
     if len(candidates) < 2:
-        heater = inferred.layers.get(HEATER)
+        heater = inferred.layers.get("heater")
         middle = best.areas[heater] if isinstance(heater, str) else best.shape.centroid
         base = _base(best.shape, middle)
         candidates = {f"edge {number}": (edge,) for number, edge in enumerate(base, start=1)}
@@ -299,7 +293,7 @@ def _terminals(best: _Silicon, sheet: Sheet, inferred: LayerInference) -> None:
         inferred.doubts.append(f"terminals cannot be told apart ({error.what})")
         named = {
             role: (name, "")
-            for role, name in zip((SUPPLY, GROUND, READER), candidates, strict=False)
+            for role, name in zip(("supply", "ground", "reader"), candidates, strict=False)
         }
     for role, (name, reason) in named.items():
         inferred.terminals[role] = candidates[name]
@@ -313,22 +307,22 @@ def _named(
     parts = {
         part: snapped(best.areas[name], best.shape, 1.5 * best.tolerance)
         for part, name in inferred.layers.items()
-        if part not in (SILICON, BODY, FILM) and isinstance(name, str)
+        if part not in ("silicon", "body", "film") and isinstance(name, str)
     }
-    partition = partitioned((SILICON, best.shape), parts)
+    partition = partitioned(("silicon", best.shape), parts)
     ends = terminal_edges(best.shape, rings, best.tolerance)
     at = partition.touched_by(ends, best.tolerance)
-    heaters = {number for number, piece in enumerate(partition.pieces) if HEATER in piece.layers}
+    heaters = {number for number, piece in enumerate(partition.pieces) if "heater" in piece.layers}
     sides = _grouped(partition, at, heaters)
     alone = next((side for side in sides if len(side) == 1), sides[0])
     others = [name for side in sides if side is not alone for name in side] or alone[1:]
     supply = _hinted(at, ("supply", "bias", "v+", "vdd")) or alone[0]
     rest = [name for name in (*others, *alone) if name != supply]
-    named = {SUPPLY: (supply, "alone on its side of the heater" if len(at) > 2 else "")}
+    named = {"supply": (supply, "alone on its side of the heater" if len(at) > 2 else "")}
     if not rest:
         return named
     # terminals that reach the heater through another low-doped part only
-    low = {number for number, piece in enumerate(partition.pieces) if SILICON not in piece.layers}
+    low = {number for number, piece in enumerate(partition.pieces) if "silicon" not in piece.layers}
     around = {name: partition.reached(at[name], low) for name in rest}
     behind = [
         name
@@ -341,10 +335,10 @@ def _named(
     reason = "on the other side of the heater" if heaters else "at the other end"
     if len(rest) > 1 and not behind:
         reason += "; which of the terminals there is ground, the drawing does not say"
-    named[GROUND] = (ground, reason)
+    named["ground"] = (ground, reason)
     rest = [name for name in rest if name != ground]
     for number, name in enumerate(rest):
-        role = READER if number == 0 else f"end-{number}"
+        role = "reader" if number == 0 else f"end-{number}"
         reason = "behind another low-doped part" if name in behind else "carries no current"
         named[role] = (name, reason)
     return named
@@ -393,11 +387,13 @@ def _tip(
             inferred.tip = (round(point[0], 6) + 0.0, round(point[1], 6) + 0.0)  # no -0
             inferred.reasons["tip"] = f"the text '{text.strip()[:20]}' stands there"
             return
-    heater, film = (inferred.layers.get(part) for part in (HEATER, FILM))
+    heater, film = (inferred.layers.get(part) for part in ("heater", "film"))
     if isinstance(heater, str):
         area, why = shapes[heater].intersection(best.shape), "the middle of the heater"
     elif isinstance(film, str):
-        drawn = [inferred.terminals[end] for end in (SUPPLY, GROUND) if end in inferred.terminals]
+        drawn = [
+            inferred.terminals[end] for end in ("supply", "ground") if end in inferred.terminals
+        ]
         ends = [
             shapes.get(end, best.shape) if isinstance(end, str) else shapely.MultiPoint(end[0])
             for end in drawn
@@ -412,19 +408,6 @@ def _tip(
     middle = inside.centroid if inside.contains(inside.centroid) else inside.point_on_surface()
     inferred.tip = (round(middle.x, 6) + 0.0, round(middle.y, 6) + 0.0)
     inferred.reasons["tip"] = f"{why}; no text in the drawing says 'tip'"
-
-
-#: Layers that are listed, and notes on how the file is read.
-_MOST_LISTED = 60
-#: What is assumed of a film that is heater and legs in one, and of the body below it.
-_ASSUMED = {
-    BODY: {"kind": "dielectric", "preset": "SiN"},
-    FILM: {"kind": "metal-film", "preset": "Pd"},
-}
-_FILM_UM = 0.05
-#: How another unit is stated.
-_UNIT_BY = "--unit {unit}"
-_UNSAID, _MISSING = "assumed: a drawing does not say", "not found in the drawing, such as {}"
 
 
 @dataclass(frozen=True)
@@ -487,7 +470,7 @@ def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None 
     """
     unit_um = None if unit is None else UNITS[unit]
     sheet = read_sheet(
-        path, cell, unit_um=unit_um, tolerance_um=TOLERANCE_UM, unit_stated_by=_UNIT_BY
+        path, cell, unit_um=unit_um, tolerance_um=TOLERANCE_UM, unit_stated_by="--unit {unit}"
     )
     inference = infer_layers(sheet, TOLERANCE_UM)
     _check_unit(sheet, inference, unit)
@@ -514,18 +497,18 @@ def _check_unit(sheet: Sheet, inference: LayerInference, unit: str | None) -> No
         name: extent_of((*layer.rings, *layer.lines)) for name, layer in sheet.layers.items()
     }
     name, better = max(extents, key=lambda name: extents[name]), None
-    if HEATER in inference.layers:
-        name = str(inference.layers[SILICON])
+    if "heater" in inference.layers:
+        name = str(inference.layers["silicon"])
         if is_lever(extents[name]):
             return
     elif unit is None and not sheet.unit_stated:
         tried = ((unit, _silicon_in(sheet, unit)) for unit in UNITS)
         better, name = next(((unit, layer) for unit, layer in tried if layer), (None, name))
     if better is None:
-        if HEATER not in inference.layers and any(map(is_lever, extents.values())):
+        if "heater" not in inference.layers and any(map(is_lever, extents.values())):
             return
         better = sensible_unit(extents[name], sheet.unit_um)
-    words = doubt(extents[name], sheet.unit_um, better, _UNIT_BY)
+    words = doubt(extents[name], sheet.unit_um, better, "--unit {unit}")
     raise InputError(f"{sheet.file}: layer {name}: {words}")
 
 
@@ -536,8 +519,8 @@ def _silicon_in(sheet: Sheet, unit: str) -> str | None:
     except InputError:  # it would be larger than any wafer
         return None
     layers = infer_layers(other, TOLERANCE_UM).layers
-    silicon = layers.get(SILICON)
-    if HEATER not in layers or not isinstance(silicon, str):
+    silicon = layers.get("silicon")
+    if "heater" not in layers or not isinstance(silicon, str):
         return None
     return silicon if is_lever(extent_of(other.layers[silicon].rings)) else None
 
@@ -562,7 +545,8 @@ def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:
     roles = _by_part(inference)
     of_layer = {drawn: role for role, drawn in roles.items() if isinstance(drawn, str)}
     rows = [["layer", "outlines", "area (µm²)", "x (µm)", "y (µm)", "taken as"]]
-    for name, layer in list(sheet.layers.items())[:_MOST_LISTED]:
+    most = 60
+    for name, layer in list(sheet.layers.items())[:most]:
         points = np.array([point for ring in (*layer.rings, *layer.lines) for point in ring])
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         number = f"{len(layer.rings)}" + (f" + {len(layer.lines)} open" if layer.lines else "")
@@ -570,12 +554,12 @@ def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:
         area = f"{_area(name, sheet.rings(layer)):.4g}"
         rows.append([name, number, area, *extent, of_layer.get(name, "–")])
     lines += aligned(rows)
-    if len(sheet.layers) > _MOST_LISTED:
-        lines.append(f"and {len(sheet.layers) - _MOST_LISTED} more layers")
+    if len(sheet.layers) > most:
+        lines.append(f"and {len(sheet.layers) - most} more layers")
     lines += [f"{label}: {reason}" for label, reason in inference.reasons.items()]
-    lines += [text for _, text in sheet.remarks[:_MOST_LISTED]]
-    if len(sheet.remarks) > _MOST_LISTED:
-        lines.append(f"and {len(sheet.remarks) - _MOST_LISTED} more notes on how it is read")
+    lines += [text for _, text in sheet.remarks[:most]]
+    if len(sheet.remarks) > most:
+        lines.append(f"and {len(sheet.remarks) - most} more notes on how it is read")
     return lines + [f"to be checked: {doubt}" for doubt in inference.doubts]
 
 
@@ -591,7 +575,7 @@ def _probe_file(
     sheet: Sheet, inference: LayerInference, listing: list[str], name: str, unit: str | None
 ) -> str:
     reference, reasons = Probe.reference(), inference.reasons
-    probe: dict[str, object] = {"shape": DRAWING, "file": name}
+    probe: dict[str, object] = {"shape": "drawing", "file": name}
     if sheet.cell is not None:
         probe["cell"] = sheet.cell
     if unit is not None or not sheet.unit_stated:
@@ -600,33 +584,38 @@ def _probe_file(
     meaning = {
         "unit_um": "the file does not say" if unit is None else f"as the import was told: {unit}",
         "thickness_um": "that of the reference probe: a drawing does not say",
-        "tip_um": reasons.get("tip", _MISSING.format("[0.0, 0.0]")),
+        "tip_um": reasons.get("tip", "not found in the drawing, such as [0.0, 0.0]"),
     }
     lines = ["# A hotlever probe file: lengths in µm, temperatures in K.", "#"]
     lines += [f"# {line}" for line in listing]
     lines += section_lines("probe", probe, meaning, optional=True)
-    has_film = FILM in inference.layers
+    has_film = "film" in inference.layers
     if has_film:
         lines += _film_sections(inference)
     else:
-        lines += _drawn_lines("layers", (SILICON, HEATER), inference.layers, reasons, "1/0")
+        lines += _drawn_lines("layers", ("silicon", "heater"), inference.layers, reasons, "1/0")
     ends = {role: reasons.get(terminal_part(role), "") for role in inference.terminals}
     lines += _drawn_lines("terminals", REQUIRED, inference.terminals, ends, "10/0")
-    without = (MATERIAL,) if has_film else ()
+    without = ("material",) if has_film else ()
     return "\n".join(lines) + "\n" + other_sections(reference, without)
 
 
 def _film_sections(inference: LayerInference) -> list[str]:
     """Return the sections of a film, of its body, and of the materials that are assumed of both."""
     lines: list[str] = []
-    for name, assumed in _ASSUMED.items():
-        layer: dict[str, object] = {DRAWN: inference.layers[name], "material": assumed["preset"]}
-        if name == FILM:
-            layer["thickness_um"] = _FILM_UM
-        meaning = {DRAWN: inference.reasons[name], "thickness_um": _UNSAID}
+    unsaid = "assumed: a drawing does not say"
+    assumed_of = {
+        "body": {"kind": "dielectric", "preset": "SiN"},
+        "film": {"kind": "metal-film", "preset": "Pd"},
+    }
+    for name, assumed in assumed_of.items():
+        layer: dict[str, object] = {"drawn": inference.layers[name], "material": assumed["preset"]}
+        if name == "film":
+            layer["thickness_um"] = 0.05
+        meaning = {"drawn": inference.reasons[name], "thickness_um": unsaid}
         lines += section_lines(f"layers.{name}", layer, meaning)
-    for assumed in _ASSUMED.values():
-        lines += section_lines(f"materials.{assumed['preset']}", assumed, {"preset": _UNSAID})
+    for assumed in assumed_of.values():
+        lines += section_lines(f"materials.{assumed['preset']}", assumed, {"preset": unsaid})
     return lines
 
 
@@ -643,6 +632,6 @@ def _drawn_lines(
         role: each[0] if isinstance(each, tuple) and len(each) == 1 else each
         for role, each in drawn.items()
     }
-    missing = _MISSING.format(as_toml(example))
+    missing = f"not found in the drawing, such as {as_toml(example)}"
     meaning = {role: reasons.get(role, "") if role in inferred else missing for role in drawn}
     return section_lines(section, values, meaning, optional=True)

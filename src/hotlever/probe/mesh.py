@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 ON_LINE = 1e-6
 #: As many squares of its width as a drawn heater may have: it is meshed in steps of its width.
 MOST_SQUARES = 100.0
-_NOT_MESHED = "Netgen could not mesh this layout; are its parts of too different a size?"
 
 
 @dataclass(frozen=True)
@@ -117,15 +116,16 @@ def mesh_layout(
     ComputationError
         If Netgen cannot mesh it, or a terminal has no edge on the outline.
     """
+    not_meshed = "Netgen could not mesh this layout; are its parts of too different a size?"
     try:
         heaters = layout.heaters(wiring)
         mesh, region = _netgen(layout, heaters, options or MeshOptions())
     except RuntimeError as error:
-        raise ComputationError(f"{_NOT_MESHED} ({error})") from error
+        raise ComputationError(f"{not_meshed} ({error})") from error
     # where Netgen fails at a face it says so to the terminal only, and leaves a hole
     area = sum(region.area for region in layout.regions)
     if not np.isclose(np.abs(doubled_areas(mesh.p[:, mesh.t])).sum() / 2, area, rtol=1e-9):
-        raise ComputationError(_NOT_MESHED)
+        raise ComputationError(not_meshed)
     return ProbeMesh(layout, mesh, region, terminal_facets(mesh, layout))
 
 

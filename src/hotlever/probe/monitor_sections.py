@@ -15,12 +15,6 @@ from hotlever.quantities import QUANTITIES
 from hotlever.records import Record
 from hotlever.types import Array, Mask
 
-#: Points that a line has unless it is said, and at most.
-_POINTS, _MOST_POINTS = 101, 1000
-#: What is nearer to a lever (µm) is on it.
-_ON_IT = 1e-6
-_NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
-
 
 def _as_tuples(value: Any) -> Any:
     """Return lists, as files have them, as tuples."""
@@ -48,7 +42,7 @@ class Monitor(Record):
         default=None, description="from one place to another, which lie on the lever"
     )
     points: int | None = Field(
-        default=None, ge=2, le=_MOST_POINTS, description=f"of the line; {_POINTS} if left out"
+        default=None, ge=2, le=1000, description="of the line; 101 if left out"
     )
     region: str | None = Field(
         default=None, description="a region, part, layer or material of the lever: a mean over it"
@@ -70,7 +64,7 @@ class Monitor(Record):
     def positions(self) -> Array:
         """The points (µm), shape (n, 2); none of a region."""
         if self.line_um is not None:
-            return np.linspace(*self.line_um, self.points or _POINTS)
+            return np.linspace(*self.line_um, self.points or 101)
         return np.reshape(self._ends, (-1, 2))
 
     def __str__(self) -> str:
@@ -134,7 +128,7 @@ class Monitors(Record):
         """
         existing_columns = {*QUANTITIES, *(f"{name}_V" for name in layout.terminal_names)}
         for name, monitor in self.named.items():
-            if not _NAME.fullmatch(name):
+            if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
                 raise InputError(
                     f"{where}: found the name {quoted(name)}, expected a letter first, and then "
                     "letters, digits and _"
@@ -152,6 +146,4 @@ def on_lever(layout: Layout, points: Array | Sequence[Place]) -> Mask:
     """Return which points (n, 2) are on a lever, as far as rounding tells, (n,)."""
     import shapely  # not every probe has monitors
 
-    return np.asarray(
-        shapely.distance(layout.polygon, shapely.points(np.asarray(points))) <= _ON_IT
-    )
+    return np.asarray(shapely.distance(layout.polygon, shapely.points(np.asarray(points))) <= 1e-6)

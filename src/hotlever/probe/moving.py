@@ -26,11 +26,7 @@ from hotlever.probe.tip import Tip
 from hotlever.types import Array
 
 T = TypeVar("T")
-Ring = tuple[Point, ...]
 
-#: Share of a dimension by which it is changed to either side to find how the drawing moves: corners
-#: that are no sums of dimensions, as those of a rounding, move by this to within 1e-6.
-_STEP = 1e-3
 #: What is no match costs more than any (µm²).
 _UNLIKE = 1e12
 
@@ -114,7 +110,9 @@ class MovingMesh:
             If parts would come apart or get other corners.
         """
         value = float(probe.values([name])[0])
-        step = _STEP * (value or 1.0)
+        # corners that are no sums of dimensions, as those of a rounding, move by this to within
+        # 1e-6
+        step = 1e-3 * (value or 1.0)
         layouts = [probe.replace({name: value + way}).layout() for way in (0.0, -step, step)]
         alike = [in_order for each in layouts if (in_order := _in_order(self._mesh.layout, each))]
         if len(alike) < len(layouts):
@@ -227,7 +225,7 @@ def _made_of(region: Region) -> tuple[Any, ...]:
     return region.part, region.dopant_from, region.insulates, taper, materials
 
 
-def _ring(like: Ring, ring: Ring) -> tuple[float, Ring]:
+def _ring(like: tuple[Point, ...], ring: tuple[Point, ...]) -> tuple[float, tuple[Point, ...]]:
     """Return how far a ring is from another (µm²), and the ring from its first corner on."""
     count = len(ring)
     if count != len(like):

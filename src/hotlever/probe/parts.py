@@ -54,9 +54,8 @@ PARTS: dict[str, type[Record]] = {
     "prior": PriorTexts,
     "monitor": Monitors,
 }
-MATERIAL, MATERIALS = "material", "materials"
 #: All sections of a probe file.
-SECTIONS = (*SHAPE_SECTIONS, MATERIALS, *PARTS)
+SECTIONS = (*SHAPE_SECTIONS, "materials", *PARTS)
 
 
 def with_values(section: Mapping[str, Any]) -> dict[str, Any]:
@@ -151,7 +150,7 @@ class ProbeParts(Record):
         """Those of its parts that matter, beside the shape, by the section of a probe file."""
         parts = {name: getattr(self, name) for name in PARTS if getattr(self, name)}
         if not self.has_plain_silicon:
-            del parts[MATERIAL]
+            del parts["material"]
         return parts
 
     @property
@@ -173,7 +172,7 @@ class ProbeParts(Record):
             if type(kind) is not KINDS[kind.kind]
         }
         if type(self.material) is not Material and self.has_plain_silicon:
-            own[MATERIAL] = type(self.material)
+            own["material"] = type(self.material)
         return own
 
     @property
@@ -224,7 +223,9 @@ class ProbeParts(Record):
         """Return the sections as plain values: what `Probe.from_sections` takes, or refuses."""
         sections: dict[str, dict[str, Any]] = self.shape.sections()
         if self.materials:
-            sections[MATERIALS] = {name: kind.model_dump() for name, kind in self.materials.items()}
+            sections["materials"] = {
+                name: kind.model_dump() for name, kind in self.materials.items()
+            }
         sections |= {name: part.model_dump() for name, part in self.parts.items()}
         if self.laws:
             sections[LAWS] = dict(self.laws)
@@ -265,7 +266,7 @@ class ProbeParts(Record):
         }
         materials = {name: copies.pop(name, kind) for name, kind in self.materials.items()}
         shape = copies.pop("probe", self.shape).with_dimensions(dimensions)
-        return self.model_copy(update={**copies, "shape": shape, MATERIALS: materials})
+        return self.model_copy(update={**copies, "shape": shape, "materials": materials})
 
     def with_physics(self, effects: Iterable[str], where: str = "physics") -> Self:
         """Return the probe with some effects beyond the paper, and no others.

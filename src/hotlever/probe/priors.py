@@ -35,16 +35,13 @@ from hotlever.records import StandardError
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 from hotlever.text import with_unit
 
-ALL_DIMENSIONS = "dimensions"
-#: All laws, and what begins the name of one; what they may be, and what one may be beside a spread.
-ALL_LAWS, LAW = "laws", "law."
-PAPERS, UNCERTAIN, EXACT = "paper", "uncertain", "exact"
-#: The parameters that are the departures of the other laws, and have no shape of their own: what is
-#: around a lever, and how its heat capacity is measured, move them as a whole by more than
-#: published curves differ in shape.
-_SCALE_OF_LAW = {"air": "gas_conductivity", "heat_capacity": "heat_capacity_scale"}
-#: All that have a spread.
-LAWS = (*DEPARTURES, *_SCALE_OF_LAW)
+#: All laws that have a spread, and the parameters by which they depart. The last two have no shape
+#: of their own: what is around a lever, and how its heat capacity is measured, move them as a whole
+#: by more than published curves differ in shape.
+LAWS = {law: tuple(departure.names) for law, departure in DEPARTURES.items()} | {
+    "air": ("gas_conductivity",),
+    "heat_capacity": ("heat_capacity_scale",),
+}
 #: Scales of what is shown, and the observable that each belongs to.
 SCALES = {
     "current_scale": "current",
@@ -55,17 +52,8 @@ SCALES = {
 #: Their standard deviations where nothing is said, relative: of a meter, and of a thermometer, by
 #: the rise above the base (the hot plate's own accuracy, gradients in the laser's spot).
 METERS, THERMOMETER = 1e-3, 0.015
-#: The share of a prior's variance below which nothing is told of it.
-_LEAST_CONTRACTION = 1e-3
-#: Relative spreads that mean something.
-_LEAST, _MOST, _LARGEST_SHARE = 1e-6, 10.0, 0.5
-#: The standard deviation of a logarithm from which on it is said as a factor: up and down are as
-#: far only by that.
-_AS_A_FACTOR = 0.4
 #: How a spread is written: in the parameter's unit, as a share of its value, or as a factor.
 Written = Literal["unit", "share", "factor"]
-_PRIOR = re.compile(r"([^±/]{0,40}?)(±|[×xX*] ?/)([^±/]{1,40})")
-_LARGEST_FACTOR = 1000.0
 
 ProbesParts = TypeVar("ProbesParts", bound=ProbeParts)
 
@@ -112,12 +100,8 @@ class Prior:
 
     def used(self, value: float, spread: float) -> PriorUse:
         """Return what data made of it, a value and a standard deviation in the parameter's unit."""
-        distribution: Distribution = "log-normal" if self.relative else "normal"
+        distribution: Literal["normal", "log-normal"] = "log-normal" if self.relative else "normal"
         return PriorUse(self.value, self.absolute, value, spread, distribution)
-
-
-#: Of a parameter, or of its logarithm.
-Distribution = Literal["normal", "log-normal"]
 
 
 @dataclass(frozen=True)
@@ -144,7 +128,7 @@ class PriorUse:
     spread: Annotated[float, Field(gt=0)]
     posterior_value: float
     posterior_spread: StandardError
-    distribution: Distribution = "normal"
+    distribution: Literal["normal", "log-normal"] = "normal"
 
     @property
     def _by_logarithm(self) -> bool:
@@ -166,7 +150,8 @@ class PriorUse:
     @property
     def stated(self) -> str:
         """What was known, in words: ``4e+17 ± 2e+16``, or ``1e+17 ×/ 3``."""
-        if self._by_logarithm and self.spread > _AS_A_FACTOR * self.value:
+        # up and down are as far only by a factor
+        if self._by_logarithm and self.spread > 0.4 * self.value:
             return f"{self.value:.4g} ×/ {math.exp(self.spread / self.value):.3g}"
         return f"{self.value:.4g} ± {self.spread:.2g}"
 
@@ -195,11 +180,8 @@ class PriorShift(NamedTuple):
 
         Without it the sum of squares would be lower by the square of this.
         """
-        return self.size / float(np.sqrt(max(self.contraction, _LEAST_CONTRACTION)))
-
-
-#: Of the coefficients of a departure, by which its spread is as published.
-_OF_COEFFICIENTS = Prior(0.0, 1.0, relative=False)
+        # below this share of a prior's variance nothing is told of it
+        return self.size / float(np.sqrt(max(self.contraction, 1e-3)))
 
 
 def published_material() -> dict[str, Prior]:
@@ -260,8 +242,8 @@ def updated(
         See `priors_of`.
     """
     anew = priors_of(stated, probe, where, in_time=in_time)
-    exact = {name.removeprefix(LAW) for name, text in stated.items() if text == EXACT}
-    if ALL_LAWS in stated:
+    exact = {name.removeprefix("law.") for name, text in stated.items() if text == "exact"}
+    if "laws" in stated:
         exact |= DEPARTURES.keys()
     names = {name for law in exact for name in _names_of_law(law, probe)}
     return {name: prior for name, prior in priors.items() if name not in names} | anew
@@ -279,12 +261,12 @@ def as_known(probe: ProbesParts, stated: Mapping[str, Prior | str] | None) -> Pr
     """
     texts = {**probe.stated_priors, **(stated or {})}
     nothing = stated is not None and not stated
-    return on_usual_chip(probe, without=nothing or texts.get(ALL_LAWS) == PAPERS)
+    return on_usual_chip(probe, without=nothing or texts.get("laws") == "paper")
 
 
 def is_of_laws(name: str) -> bool:
     """Return whether a prior is of a law, or of all."""
-    return name == ALL_LAWS or name.startswith(LAW)
+    return name == "laws" or name.startswith("law.")
 
 
 def priors_of(
@@ -306,22 +288,22 @@ def priors_of(
     Prior(value=3.3e+17, spread=0.15, relative=True)
     """
     table, priors = parameters_of(probe, anywhere=True), dict[str, Prior]()
-    if ALL_LAWS in stated:
-        priors |= _of_all_laws(stated[ALL_LAWS], probe, f"{where}: {ALL_LAWS}")
+    if "laws" in stated:
+        priors |= _of_all_laws(stated["laws"], probe, f"{where}: laws")
     for name, text in stated.items():
         here = f"{where}: {name}"
         if is_of_laws(name):
-            if name != ALL_LAWS:
-                priors |= _of_law(name.removeprefix(LAW), text, probe, here)
+            if name != "laws":
+                priors |= _of_law(name.removeprefix("law."), text, probe, here)
             continue
-        if name not in table and name not in (ALL_DIMENSIONS, *SCALES):
-            others = [*table, ALL_DIMENSIONS, ALL_LAWS, *(LAW + law for law in LAWS), *SCALES]
+        if name not in table and name not in ("dimensions", *SCALES):
+            others = [*table, "dimensions", "laws", *(f"law.{law}" for law in LAWS), *SCALES]
             raise unknown_name("prior", name, others, where)
         if isinstance(text, Prior):
             priors[name] = text
         elif name in SCALES:
             priors[name] = Prior(1.0, share_of(text, here))
-        elif name == ALL_DIMENSIONS:
+        elif name == "dimensions":
             spread = share_of(text, here, ("share", "factor"))
             if not probe.shape.outline_moves:
                 shifts = [own for own in probe.shape.dimensions() if own_name(own) == EDGE_BIAS]
@@ -343,23 +325,23 @@ def priors_of(
 
 def _names_of_law(law: str, probe: ProbeParts) -> list[str]:
     """Return the parameters by which a law departs in a probe."""
-    own = DEPARTURES[law].names if law in DEPARTURES else (_SCALE_OF_LAW[law],)
-    return [name for name in parameters_of(probe, anywhere=True) if own_name(name) in own]
+    return [name for name in parameters_of(probe, anywhere=True) if own_name(name) in LAWS[law]]
 
 
 def _of_all_laws(text: Prior | str, probe: ProbeParts, where: str) -> dict[str, Prior]:
     """Return the priors of all departures: as is usual, or none."""
-    if text not in (PAPERS, UNCERTAIN):
-        raise unknown_name("choice", str(text), (PAPERS, UNCERTAIN), where)
+    if text not in ("paper", "uncertain"):
+        raise unknown_name("choice", str(text), ("paper", "uncertain"), where)
     names = [name for law in DEPARTURES for name in _names_of_law(law, probe)]
-    return dict.fromkeys(names, _OF_COEFFICIENTS) if text == UNCERTAIN else {}
+    # of the coefficients of a departure, by which its spread is as published
+    return dict.fromkeys(names, Prior(0.0, 1.0, relative=False)) if text == "uncertain" else {}
 
 
 def _of_law(law: str, text: Prior | str, probe: ProbeParts, where: str) -> dict[str, Prior]:
     """Return the priors by which a law is as uncertain as a text says."""
     if law not in LAWS:
-        raise unknown_name("law", law, LAWS, where.removesuffix(f": {LAW}{law}"))
-    if text == EXACT:
+        raise unknown_name("law", law, LAWS, where.removesuffix(f": law.{law}"))
+    if text == "exact":
         return {}
     share = share_of(str(text), where, ("share", "factor"))
     if law not in DEPARTURES:
@@ -387,10 +369,8 @@ def share_of(text: str, where: str, allowed: tuple[Written, ...] = ("share",)) -
     0.015
     """
     value, spread, written = parsed(text, where)
-    if not (value is None and written in allowed and _LEAST <= spread <= _LARGEST_SHARE):
-        raise InputError(
-            f"{where} = '{text}', expected a share such as '± 5%', at most {_LARGEST_SHARE:.0%}"
-        )
+    if not (value is None and written in allowed and 1e-6 <= spread <= 0.5):
+        raise InputError(f"{where} = '{text}', expected a share such as '± 5%', at most 50%")
     return spread
 
 
@@ -409,10 +389,8 @@ def _check(prior: Prior, parameter: Parameter, where: str, written: Written) -> 
     if prior.relative and prior.value == 0:
         raise InputError(f"{where}: a relative spread needs a value above 0")
     share = prior.absolute / abs(prior.value or parameter.scale)
-    if not _LEAST <= share <= _MOST:
-        raise InputError(
-            f"{where}: a spread of {share:.2g} times the value, expected {_LEAST:g} to {_MOST:g}"
-        )
+    if not 1e-6 <= share <= 10.0:
+        raise InputError(f"{where}: a spread of {share:.2g} times the value, expected 1e-06 to 10")
 
 
 def parsed(text: str, where: str) -> tuple[float | None, float, Written]:
@@ -434,7 +412,8 @@ def parsed(text: str, where: str) -> tuple[float | None, float, Written]:
         f"{where} = '{text[:60]}', expected a value and its spread such as '3.3e17 ± 15%', "
         "'0.40 ± 0.02', '± 5%' or '1e17 ×/ 3'"
     )
-    match = _PRIOR.fullmatch(text.replace("+-", "±").replace("+/-", "±"))
+    plus_minus = text.replace("+-", "±").replace("+/-", "±")
+    match = re.fullmatch(r"([^±/]{0,40}?)(±|[×xX*] ?/)([^±/]{1,40})", plus_minus)
     if match is None:
         raise wrong
     first, sign, second = (part.strip() for part in match.groups())
@@ -447,10 +426,10 @@ def parsed(text: str, where: str) -> tuple[float | None, float, Written]:
     if value is not None and not math.isfinite(value):
         raise wrong
     if written == "factor":
-        if not 1.0 < spread <= _LARGEST_FACTOR:
+        if not 1.0 < spread <= 1000.0:
             raise InputError(
                 f"{where} = '{text[:60]}': a factor of {spread:g}, expected one above 1 and at "
-                f"most {_LARGEST_FACTOR:g}"
+                "most 1000"
             )
         return value, math.log(spread), written
     if not 0 < spread < math.inf:

@@ -20,7 +20,7 @@ from hotlever.probe.file_sections import (
     read_sections,
 )
 from hotlever.probe.monitor_sections import Monitor, Monitors
-from hotlever.probe.parts import MATERIAL, MATERIALS, ProbeParts
+from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import ThreeLeg, UShape
 from hotlever.records import Record
 
@@ -77,7 +77,7 @@ class Probe(ProbeParts):
         from hotlever.probe.drawing.parametric import sections_of
 
         where, sections = sections_of(drawing)
-        return cls.from_sections({**sections, MATERIALS: dict(materials or {})}, where, Path())
+        return cls.from_sections({**sections, "materials": dict(materials or {})}, where, Path())
 
     @classmethod
     def coerce(cls, probe: Probe | str | os.PathLike[str]) -> Probe:
@@ -155,16 +155,16 @@ class Probe(ProbeParts):
         InputError
             If there is no such material, or the class or a value is none for it.
         """
-        plain = [MATERIAL] if self.has_plain_silicon else []
+        plain = ["material"] if self.has_plain_silicon else []
         if section not in [*self.materials, *plain]:
             raise unknown_name("material", section, [*self.materials, *plain])
-        if section == MATERIAL:
+        if section == "material":
             changed: dict[str, Any] = {
-                MATERIAL: remade(self.material, material_class, values, section)
+                "material": remade(self.material, material_class, values, section)
             }
         else:
             new = remade(self.materials[section], material_class, values, section)
-            changed = {MATERIALS: {**self.materials, section: new}}
+            changed = {"materials": {**self.materials, section: new}}
         return type(self).from_values({**dict(self), **changed}, "probe")
 
     def __repr__(self) -> str:

@@ -11,38 +11,16 @@ import math
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
 from hotlever.materials.parameters import own_name, parameter_named
-from hotlever.probe.chip import CHIP, usual_chip
+from hotlever.probe.chip import usual_chip
 from hotlever.probe.circuit import MOST_OFFSET_V
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
 from hotlever.probe.tip import OUT_OF_CONTACT
 
-#: Shares of a dimension or a resistance, of a base temperature, and of what a gas conducts, within
-#: which a fit stays.
-_OF_THE_VALUE, _OF_THE_BASE, _OF_THE_GAS = (0.5, 1.5), (0.8, 1.2), (0.2, 5.0)
-#: Relative spreads that are known beforehand: of what the drawing says, and of a resistor that was
-#: measured.
-_DIMENSIONS, RESISTANCE = 0.05, 1e-3
-#: Of the base temperature (K): a room, or a hot plate and its thermocouple.
-_BASE_K = 1.0
-#: Of how warm a chip gets, as a share of what is usual: the holder is not known; bounds (K/mW).
-_CHIP, _OF_THE_CHIP = 0.6, (0.01, 100.0)
-#: Of a tip, as far as it is stated: its height, half-angle and radius, from a micrograph.
-_TIP = 0.2
-#: Of what air takes up: humidity, what is around, and dimensions as far as they matter to it.
-_GAS = 0.1
-#: Of the distance to a surface below.
-_GAP = 0.1
-#: Bounds of an interface, of which nothing is known but its power of ten.
-_OF_THE_INTERFACE, _INTERFACE = (1e-3, 1e3), math.log(10.0)
-#: Offset that the amplifier of a bridge usually has (V).
-_USUAL_OFFSET_V = 0.01
-#: How far off all edges usually are (µm).
-_USUAL_BIAS = 0.1
-#: Dimensions of a tip that matter to its lever, the last in contact only, and of a shape that do
-#: not matter to the tip.
+#: Relative spread of a resistor that was measured.
+RESISTANCE = 1e-3
+#: Dimensions of a tip that matter to its lever, the last in contact only.
 OF_THE_TIP = ("height_um", "half_angle_deg", "apex_radius_um")
-_HARMLESS = ("reader_length_um", "reader_centre_um")
 
 
 def dimensions_of(probe: ProbeParts) -> list[str]:
@@ -58,7 +36,8 @@ def _of_the_tip(probe: ProbeParts) -> tuple[str, ...]:
 
 def nuisances(probe: ProbeParts) -> list[str]:
     """Return the dimensions of the drawing that matter to the tip, each by itself."""
-    held = (*_HARMLESS, *probe.shape.tied())
+    # the reader does not matter to the tip
+    held = ("reader_length_um", "reader_centre_um", *probe.shape.tied())
     return [
         name
         for name in probe.shape.dimensions()
@@ -159,7 +138,7 @@ def parameters_of(
     parts = (probe.shape, probe.tip, probe.contact, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
 
-    def add(name: str, spread: float | None, within: tuple[float, float] = _OF_THE_VALUE) -> None:
+    def add(name: str, spread: float | None, within: tuple[float, float] = (0.5, 1.5)) -> None:
         (value,) = probe.values([name]).tolist()
         least, most = within
         table[name] = parameter_named(name)._replace(
@@ -173,23 +152,27 @@ def parameters_of(
 
     matter = nuisances(probe)
     for name in probe.shape.dimensions():
-        add(name, _DIMENSIONS if name in matter else None)
+        add(name, 0.05 if name in matter else None)
         if own_name(name) == EDGE_BIAS:
             table[name] = table[name]._replace(
-                scale=_USUAL_BIAS, lower=-MOST_EDGE_BIAS, upper=MOST_EDGE_BIAS
+                scale=0.1, lower=-MOST_EDGE_BIAS, upper=MOST_EDGE_BIAS
             )
     for name in _of_the_tip(probe):
-        add(name, _TIP)
+        # from a micrograph
+        add(name, 0.2)
     if probe.contact is not None and 0 < probe.contact.interface_K_per_mW < OUT_OF_CONTACT:
-        add("interface_K_per_mW", _INTERFACE, _OF_THE_INTERFACE)
-    add("base_temperature_K", _BASE_K, _OF_THE_BASE)
+        # nothing is known of it but its power of ten
+        add("interface_K_per_mW", math.log(10.0), (1e-3, 1e3))
+    # of a room, or a hot plate and its thermocouple
+    add("base_temperature_K", 1.0, (0.8, 1.2))
     table["base_temperature_K"] = table["base_temperature_K"]._replace(relative=False)
     if anywhere or probe.circuit.chip_K_per_mW:
         usual = usual_chip(probe)
-        # in pulses the spreading counts alone, which is known
-        add(CHIP, None if in_time else _CHIP * usual, _OF_THE_CHIP)
-        table[CHIP] = table[CHIP]._replace(
-            scale=usual, lower=_OF_THE_CHIP[0], upper=_OF_THE_CHIP[1], relative=False
+        # in pulses the spreading counts alone, which is known; the holder is not
+        within = (0.01, 100.0)
+        add("chip_K_per_mW", None if in_time else 0.6 * usual, within)
+        table["chip_K_per_mW"] = table["chip_K_per_mW"]._replace(
+            scale=usual, lower=within[0], upper=within[1], relative=False
         )
     if probe.circuit.series_resistance_ohm > 0:
         add("series_resistance_ohm", RESISTANCE)
@@ -198,12 +181,13 @@ def parameters_of(
         add("bridge_lower_ohm", RESISTANCE)
         add("bridge_offset_V", None)
         table["bridge_offset_V"] = table["bridge_offset_V"]._replace(
-            scale=_USUAL_OFFSET_V, lower=-MOST_OFFSET_V, upper=MOST_OFFSET_V, relative=False
+            scale=0.01, lower=-MOST_OFFSET_V, upper=MOST_OFFSET_V, relative=False
         )
     if anywhere or probe.surroundings.medium == "air":
-        add("gas_conductivity", _GAS, _OF_THE_GAS)
+        # humidity, what is around, and dimensions as far as they matter to what air takes up
+        add("gas_conductivity", 0.1, (0.2, 5.0))
         if probe.surroundings.surface_gap_um is not None:
-            add("surface_gap_um", _GAP)
+            add("surface_gap_um", 0.1)
     return table
 
 

@@ -19,9 +19,6 @@ from hotlever.records import Record
 
 #: No part of a lever is smaller (µm), nor are two that do not touch nearer to each other.
 _SMALLEST = 0.01
-#: A heater is at most as many times as long as it is wide, or as wide as long: it is meshed in
-#: steps of its narrow side.
-_SLENDER = 30.0
 #: The dimension that is the same for all edges, and how far off it is at most (µm).
 EDGE_BIAS, MOST_EDGE_BIAS = "edge_bias_um", 2.0
 
@@ -157,9 +154,11 @@ class Parametric(Shape):
                 f"the {region.name} is {narrow:.2g} µm long or wide, expected {_SMALLEST} µm or "
                 "more",
             )
+            # a heater is meshed in steps of its narrow side
+            slender = 30.0
             _need(
-                region is not layout.heater or long <= _SLENDER * narrow,
-                f"the heater is {long:g} µm by {narrow:g} µm, expected at most {_SLENDER:g} times "
+                region is not layout.heater or long <= slender * narrow,
+                f"the heater is {long:g} µm by {narrow:g} µm, expected at most {slender:g} times "
                 "as long as wide",
             )
 
@@ -369,11 +368,8 @@ class UShape(Parametric):
 
 
 PARAMETRIC: dict[str, type[Parametric]] = {"three-leg": ThreeLeg, "u-shape": UShape}
-DRAWING = "drawing"
 #: Made in Python only.
 PARAMETRIC_DRAWING: Literal["parametric-drawing"] = "parametric-drawing"
-SHAPES = (*PARAMETRIC, DRAWING)
-#: Key of a layer's outlines where a section says more of it.
-DRAWN = "drawn"
+SHAPES = (*PARAMETRIC, "drawing")
 #: Sections of a probe file that describe a shape; those of a drawing come first to last.
 SHAPE_SECTIONS = ("probe", "layers", "terminals")

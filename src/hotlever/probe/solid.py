@@ -20,16 +20,6 @@ from hotlever.probe.layout import Layout, Region
 from hotlever.probe.mesh import ON_LINE, MeshSizes, ProbeMesh, face_of, terminal_facets
 from hotlever.types import Array, Index
 
-#: Largest edge on the sphere, as a share of its radius: with longer ones Netgen fails to pair
-#: the sphere with the image ball.
-_COARSEST_SPHERE = 0.25
-
-#: Steps along the rims and cells in the heater at which a lever takes two minutes to solve.
-_MOST_ALONG_RIMS, _MOST_IN_HEATER = 4000, 2500
-
-#: Names of the parts of the mesh outside the silicon.
-AIR, IMAGE, SPHERE, LEVER_SURFACE = "air", "image", "sphere", "lever"
-
 
 @dataclass(frozen=True)
 class SolidMeshOptions(MeshSizes):
@@ -135,7 +125,8 @@ def _check_size(layout: Layout) -> None:
     narrow = layout.heater.narrow_um
     along_rims = edges / (sizes.rim * thickness)
     in_heater = layout.heater.area * thickness / (sizes.heater * narrow) ** 3
-    if max(along_rims / _MOST_ALONG_RIMS, in_heater / _MOST_IN_HEATER) > 1:
+    # at so many steps along the rims, or cells in the heater, a lever takes two minutes to solve
+    if max(along_rims / 4000, in_heater / 2500) > 1:
         raise InputError(
             f"full 3-D simulation: with a thickness of {thickness:g} µm, edges of {edges:.4g} µm "
             f"in all and a heater {narrow:g} µm narrow this lever takes too many tetrahedra; "
@@ -185,21 +176,22 @@ def in_a_sphere(body: Any, centre: tuple[float, float, float], radius: float) ->
     from netgen.occ import Compound, Glue, Pnt, Sphere, Vec, gp_Trsf
 
     ball = Sphere(Pnt(*centre), radius)
-    ball.faces.name = SPHERE
+    ball.faces.name = "sphere"
     air = ball - body
-    air.mat(AIR)
+    air.mat("air")
     inside = Glue([body, air])
     for solid in inside.solids:
-        if solid.name == AIR:
+        if solid.name == "air":
             for face in solid.faces:
-                face.name = face.name if face.name == SPHERE else LEVER_SURFACE
+                face.name = face.name if face.name == "sphere" else "lever"
     # the image ball, whose surface is meshed like the sphere's
     shift = Vec(3 * radius, 0, 0)
     image = Sphere(Pnt(*centre), radius).Move(shift)
-    image.mat(IMAGE)
-    image.faces.name = IMAGE
-    (outer,) = [face for face in inside.faces if face.name == SPHERE]
-    image.faces.maxh = outer.maxh = _COARSEST_SPHERE * radius
+    image.mat("image")
+    image.faces.name = "image"
+    (outer,) = [face for face in inside.faces if face.name == "sphere"]
+    # with longer edges on the sphere Netgen fails to pair it with the image ball
+    image.faces.maxh = outer.maxh = 0.25 * radius
     outer.Identify(
         image.faces[0], "kelvin", IdentificationType.PERIODIC, gp_Trsf.Translation(shift)
     )

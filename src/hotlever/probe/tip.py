@@ -19,15 +19,8 @@ from hotlever.records import Record
 from hotlever.types import Array
 from hotlever.units import product_conversion, quantity
 
-#: First zero of J₁', the slope of the Bessel function: the slowest sideways mode of a cylinder
-#: of radius a dies out as exp(−1.841 z/a) along its axis.
-SIDEWAYS_MODE = 1.841184
-#: Thickness that a layer may have (µm).
-_THINNEST, _THICKEST = 1e-4, 1e4
 #: Resistance of an interface (K/mW) that lets no heat through: the tip is out of contact.
 OUT_OF_CONTACT = 1e12
-#: m² K/W to µm² K/mW.
-_PER_AREA = 1e9
 
 
 class Tip(Record):
@@ -85,7 +78,9 @@ class Tip(Record):
         and angle, in steps as points come under the base, to about 20 %. It is a small share: by
         it twice the height changes the current by less than 1 %.
         """
-        base, power = self.base_radius_um, 1.0 + SIDEWAYS_MODE / self.slope
+        # the first zero of J₁', the slope of the Bessel function: the slowest sideways mode of a
+        # cylinder of radius a dies out as exp(−1.841 z/a) along its axis
+        base, power = self.base_radius_um, 1.0 + 1.841184 / self.slope
         radius = np.clip(np.asarray(distance, dtype=float), self.apex_radius_um, base)
         thickening: Array = base / (self.slope * power) * (1.0 - (radius / base) ** power)
         return thickening
@@ -163,10 +158,10 @@ def parsed_layers(text: str, where: str) -> tuple[SampleLayer, ...]:
     lengths: list[float | None] = []
     for material, part in zip(materials, thicknesses, strict=False):
         length = length_um(part)
-        if length is None or not _THINNEST <= length <= _THICKEST:
+        if length is None or not 1e-4 <= length <= 1e4:
             raise InputError(
                 f"{where}: found '{excerpt(part)}', expected the thickness of {excerpt(material)}, "
-                f"{1e3 * _THINNEST:g} nm to {1e-3 * _THICKEST:g} mm, such as 100nm"
+                "0.1 nm to 10 mm, such as 100nm"
             )
         lengths.append(length)
     if len(lengths) == len(materials):
@@ -211,7 +206,8 @@ def interface_of(text: str, radius_um: float, where: str) -> float:
     if value is not None and value >= 0 and of_all is not None:
         resistance = 1e-3 * of_all * value
     elif value is not None and value >= 0 and of_area is not None:
-        resistance = _PER_AREA * of_area * value / (math.pi * radius_um**2)
+        # m² K/W to µm² K/mW
+        resistance = 1e9 * of_area * value / (math.pi * radius_um**2)
     else:
         raise InputError(
             f"{where}: found '{excerpt(text)}', expected a resistance such as 1e7 K/W, or for an "

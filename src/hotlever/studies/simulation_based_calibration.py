@@ -39,9 +39,6 @@ from hotlever.materials.silicon import (
 )
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.priors import (
-    ALL_LAWS,
-    PAPERS,
-    UNCERTAIN,
     default_priors,
     draw_values,
     updated,
@@ -142,7 +139,7 @@ def values_from_priors(nominal: Probe, rng: np.random.Generator) -> dict[str, fl
 
     Its laws do not depart from their formulas.
     """
-    lawful = updated(default_priors(nominal), {ALL_LAWS: PAPERS}, nominal, "twins")
+    lawful = updated(default_priors(nominal), {"laws": "paper"}, nominal, "twins")
     return draw_values(
         {name: prior for name, prior in lawful.items() if name != "series_resistance_ohm"}, rng
     )
@@ -240,12 +237,12 @@ def judge(
     what: str = "iv",
     departures: Collection[str] = DEPARTURES,
     noise: float = NOISE,
-    laws: str = UNCERTAIN,
+    laws: str = "uncertain",
     rows: int = 101,
 ) -> xr.Dataset:
     """Simulate the lever of a number, calibrate it, and compare with its true temperature.
 
-    The calibration takes the laws of silicon to be uncertain, or the paper's (`ALL_LAWS`), and is
+    The calibration takes the laws of silicon to be uncertain, or the paper's (``laws``), and is
     compared at so many even biases, its rows.
 
     Returns
@@ -270,7 +267,7 @@ def judge(
     tip, stated = off[0], off[0]
     began = time.process_time()
     try:
-        calibration = calibrate(data, probe=nominal, priors={ALL_LAWS: laws})
+        calibration = calibrate(data, probe=nominal, priors={"laws": laws})
     except HotleverError as error:
         refused = str(error)
     seconds = time.process_time() - began

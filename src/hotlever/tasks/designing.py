@@ -84,7 +84,6 @@ def vary_design(
 ) -> None:
     """Show how knee, tip temperature and loss to air depend on a probe's design."""
     from hotlever.datasets import write_dataset
-    from hotlever.probe.shapes import DRAWING
     from hotlever.studies import design as study
 
     beside: dict[str, Any] = {
@@ -119,7 +118,7 @@ def vary_design(
             sensitivities = study.sensitivities(start, power_mW=power_mW, air=air, progress=update)
         reporter.note(study.mesh_note(start.probe, power_mW))
         reporter.give(study.sensitivity_text(sensitivities) + "\n")
-        if start.probe.shape.shape == DRAWING:
+        if start.probe.shape.shape == "drawing":
             names = ", ".join(start.numbers)
             reporter.note(
                 f"a drawing has no dimensions but these; --vary NAME=START:STOP:COUNT of {names}"

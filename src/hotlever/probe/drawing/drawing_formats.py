@@ -19,22 +19,13 @@ from itertools import chain, pairwise
 from typing import Any
 
 #: Polygons, and corners in all, beyond which a file holds more than one lever.
-MOST_POLYGONS, MOST_CORNERS = 20_000, 200_000
-#: How deep blocks of a DXF file may be nested.
-_DEEPEST = 20
+MOST_POLYGONS = 20_000
 #: Points within this (µm) are one: a file does not state them better.
 _SAME_UM = 1e-6
 #: How lines begin in which gdstk and ezdxf warn.
 WARNS = ("[GDSTK] ", "ezdxf: ")
-#: Types of DXF entities that are areas, and those that are frames of something else.
-_AREAS = ("HATCH", "MPOLYGON", "SOLID", "TRACE", "3DFACE")
-_FRAMES = ("IMAGE", "WIPEOUT", "VIEWPORT")
-#: What of a hatch is filled, by its style: every other ring from outside, the first one, all.
-_RULES = {0: "even-odd", 1: "outer", 2: "all"}
 #: How many cubic curves stand for a circle: they are off by less than 1e-8 of its radius.
 _CURVES = 16
-#: Straight lines that stand for a circle of a wide polyline, at most.
-_MOST_LINES = 2000
 
 Ring = list[tuple[float, float]]
 
@@ -82,8 +73,8 @@ class Outlines:
     def count(self, points: Sequence[Any]) -> None:
         """Refuse a file of very many corners."""
         self.corners += len(points)
-        if self.corners > MOST_CORNERS:
-            raise Refusal(f"holds more than {MOST_CORNERS} corners, expected one lever")
+        if self.corners > 200_000:
+            raise Refusal("holds more than 200000 corners, expected one lever")
 
 
 def extent_of(points: Sequence[Sequence[float]]) -> float:
@@ -280,8 +271,8 @@ class _Drawing:
             if entity.dxftype() != "INSERT":
                 self._take(entity, name, unseen)
                 continue
-            if depth >= _DEEPEST:
-                raise Refusal(f"blocks are nested more than {_DEEPEST} deep")
+            if depth >= 20:
+                raise Refusal("blocks are nested more than 20 deep")
             if entity.mcount > MOST_POLYGONS:
                 raise Refusal(f"an array of {entity.mcount} blocks, expected one lever")
             block = entity.dxf.get("name", "")
@@ -351,7 +342,7 @@ class _Drawing:
             # the frame of a spline is not seen
             entity.vertices[:] = [each for each in entity.vertices if not each.dxf.flags & 16]
         try:
-            if kind in _FRAMES:
+            if kind in ("IMAGE", "WIPEOUT", "VIEWPORT"):
                 raise TypeError
             curve = path.make_path(entity, segments=_CURVES)
         except TypeError:
@@ -363,9 +354,11 @@ class _Drawing:
             self.outlines.leave_out(name, f"{kind} without extent")
             return
         rule = None
-        if kind in _AREAS:
+        if kind in ("HATCH", "MPOLYGON", "SOLID", "TRACE", "3DFACE"):
             style = entity.dxf.get("hatch_style", 0) if kind == "HATCH" else 0
-            rule = _RULES.get(style, _RULES[0])
+            # what is filled: every other ring from outside, the first one, all
+            rules = {0: "even-odd", 1: "outer", 2: "all"}
+            rule = rules.get(style, rules[0])
         elif kind in ("LWPOLYLINE", "POLYLINE") and entity.has_width:
             self.outlines.note(name, f"{{}} {kind} counts as wide as it is drawn")
             self.wide.append((name, entity))
@@ -436,7 +429,7 @@ class _Drawing:
         # the outer side of what is wide is hardly ever twice as far from its centre as its middle
         radius_um = 2 * self.unit_um * max(radius for _, radius in _segments(polyline))
         lines = math.pi * math.sqrt(radius_um / (2 * self.tolerance_um))
-        segments = min(math.ceil(lines), _MOST_LINES)
+        segments = min(math.ceil(lines), 2000)
         trace = TraceBuilder.from_polyline(polyline, segments=max(segments, _CURVES))
         faces = trace.faces_wcs(polyline.ocs(), 0.0)
         return [self._ring(face) for face in faces]

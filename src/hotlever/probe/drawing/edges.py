@@ -36,23 +36,8 @@ from hotlever.probe.drawing.outlines import (
 from hotlever.probe.layout import Film, Layout, Point, Region, Terminal
 from hotlever.types import Array, Index
 
-#: Share of its length by which an edge may stick out of a terminal that names a line.
-_ENDS = 2.0
-#: How far (µm) from the outline an edge is none of it.
-_OFF = 1e-6
-#: Share of a leg that a contact may cover without a word.
-_COVERED = 0.1
-#: Share of what a contact covers that a film below it must take up to be that contact's metal.
-_IS_FILM = 0.9
 #: How far off (µm) a point is still a corner, or on a line.
 _SAME_UM = 1e-6
-#: Cosine of the angle between a border and the outline's normal below which it runs along it.
-_ALONG = 0.3
-#: How far from outline and corners places move partly with them (µm): borders of low-doped silicon,
-#: since its dopant stays, and those of films, which stay themselves.
-_WITH_DOPANT_UM, _WITH_FILMS_UM = 1.0, 0.1
-#: Sine of the angle between a terminal and the edge beside it below which it goes straight on.
-_STRAIGHT_ON = 0.01
 
 
 def terminal_edges(
@@ -120,16 +105,17 @@ def cut_away(
     rest = next((piece for piece in pieces if piece.covers(shapely.Point(tip))), None)
     if rest is None:
         raise DrawingError(f"it lies outside the {body}", "tip_um", place=tip)
+    off_um = 1e-6  # from the outline, where an edge is none of it
     borders = []
     for start, end in outline_edges(rest):
         middle = LineString([start, end]).interpolate(0.5, normalized=True)
-        if outline.boundary.distance(middle) > _OFF:
+        if outline.boundary.distance(middle) > off_um:
             name = min(areas, key=lambda name: areas[name].boundary.distance(middle))
             borders.append(Terminal(name, start, end))
     remaining_ends = [
         end
         for end in ends
-        if rest.boundary.distance(shapely.Point(np.mean([end.start, end.end], axis=0))) < _OFF
+        if rest.boundary.distance(shapely.Point(np.mean([end.start, end.end], axis=0))) < off_um
     ]
     names = {end.name for end in (*remaining_ends, *borders)}
     for name in (*areas, *(end.name for end in ends)):
@@ -159,13 +145,14 @@ def covered(layout: Layout, terminals: Iterable[DrawnTerminal], films: Iterable[
         below = body.intersection(shapely.union_all(areas))
         if terminal.by_area or not areas or below.area == 0:
             continue
-        if below.intersection(metal).area > _IS_FILM * below.area:
+        # a film below a contact that takes up nearly all of it is that contact's metal
+        if below.intersection(metal).area > 0.9 * below.area:
             continue
         edge = shapely.union_all(list(map(line_of, ends)))
         reach, leg = _farthest(edge, below), edge.distance(heaters)
         # where a film heats all along, all of it is the leg
         leg = leg if leg > 0 else _farthest(edge, body)
-        if reach > _COVERED * leg:
+        if reach > 0.1 * leg:
             notes.append(
                 f"{terminal_part(terminal.name)} covers {reach:.3g} µm of a leg of {leg:.3g} µm "
                 "but counts as its end only, the rest as bare silicon; to make all of it a "
@@ -209,7 +196,7 @@ def along(edge: tuple[Point, Point], line: Ring, tolerance: float) -> tuple[Poin
     if high - low < tolerance:
         return None
     # a line that ends nearly at a corner ends there
-    near = _ENDS * tolerance
+    near = 2.0 * tolerance
     first = edge[0] if low < near else _point(start + low * unit)
     last = edge[1] if high > length - near else _point(start + high * unit)
     return first, last
@@ -347,7 +334,7 @@ class _OutlineRates:
         normals, rates = self._outward[[first, last]], self._rates[[first, last]]
         if rates[0] == rates[1]:
             return np.asarray(rates[0] * normals.sum(axis=0) / (1.0 + normals[0] @ normals[1]))
-        if abs(np.linalg.det(normals)) < _STRAIGHT_ON:
+        if abs(np.linalg.det(normals)) < 0.01:
             what = "beside a terminal the edge goes straight on: its edges cannot be shifted"
             raise DrawingError(what, body, place=self._starts[last])
         return np.linalg.solve(normals, rates)
@@ -392,13 +379,15 @@ class _OutlineRates:
 
     def _near(self, point: Array) -> float:
         """Return how far what moves with it is from a place."""
-        return _WITH_DOPANT_UM if _key(point) in self._of_dopant else _WITH_FILMS_UM
+        # borders of low-doped silicon move as its dopant does, those of films stay themselves
+        return 1.0 if _key(point) in self._of_dopant else 0.1
 
     def _slide(self, edge: int, at: Array) -> Array | None:
         """Return the rate of a place on an edge at which a border goes straight on, if it can."""
         normal = self._outward[edge]
         borders = self._borders.get(_key(at), [])
-        steep = [border / (border @ normal) for border in borders if abs(border @ normal) > _ALONG]
+        # others run along the outline
+        steep = [border / (border @ normal) for border in borders if abs(border @ normal) > 0.3]
         if not steep or any(np.abs(steep[0] - other).max() > _SAME_UM for other in steep):
             return None
         return np.asarray(self._rates[edge] * steep[0])

@@ -20,7 +20,6 @@ from shapely import box as rectangle
 
 from hotlever.errors import InputError, quoted
 from hotlever.materials import LOW_DOPED
-from hotlever.probe.drawing.layers import DRAWN, SILICON
 from hotlever.probe.drawing.outlines import GRID, DrawingError, Ring, polygons, rings_of
 from hotlever.probe.layout import Layout, Point
 from hotlever.types import Array
@@ -28,13 +27,6 @@ from hotlever.types import Array
 __all__ = ["Drawing", "Layer", "Polygon", "difference", "fillet", "mirror", "rectangle", "union"]
 
 Area: TypeAlias = "Polygon | MultiPolygon | Sequence[Point]"
-#: What is drawn by numbers is drawn well (µm): where a dimension moves one of two edges that were
-#: the same, they are not the same any more.
-_TOLERANCE_UM = 1e-4
-#: Straight lines that stand for a quarter of a circle.
-_QUARTER = 8
-#: An angle (rad) by which an outline turns that is no corner.
-_STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -107,7 +99,7 @@ class Drawing:
         """Return the drawing of a lever of a built-in shape."""
         low = {each.name: each.outline for each in layout.regions if each.material == LOW_DOPED}
         return cls(
-            layers={SILICON: union(*(region.outline for region in layout.regions)), **low},
+            layers={"silicon": union(*(region.outline for region in layout.regions)), **low},
             terminals={end.name: (end.start, end.end) for end in layout.terminals},
             tip_um=layout.tip,
             thickness_um=layout.thickness_um,
@@ -127,7 +119,9 @@ class Drawing:
             if getattr(self, name) is not None
         }
         if self.file is None:
-            probe.setdefault("tolerance_um", _TOLERANCE_UM)
+            # what is drawn by numbers is drawn well: where a dimension moves one of two edges that
+            # were the same, they are not the same any more
+            probe.setdefault("tolerance_um", 1e-4)
         return {
             "probe": {"shape": "drawing", **probe},
             "layers": {name: _stated(each) for name, each in self.layers.items()},
@@ -179,7 +173,7 @@ def mirror(area: Area, *, x_um: float | None = None, y_um: float = 0.0) -> Polyg
 
 
 def fillet(
-    area: Area, radius_um: float, at: Sequence[Point] | None = None, *, quarter: int = _QUARTER
+    area: Area, radius_um: float, at: Sequence[Point] | None = None, *, quarter: int = 8
 ) -> Polygon | MultiPolygon:
     """Return an area with rounded corners.
 
@@ -227,7 +221,7 @@ def _rounded(outline: Ring, chosen: Array, radius: float, quarter: int) -> Array
     room = np.linalg.norm(after, axis=1)
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     turn = math.pi - np.abs(np.arctan2(cross, (before * after).sum(axis=1)))
-    here = (ring[:, None] == chosen).all(axis=2).any(axis=1) & (turn > _STRAIGHT)
+    here = (ring[:, None] == chosen).all(axis=2).any(axis=1) & (turn > 1e-6)
     cut = np.where(here, radius * np.tan(turn / 2), 0.0)
     lacking = cut + np.roll(cut, -1) - room
     if lacking.max() > 0:
@@ -281,7 +275,7 @@ def _stated(entry: Any) -> Any:
     if isinstance(entry, Layer):
         own = {"material": entry.material, "thickness_um": entry.thickness_um}
         own = {key: value for key, value in own.items() if value is not None}
-        return {DRAWN: _stated(entry.drawn), **own} if own else _stated(entry.drawn)
+        return {"drawn": _stated(entry.drawn), **own} if own else _stated(entry.drawn)
     if isinstance(entry, Mapping):
         return {key: _stated(area) for key, area in entry.items()}
     # the name of a layer, or a list of points, stays as it is

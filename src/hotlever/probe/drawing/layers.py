@@ -17,27 +17,18 @@ from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.probe.drawing.outlines import Ring
-from hotlever.probe.shapes import DRAWN, EDGE_BIAS, edge_bias
+from hotlever.probe.shapes import EDGE_BIAS, edge_bias
 from hotlever.records import Record
 
-SILICON, BODY, HEATER = "silicon", "body", "heater"
 #: Terminals that a lever must have.
 REQUIRED = ("supply", "ground")
-#: Key of outlines where all below a terminal's is contact.
-AREA = "area"
-#: Keys of a layer of the silicon of ``[material]`` of which more than outlines is said.
-_EDGES = {DRAWN, EDGE_BIAS}
-#: Thickness that a film may have (µm).
-_THINNEST_UM, _THICKEST_UM = 0.001, 20.0
-
-Rings = tuple[Ring, ...]
 
 
 class DrawnPart(Record):
     """What has outlines in a drawing; one of two points is a line."""
 
     name: str
-    drawn: Rings
+    drawn: tuple[Ring, ...]
 
     @property
     def part(self) -> str:
@@ -47,7 +38,7 @@ class DrawnPart(Record):
     def scaled(self, scale: float) -> Any:
         """Return it some times as large."""
         rings = tuple(tuple((scale * x, scale * y) for x, y in ring) for ring in self.drawn)
-        return self if scale == 1.0 else self.model_copy(update={DRAWN: rings})
+        return self if scale == 1.0 else self.model_copy(update={"drawn": rings})
 
 
 class DrawnTerminal(DrawnPart):
@@ -62,7 +53,7 @@ class DrawnTerminal(DrawnPart):
 
     def section(self) -> Any:
         """Return its value in ``[terminals]``."""
-        return {AREA: self.drawn} if self.by_area else self.drawn
+        return {"area": self.drawn} if self.by_area else self.drawn
 
 
 class DrawnLayer(DrawnPart):
@@ -71,8 +62,8 @@ class DrawnLayer(DrawnPart):
     material: str = Field(description="of [materials]")
     thickness_um: float | None = Field(
         default=None,
-        ge=_THINNEST_UM,
-        le=_THICKEST_UM,
+        ge=0.001,
+        le=20.0,
         description="of a film on the body; left out: a part of the body",
     )
     edge_bias_um: float = edge_bias("edges of outline or window lie so far outside the drawing")
@@ -82,7 +73,7 @@ class DrawnLayer(DrawnPart):
     @property
     def is_body(self) -> bool:
         """Whether it is the outline of the lever."""
-        return self.name in (SILICON, BODY)
+        return self.name in ("silicon", "body")
 
     @property
     def window_bias_um(self) -> float:
@@ -139,21 +130,22 @@ def layer_values(
     InputError
         If the body or a heater is missing, a key is wrong, or a material does not exist.
     """
-    if SILICON in section and BODY in section:
+    if "silicon" in section and "body" in section:
         raise InputError(
-            f"{where}: {SILICON} and {BODY}: expected one of them, the outline of the lever"
+            f"{where}: silicon and body: expected one of them, the outline of the lever"
         )
-    body = BODY if BODY in section else SILICON
+    body = "body" if "body" in section else "silicon"
     if body not in section:
-        raise _missing(SILICON, section, where)
+        raise _missing("silicon", section, where)
+    # of the silicon of [material] more than outlines may be said
     named = {
         name
         for name, entry in section.items()
-        if isinstance(entry, Mapping) and entry.keys() != _EDGES
+        if isinstance(entry, Mapping) and entry.keys() != {"drawn", EDGE_BIAS}
     }
     layers = {}
     for name, entry in section.items():
-        own = dict(entry) if isinstance(entry, Mapping) else {DRAWN: entry}
+        own = dict(entry) if isinstance(entry, Mapping) else {"drawn": entry}
         if name in named:
             own = _of_material(entry, kinds, f"{where.removesuffix(']')}.{name}]")
         elif name == body:
@@ -161,16 +153,16 @@ def layer_values(
         else:
             own |= {"material": LOW_DOPED, "kind": "n-silicon"}
         layers[name] = {"name": name, **own}
-    if BODY in section and BODY not in named:
+    if "body" in section and "body" not in named:
         raise InputError(
-            f'{where}: {BODY}: expected a section [layers.{BODY}] with drawn = "1/0" and material'
+            f'{where}: body: expected a section [layers.body] with drawn = "1/0" and material'
         )
     if layers[body].get("thickness_um") is not None:
         raise InputError(
             f"{where}: {body}: thickness_um of the body stands in [probe], expected it there only"
         )
-    if HEATER not in layers and not named:
-        raise InputError(f"{where}: {HEATER} is missing")
+    if "heater" not in layers and not named:
+        raise InputError(f"{where}: heater is missing")
     low_doped = next((name for name in layers if name != body and name not in named), None)
     if low_doped and not issubclass(KINDS[layers[body]["kind"]], HighDopedSilicon):
         raise InputError(
@@ -189,11 +181,11 @@ def _missing(name: str, section: Mapping[str, Any], where: str) -> InputError:
 
 def _of_material(entry: Mapping[str, Any], kinds: Mapping[str, str], where: str) -> dict[str, Any]:
     """Return what a section says of a layer, with the kind of its material."""
-    if DRAWN not in entry:
-        raise InputError(f"{where}: {DRAWN} is missing")
+    if "drawn" not in entry:
+        raise InputError(f"{where}: drawn is missing")
     for key in ("name", "kind"):
         if key in entry:
-            keys = (DRAWN, "material", "thickness_um", EDGE_BIAS)
+            keys = ("drawn", "material", "thickness_um", EDGE_BIAS)
             raise unknown_name("key", key, keys, where)
     if "material" not in entry:
         raise InputError(f"{where}: material is missing")
@@ -221,11 +213,11 @@ def terminal_values(section: Mapping[str, Any], where: str) -> dict[str, dict[st
     terminals = {}
     for name, entry in section.items():
         by_area, here = isinstance(entry, Mapping), f"{where.removesuffix(']')}.{name}]"
-        others = [key for key in entry if key != AREA] if by_area else []
+        others = [key for key in entry if key != "area"] if by_area else []
         if others:
-            raise unknown_name("key", others[0], (AREA,), here)
+            raise unknown_name("key", others[0], ("area",), here)
         if by_area and not entry:
-            raise InputError(f"{here}: {AREA} is missing")
-        drawn = entry[AREA] if by_area else entry
-        terminals[name] = {"name": name, DRAWN: drawn, "by_area": by_area}
+            raise InputError(f"{here}: area is missing")
+        drawn = entry["area"] if by_area else entry
+        terminals[name] = {"name": name, "drawn": drawn, "by_area": by_area}
     return terminals

@@ -30,12 +30,6 @@ Ring = tuple[Point, ...]
 GRID = 1e-9
 #: No part of a lever is narrower than this many tolerances, nor are two that do not touch nearer.
 NARROWEST = 5.0
-#: Corners of a healed outline beyond which its mesh takes minutes.
-_MOST_CORNERS = 2000
-#: Share of the tolerance by which a corner must stand out.
-STANDS_OUT = 0.25
-#: Angle (rad) of a corner below which nothing is meshed.
-_SHARPEST = math.radians(1.0)
 
 
 class DrawingError(InputError):
@@ -229,11 +223,14 @@ def without_nested(rings: tuple[Ring, ...]) -> tuple[Ring, ...]:
 
 def healed(part: str, areas: list[Polygon], tolerance: float) -> BaseGeometry:
     """Return the union of polygons, slits of less than the tolerance closed."""
-    whole = _closed(together(areas, tolerance), tolerance).simplify(STANDS_OUT * tolerance)
+    # corners must stand out by a share of the tolerance
+    whole = _closed(together(areas, tolerance), tolerance).simplify(0.25 * tolerance)
     corners = shapely.count_coordinates(whole)
-    if corners > _MOST_CORNERS:
+    # with more its mesh takes minutes
+    most = 2000
+    if corners > most:
         raise DrawingError(
-            f"{corners} corners, expected at most {_MOST_CORNERS}; a larger tolerance_um than "
+            f"{corners} corners, expected at most {most}; a larger tolerance_um than "
             f"{tolerance:g} makes curves of fewer",
             part,
         )
@@ -349,7 +346,8 @@ def _check_angles(part: str, shape: Polygon, drawn: list[Polygon]) -> None:
         before, after = (np.roll(corners, way, axis=0) - corners for way in (1, -1))
         cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
         angle = np.abs(np.arctan2(cross, (before * after).sum(axis=1)))
-        if angle.min() < _SHARPEST:
+        # nothing is meshed in sharper corners
+        if angle.min() < math.radians(1.0):
             raise DrawingError(
                 f"a corner of {math.degrees(angle.min()):.2g}°, expected 1° or more",
                 part,

@@ -18,8 +18,6 @@ from hotlever.probe.layout import Layout
 from hotlever.probe.parts import PARTS
 from hotlever.probe.shapes import EDGE_BIAS, PARAMETRIC_DRAWING, Shape, edge_bias
 
-#: What a dimension may be (µm).
-_LONGEST_UM = 2000.0
 #: The shapes of functions that probes of this process were made of, by the functions' names.
 _SHAPES: dict[str, type[ParametricDrawing]] = {}
 
@@ -177,7 +175,7 @@ def _dimensions(function: Callable[..., Drawing]) -> dict[str, Any]:
         meaning = words or name.removesuffix("_um").replace("_", " ")
         fields[name] = (
             float,
-            Field(default=float(default), gt=0, le=_LONGEST_UM, description=meaning),
+            Field(default=float(default), gt=0, le=2000.0, description=meaning),
         )
     owners = {EDGE_BIAS: "every drawing"} | {
         name: f"[{section}]" for section, part in PARTS.items() for name in part.model_fields

@@ -17,8 +17,6 @@ from hotlever.probe.drawing.outlines import GRID, DrawingError, parts_of
 from hotlever.probe.layout import BorderTaper, Point, Taper, Terminal
 from hotlever.types import Array
 
-Edge = frozenset[Point]
-
 
 @dataclass(frozen=True)
 class PartitionPiece:
@@ -48,7 +46,7 @@ class Partition:
     """
 
     pieces: list[PartitionPiece]
-    shared: dict[tuple[int, int], list[Edge]]
+    shared: dict[tuple[int, int], list[frozenset[Point]]]
 
     def neighbours(self, number: int) -> set[int]:
         """Return the pieces that touch one along an edge."""
@@ -159,13 +157,13 @@ def partitioned(
         for kind in sorted(kinds, key=lambda kind: order.index(kind[0]))
         for shape in sorted(parts_of(shapely.union_all(kinds[kind])), key=lambda shape: -shape.area)
     ]
-    owners: dict[Edge, list[int]] = defaultdict(list)
+    owners: dict[frozenset[Point], list[int]] = defaultdict(list)
     for number, piece in enumerate(pieces):
         for face in kinds[piece.layers]:
             if piece.shape.covers(face.representative_point()):
                 for edge in map(frozenset, outline_edges(face)):
                     owners[edge].append(number)
-    shared: dict[tuple[int, int], list[Edge]] = defaultdict(list)
+    shared: dict[tuple[int, int], list[frozenset[Point]]] = defaultdict(list)
     for edge, touching in owners.items():
         if len(touching) == 2 and touching[0] != touching[1]:
             shared[min(touching), max(touching)].append(edge)

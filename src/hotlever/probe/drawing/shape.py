@@ -21,14 +21,9 @@ from hotlever.files import whole_file
 from hotlever.materials import HIGH_DOPED
 from hotlever.probe.drawing.edges import check_apart, covered, cut_away, etched, terminal_edges
 from hotlever.probe.drawing.layers import (
-    AREA,
-    BODY,
-    HEATER,
     REQUIRED,
-    SILICON,
     DrawnLayer,
     DrawnTerminal,
-    Rings,
     layer_values,
     terminal_part,
     terminal_values,
@@ -61,11 +56,8 @@ from hotlever.probe.drawing.sheet import (
 )
 from hotlever.probe.layout import BorderTaper, Film, Layout, Part, Point, Region, Taper, Terminal
 from hotlever.probe.mesh import MOST_SQUARES
-from hotlever.probe.shapes import DRAWN, EDGE_BIAS, Shape, full_bias_name, thickness
+from hotlever.probe.shapes import EDGE_BIAS, Shape, full_bias_name, thickness
 from hotlever.records import Record
-
-#: Outlines nearer than so many tolerances to that of the body are the same.
-_SNAP = 1.5
 
 
 @lru_cache(maxsize=32)
@@ -94,7 +86,8 @@ def build_layout(
         (`hotlever.probe.drawing.partition`) or a terminal (`hotlever.probe.drawing.edges`).
     """
     by_name = {layer.name: layer for layer in layers}
-    narrowest, snap = NARROWEST * tolerance_um, _SNAP * tolerance_um
+    # outlines that are nearer to that of the body are the same
+    narrowest, snap = NARROWEST * tolerance_um, 1.5 * tolerance_um
     body = next(layer.name for layer in layers if layer.is_body)
     by_area = [end for end in terminals if end.by_area]
     rings = by_name[body].drawn
@@ -139,10 +132,10 @@ def build_layout(
         layout = etched(body, layout, outline, bias, tolerance_um)
     for region in layout.regions:
         squares = region.area / region.narrow_um**2
-        if HEATER in region.layers and squares > MOST_SQUARES:
+        if "heater" in region.layers and squares > MOST_SQUARES:
             what = f"{region.narrow_um:.3g} µm wide and {squares:.0f} times as long, expected at "
             raise DrawingError(
-                f"{what}most {MOST_SQUARES:g}", HEATER, drawn[HEATER], region.polygon
+                f"{what}most {MOST_SQUARES:g}", "heater", drawn["heater"], region.polygon
             )
     if not layout.contains(np.array([tip])).all():
         raise DrawingError(f"it lies outside the {body}", "tip_um", place=tip)
@@ -281,10 +274,10 @@ def _parts(
         if at[name] <= insulates:
             raise fault("it touches no conductor", terminal_part(name), at[name])
     pieces = range(len(partition.pieces))
-    drawn = {number for number in pieces if HEATER in partition.pieces[number].layers}
+    drawn = {number for number in pieces if "heater" in partition.pieces[number].layers}
     heaters = drawn - insulates
     if drawn and not heaters:
-        raise fault("it conducts no current", HEATER, drawn)
+        raise fault("it conducts no current", "heater", drawn)
     at_supply, at_ground = (at[name] for name in REQUIRED)
     supply, ground = (
         partition.reached(start, heaters | insulates) for start in (at_supply, at_ground)
@@ -299,7 +292,7 @@ def _parts(
         raise fault("it lies on the heater", terminal_part(name), at[name])
     if supply & ground:
         what = "supply and ground are joined without it: no current has to pass"
-        raise fault(what, HEATER, heaters)
+        raise fault(what, "heater", heaters)
     legs: tuple[tuple[Part, set[int], set[int]], ...] = (
         ("leg 1", supply, at_supply),
         ("leg 2", ground, at_ground),
@@ -319,14 +312,6 @@ def _parts(
 
 #: What is nearer is the same (µm), unless a probe file says otherwise.
 TOLERANCE_UM = 0.002
-#: Steps of the coordinates (µm), and how many of them a file counts.
-GRID_UM, _MOST_STEPS = 1e-4, 2**31 - 1
-_CELL = "LEVER"
-#: Number of the layer of the first terminal, if there are not more of others.
-_TERMINALS = 10
-#: Holes that are named by their polygons.
-_MOST_HOLES = 10
-
 
 #: A place that is drawn, and an outline or a line, as lists or tuples (µm).
 _Coordinate = Annotated[float, Field(strict=True, gt=-FARTHEST_UM, lt=FARTHEST_UM)]
@@ -533,15 +518,15 @@ class DrawnShape(DrawingFile, Shape):
             _add_bias(layers, bias, here)
         terminals = terminal_values(_section(sections, "terminals", where), f"{where}: [terminals]")
         parts = layers | {terminal_part(name): end for name, end in terminals.items()}
-        named = {part: own[DRAWN] for part, own in parts.items() if isinstance(own[DRAWN], str)}
+        named = {part: own["drawn"] for part, own in parts.items() if isinstance(own["drawn"], str)}
         stated = {key: values[key] for key in DrawingFile.model_fields if key in values}
         sheet = DrawingFile.from_values(stated, here).sheet(here, folder) if named else None
         if sheet is not None:
             values["remarks"] = tuple(sheet.notes(named.values())) or None
         for own in layers.values():
-            own[DRAWN] = _rings(sheet, own, f"{where}: [layers] {own['name']}")
+            own["drawn"] = _rings(sheet, own, f"{where}: [layers] {own['name']}")
         for own in terminals.values():
-            own[DRAWN] = _rings(sheet, own, f"{where}: [terminals] {own['name']}", lines=True)
+            own["drawn"] = _rings(sheet, own, f"{where}: [terminals] {own['name']}", lines=True)
         drawn_layers = tuple(
             DrawnLayer.from_values(layer, f"{where}: [layers.{name}]")
             for name, layer in layers.items()
@@ -567,7 +552,7 @@ def _add_bias(layers: Mapping[str, dict[str, Any]], bias: Any, where: str) -> No
     InputError
         If that says it too.
     """
-    (body,) = (name for name in layers if name in (SILICON, BODY))
+    (body,) = (name for name in layers if name in ("silicon", "body"))
     if EDGE_BIAS in layers[body]:
         raise InputError(f"{where}: {EDGE_BIAS}: expected it in [layers.{body}] only")
     layers[body][EDGE_BIAS] = bias
@@ -575,8 +560,9 @@ def _add_bias(layers: Mapping[str, dict[str, Any]], bias: Any, where: str) -> No
 
 def _cut_by(numbers: list[int]) -> str:
     """Say which polygons are holes."""
-    first = [str(number) for number in numbers[:_MOST_HOLES]]
-    if len(numbers) > _MOST_HOLES:
+    most = 10
+    first = [str(number) for number in numbers[:most]]
+    if len(numbers) > most:
         first.append("…")
     polygons_ = ", ".join(first)
     return f"{counted(len(numbers), 'hole')}, cut by polygon{'s'[: len(numbers) - 1]} {polygons_}"
@@ -607,9 +593,9 @@ def _section(sections: Mapping[str, Any], name: str, where: str) -> dict[str, An
 
 def _rings(
     sheet: Sheet | None, own: Mapping[str, Any], where: str, *, lines: bool = False
-) -> Rings:
+) -> tuple[Ring, ...]:
     """Return the outlines of a layer, of a list of points or of a list of such lists."""
-    drawn = own[DRAWN]
+    drawn = own["drawn"]
     if sheet is not None and isinstance(drawn, str):
         layer = sheet.layer(drawn, where)
         if layer.lines and not lines:
@@ -657,19 +643,22 @@ def save_drawing(drawn: DrawnShape, path: str | os.PathLike[str], folder: Path) 
     # imported here: it is needed to write only, files are read in processes of their own
     import gdstk
 
-    library = gdstk.Library("hotlever", unit=1e-6, precision=1e-6 * GRID_UM)
-    cell, sections = library.new_cell(_CELL), drawn.sections()
+    grid_um = 1e-4
+    library = gdstk.Library("hotlever", unit=1e-6, precision=1e-6 * grid_um)
+    cell_name = "LEVER"
+    cell, sections = library.new_cell(cell_name), drawn.sections()
     sections["probe"] |= {
         "file": relative(Path(path), folder),
-        "cell": _CELL,
+        "cell": cell_name,
         # finer than the steps nothing is the same
         "tolerance_um": max(drawn.tolerance_um, TOLERANCE_UM),
     }
 
-    def added(name: str, rings: Rings, number: int) -> str:
+    def added(name: str, rings: tuple[Ring, ...], number: int) -> str:
         farthest = max(max(map(abs, point)) for ring in rings for point in ring)
-        if farthest > _MOST_STEPS * GRID_UM:
-            what = f"{farthest:g} µm from the origin, expected {_MOST_STEPS * GRID_UM:.0f} µm"
+        most_um = (2**31 - 1) * grid_um  # a file counts steps in 32 bits
+        if farthest > most_um:
+            what = f"{farthest:g} µm from the origin, expected {most_um:.0f} µm"
             raise DrawingError(f"{what} at most", name)
         for area in parts_of(together(polygons(name, rings, 0.0), 0.0)):
             outline, *holes = (
@@ -678,7 +667,7 @@ def save_drawing(drawn: DrawnShape, path: str | os.PathLike[str], folder: Path) 
             )
             if holes:
                 # an outline that runs along itself, around its holes
-                cell.add(*gdstk.boolean(outline, holes, "not", GRID_UM, layer=number))
+                cell.add(*gdstk.boolean(outline, holes, "not", grid_um, layer=number))
             else:
                 cell.add(outline)
         return f"{number}/0"
@@ -687,12 +676,13 @@ def save_drawing(drawn: DrawnShape, path: str | os.PathLike[str], folder: Path) 
         drawn_as = added(layer.name, layer.drawn, number)
         whole = sections["layers"][layer.name]
         of_more = isinstance(whole, Mapping)
-        sections["layers"][layer.name] = whole | {DRAWN: drawn_as} if of_more else drawn_as
-    first = max(_TERMINALS, len(drawn.layers) + 1)
+        sections["layers"][layer.name] = whole | {"drawn": drawn_as} if of_more else drawn_as
+    # terminals begin at layer 10, if there are not more of others
+    first = max(10, len(drawn.layers) + 1)
     for number, end in enumerate(drawn.terminals, start=first):
         if all(len(ring) > 2 for ring in end.drawn):
             drawn_as = added(end.part, end.drawn, number)
-            sections["terminals"][end.name] = {AREA: drawn_as} if end.by_area else drawn_as
+            sections["terminals"][end.name] = {"area": drawn_as} if end.by_area else drawn_as
     with whole_file(path) as temporary:
         library.write_gds(temporary, max_points=0)
     return sections

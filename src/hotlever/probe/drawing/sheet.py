@@ -24,10 +24,6 @@ from hotlever.probe.drawing.drawing_formats import WARNS
 from hotlever.probe.drawing.outlines import Ring, rings_of, united, without_nested
 from hotlever.probe.layout import Point
 
-#: Bytes that a file may have, and of memory and seconds that reading it may take.
-_LARGEST, _MEMORY, _PATIENCE_S = 64 * 2**20, 4 * 2**30, 60.0
-#: Warnings of libraries that are told, and their length.
-_MOST_WARNINGS, _LONGEST_WARNING = 5, 200
 #: Coordinates (µm) beyond which nothing is drawn on a wafer.
 FARTHEST_UM = 1e6
 #: Extent of a lever (µm).
@@ -155,7 +151,7 @@ def read_sheet(
     InputError
         If the file cannot be read, has no such cell or several top cells.
     """
-    content = read_bytes(path, _LARGEST)
+    content = read_bytes(path, 64 * 2**20)
     parsed = _read_apart(content, str(path), cell, unit_um, tolerance_um)
     _check_places(parsed, str(path), unit_stated_by)
     layers = {}
@@ -182,7 +178,7 @@ def read_sheet(
     elif sheet.cell not in sheet.cells:
         raise unknown_name("cell", sheet.cell, sheet.cells, str(path))
     if not layers:
-        why = "; ".join(["holds no outline", *(text for _, text in sheet.remarks[:_MOST_WARNINGS])])
+        why = "; ".join(["holds no outline", *(text for _, text in sheet.remarks[:5])])
         raise InputError(f"{path}: {why}")
     return sheet
 
@@ -196,7 +192,7 @@ def _read_apart(
         "unit_um": unit_um,
         "tolerance_um": tolerance_um,
         "largest_um": LARGEST_UM,
-        "memory": _MEMORY,
+        "memory": 4 * 2**30,
     }
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder, "drawing")
@@ -208,16 +204,17 @@ def _read_apart(
         }
         script = str(Path(__file__).with_name("drawing_formats.py"))
         try:
+            patience_s = 60.0
             done = subprocess.run(
                 [sys.executable, "-P", script, str(copy), json.dumps(options)],
                 capture_output=True,
                 stdin=subprocess.DEVNULL,
-                timeout=_PATIENCE_S,
+                timeout=patience_s,
                 env=environment,
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            raise InputError(f"{path}: not read within {_PATIENCE_S:g} s") from None
+            raise InputError(f"{path}: not read within {patience_s:g} s") from None
     try:
         sheet: dict[str, Any] = json.loads(done.stdout)
     except ValueError:
@@ -228,11 +225,10 @@ def _read_apart(
     lines = done.stderr.decode(errors="replace").splitlines()
     warned = list(dict.fromkeys(line for line in lines if line.startswith(WARNS)))
     remarks = [
-        ("", f"warning while the file was read: {excerpt(line, _LONGEST_WARNING)}")
-        for line in warned[:_MOST_WARNINGS]
+        ("", f"warning while the file was read: {excerpt(line, 200)}") for line in warned[:5]
     ]
-    if len(warned) > _MOST_WARNINGS:
-        remarks.append(("", f"and {len(warned) - _MOST_WARNINGS} more warnings"))
+    if len(warned) > 5:
+        remarks.append(("", f"and {len(warned) - 5} more warnings"))
     sheet["remarks"] = [(layer, text) for layer, text in sheet.pop("notes", ())] + remarks
     return sheet
 
