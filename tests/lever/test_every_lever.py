@@ -21,7 +21,7 @@ from hotlever.lever.equations import BALANCES, balance_columns
 from hotlever.lever.lever import COARSE
 from hotlever.lever.monitors import MonitorMap
 from hotlever.lever.observables import Linearised, by_parameter
-from hotlever.lever.reduced.lever import BranchSolver, ReducedLever
+from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.lever.reduced.training import cached_reduction
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.space import LEVER, TIP
@@ -66,7 +66,7 @@ class One:
         return tuple(own or [*PARAMETERS, *effects])
 
     @property
-    def solver(self) -> BranchSolver:
+    def solver(self) -> SimilarLevers | ReducedLever:
         """What solves it for any material."""
         known = isinstance(self.lever, ReducedLever)
         return self.lever if known else SimilarLevers(self.lever)

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 from scipy.sparse import diags_array
 
-from hotlever.materials.departures import FACTORS, MODES_FROM, MODES_TO, PROFILE
+from hotlever.materials.departures import FACTORS, PROFILE
 from hotlever.materials.doping import tapered_doping
 from hotlever.materials.heat import thermal_conductivity, thermal_conductivity_of_layer
 from hotlever.materials.silicon import (
@@ -20,7 +20,7 @@ from hotlever.materials.silicon import (
 )
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S, PUBLISHED_VALUES
 
-T = np.linspace(MODES_FROM, MODES_TO, 51)
+T = np.linspace(300.0, 1300.0, 51)
 #: Dopings of heaters (cm⁻³), and that of legs.
 HEATERS, LEGS = (3e17, 6e17), 2.2e20
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from copy import copy
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -20,14 +20,6 @@ from hotlever.air.operator import AirOperator
 from hotlever.air.stores import HeatInAir
 from hotlever.errors import ComputationError
 from hotlever.types import Array, Index, LinearSolver
-
-
-class LocalLosses(Protocol):
-    """What losses at points, by the temperature there, add to the matrices of elements."""
-
-    def add_to(self, element_matrices: Array, slopes: Array) -> None:
-        """Add those of losses with these slopes (points,)."""
-        ...
 
 
 class AirLoss:
@@ -43,8 +35,8 @@ class AirLoss:
         Unknowns of the temperatures of the element at each site; −1 where the node is held.
     shares : ndarray, shape (sites, nodes)
         Their weights in the temperature at the site.
-    losses : LocalLosses, optional
-        What losses at the sites add to the matrices of elements.
+    add_losses : callable, optional
+        Adds to the matrices of elements those of losses at the sites with some slopes (sites,).
     size : int
         Number of unknowns, V_l included.
 
@@ -66,7 +58,7 @@ class AirLoss:
         unknowns: Index,
         shares: Array,
         size: int,
-        losses: LocalLosses | None = None,
+        add_losses: Callable[[Array, Array], None] | None = None,
     ) -> None:
         self._take(operator)
         self._nothing_around = HeatInAir.nothing(size)
@@ -77,7 +69,7 @@ class AirLoss:
             (shares[~held], (rows[~held], unknowns[~held])), shape=(len(unknowns), size)
         )
         self.spreading = self.sampling.T.tocsr()
-        self._losses = losses
+        self._add_losses = add_losses
 
     def _take(self, operator: Any) -> None:
         self.operator, self.filling = operator, operator.filling
@@ -137,8 +129,8 @@ class AirLoss:
 
         Each site loses as it would in a lever of one temperature.
         """
-        if self._losses is not None:
-            self._losses.add_to(element_matrices, self._local * kappa)
+        if self._add_losses is not None:
+            self._add_losses(element_matrices, self._local * kappa)
 
     def solver(self, factors: LinearSolver, kappa: Array, taken_up: Array | None) -> LinearSolver:
         """Return what solves the whole linear system, of the factors of its local part."""

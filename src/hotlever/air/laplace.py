@@ -25,10 +25,6 @@ from hotlever.types import Array, Index
 
 #: Stands for zero below a fraction whose factor vanishes there.
 _TINY = 1e-150
-#: Pairs whose centroids are this many times the sum of their radii apart are far.
-FAR = 3.0
-#: For near pairs that have no closed form, see `hotlever.air.single_layer.pairs_by_points`.
-ORDERS = ((8, 0.5), (6, 1.0), (4, 1.5), (3, 2.0), (2, np.inf))
 #: Signs of the limits: where both panels extend, and where one does.
 _TWICE, _ONCE = np.array([1.0, -1.0, -1.0, 1.0]), np.array([1.0, -1.0])
 
@@ -37,7 +33,9 @@ class Laplace:
     """The kernel 1/R; see `hotlever.air.single_layer.Kernel`."""
 
     shape: tuple[int, ...] = ()
-    dtype, far = np.dtype(float), FAR
+    dtype, far = np.dtype(float), 3.0
+    #: For near pairs that have no closed form, see `hotlever.air.single_layer.pairs_by_points`.
+    orders = ((8, 0.5), (6, 1.0), (4, 1.5), (3, 2.0), (2, np.inf))
 
     def far_pairs(self, first: Panels, second: Panels, square: Array) -> Array:
         """Return ∫∫ 1/R over distant pairs, to second order in size over distance."""
@@ -53,7 +51,7 @@ class Laplace:
         result = np.empty(len(i))
         result[closed] = rectangle_pairs(first.chosen(i[closed]), second.chosen(j[closed]))
         others = first.chosen(i[~closed]), second.chosen(j[~closed])
-        result[~closed] = pairs_by_points(*others, potential, ORDERS)
+        result[~closed] = pairs_by_points(*others, potential, self.orders)
         return result
 
 
@@ -68,7 +66,7 @@ class Approach:
     """
 
     shape: tuple[int, ...] = ()
-    dtype, far = np.dtype(float), FAR
+    dtype, far = Laplace.dtype, Laplace.far
 
     def __init__(self, motion: Array) -> None:
         self._motion, self._upwards = motion, not motion[:2].any()
@@ -101,7 +99,7 @@ class Approach:
             first.chosen(i[closed]), second.chosen(j[closed])
         )
         others = first.chosen(i[~closed]), second.chosen(j[~closed])
-        result[~closed] = pairs_by_points(*others, over_panel, ORDERS, odd=True)
+        result[~closed] = pairs_by_points(*others, over_panel, Laplace.orders, odd=True)
         return result
 
 
@@ -361,7 +359,7 @@ def layer_potential(points: Array, panels: Panels, density: Array) -> Array:
         some = points[start : start + rows]
         offsets = some[:, None] - panels.centres
         square = np.einsum("nmd,nmd->nm", offsets, offsets)
-        near = square < (FAR * panels.radii) ** 2
+        near = square < (Laplace.far * panels.radii) ** 2
         inverse = 1.0 / np.sqrt(np.where(near, np.inf, square))
         spread = np.einsum("nmd,mde,nme->nm", offsets, panels.moments, offsets, optimize=True)
         integrals = inverse + 0.5 * inverse**3 * (3.0 * spread * inverse**2 - traces)

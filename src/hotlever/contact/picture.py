@@ -16,8 +16,6 @@ from hotlever.probe import Probe
 from hotlever.probe.tip import SampleContact
 from hotlever.types import Array
 
-Corners = list[tuple[float, float]]
-
 
 @dataclass(frozen=True)
 class ContactPicture:
@@ -40,8 +38,8 @@ class ContactPicture:
     half_width, bottom, top : float
     """
 
-    pieces: list[tuple[Corners, float]]
-    outlines: list[Corners]
+    pieces: list[tuple[list[tuple[float, float]], float]]
+    outlines: list[list[tuple[float, float]]]
     layers: list[tuple[str, float, float]]
     ticks: list[tuple[float, str]]
     height: Array
@@ -118,7 +116,9 @@ def _named(contact: SampleContact, floors: list[float]) -> list[tuple[str, float
     return named
 
 
-def _slices(heights: Array, halves: Array, T: Array) -> list[tuple[Corners, float]]:
+def _slices(
+    heights: Array, halves: Array, T: Array
+) -> list[tuple[list[tuple[float, float]], float]]:
     """Return slices between heights, each of its mean temperature."""
     slices = []
     for number in range(heights.size - 1):

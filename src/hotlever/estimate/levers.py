@@ -14,7 +14,7 @@ from hotlever.errors import HotleverError, InputError
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.power_law import PowerLaw
 from hotlever.estimate.tip_table import STATED, interpolated
-from hotlever.materials.parameters import INVERSION, heading, is_of_material, parameter_named
+from hotlever.materials.parameters import heading, is_of_material, parameter_named
 from hotlever.quantities import QUANTITIES
 from hotlever.text import aligned, listed, value_with_error
 
@@ -227,7 +227,7 @@ def compared(
 
 def _compared(name: str) -> Compared:
     """Return how a parameter, or the inversion temperature, is called and written."""
-    if name == INVERSION:
+    if name == "inversion_temperature":
         return Compared(heading(name), "K", f"{name}{{}}_K", "inversion temperature")
     parameter = parameter_named(name)
     how = parameter.scale, *parameter.bounds
@@ -243,7 +243,10 @@ def _parameters(fit: Estimate) -> dict[str, tuple[float, float | None]]:
         if is_of_material(name)
     }
     if np.isfinite(fit.inversion_temperature_K):
-        quantities[INVERSION] = fit.inversion_temperature_K, fit.inversion_temperature_stderr_K
+        quantities["inversion_temperature"] = (
+            fit.inversion_temperature_K,
+            fit.inversion_temperature_stderr_K,
+        )
     return quantities
 
 

@@ -17,7 +17,6 @@ import numpy as np
 from hotlever.contact.law import INTERFACE
 from hotlever.estimate.experiment import TIP, ExperimentAtRest, PredictionAtRest, named
 from hotlever.estimate.surrogate import CurveSurrogate
-from hotlever.lever.equations import GAP
 from hotlever.probe import Probe
 from hotlever.probe.tip import OUT_OF_CONTACT
 from hotlever.types import Array
@@ -55,7 +54,7 @@ class Away:
             turns = np.cos(np.linspace(np.pi, 0.0, most))
             places = (places[-1] + places[0] + turns * np.ptp(places)) / 2.0
         gaps = np.exp(places).tolist()
-        return cls(tuple({**change, GAP: gap} for gap in gaps), height, places)
+        return cls(tuple({**change, "surface_gap_um": gap} for gap in gaps), height, places)
 
     def probes(self, probe: Probe) -> list[Probe]:
         """Return a probe in contact as it is there."""

@@ -27,7 +27,6 @@ from hotlever.estimate.tip_table import (
 )
 from hotlever.estimate.tip_temperature import error_of_model, errors_by_source, measured_range
 from hotlever.lever import Lever
-from hotlever.lever.equations import BASE
 from hotlever.lever.lever import COARSE, State
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.transient import pulse, simulate
@@ -119,7 +118,9 @@ def pulse_calibration(
     rise *= 1.0 + _through(some, corrections, bias)
     slopes = rise[:, None] * _through(some, changes, bias)
     # with the base the whole lever gets warmer
-    slopes[:, :-1] += np.array([[direction.get(BASE, 0.0)] for direction in directions])
+    slopes[:, :-1] += np.array(
+        [[direction.get("base_temperature_K", 0.0)] for direction in directions]
+    )
     return _with_errors(solution, bias, timing, rise, slopes, directions, options)
 
 

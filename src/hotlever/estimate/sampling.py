@@ -25,7 +25,6 @@ from hotlever.estimate.surrogate import ReducedSurrogate
 from hotlever.estimate.trials import Noise, Samples, TrialOptions, Trials, draw_samples
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import full_name
-from hotlever.materials.parameters import INVERSION
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import parameters_of, usual_parameters
 from hotlever.steps import each
@@ -232,7 +231,9 @@ def _dataset(fit: Estimate, drawn: Samples, values_of: Callable[[Array], Array])
         owned = {full_name(material, own): own for own in ("n_d", "p")}
         sampled = {owned[name]: column for name, column in columns.items() if name in owned}
         if sampled:  # else it is what it was
-            columns[INVERSION] = silicon.model_copy(update=sampled).inversion_temperature()
+            columns["inversion_temperature"] = silicon.model_copy(
+                update=sampled
+            ).inversion_temperature()
     held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
     at_rest = zip(held, fit.probe.values(held).tolist(), strict=True)
     data = labelled(

@@ -23,7 +23,6 @@ import numpy as np
 from hotlever.contact.law import contact_of
 from hotlever.lever.branch import TIP_RISE, Branch, branch_end, shifted
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.laws import BASE
 from hotlever.lever.newton import NewtonResult
 from hotlever.lever.observables import (
     Linearised,
@@ -184,7 +183,7 @@ class ContactTemperatures:
         self._own = [number for number, name in enumerate(names) if name in of_law]
         self._names = [names[number] for number in self._own]
         self._origin = probe.values(self._names)
-        self._of_base = np.array([float(name == BASE) for name in self._names])
+        self._of_base = np.array([float(name == "base_temperature_K") for name in self._names])
 
     def added(self, observables: Array, parameters: Array) -> Array:
         """Return the observables of levers, and behind them what contacts show, (all, n)."""

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, whole_file
-from hotlever.materials.parameters import INVERSION, parameter_named
+from hotlever.materials.parameters import parameter_named
 from hotlever.quantities import QUANTITIES
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ def axis_label(name: str) -> str:
 
 def parameter_label(name: str) -> tuple[str, float]:
     """Return a parameter's axis label and the unit (of its own) that it is drawn in."""
-    if name == INVERSION:
+    if name == "inversion_temperature":
         return "T$_i$ (K)", 1.0
     parameter = parameter_named(name)
     unit = "" if parameter.unit == "1" else parameter.unit

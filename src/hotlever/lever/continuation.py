@@ -29,9 +29,6 @@ from hotlever.types import Array, Progress
 #: Points and weights of Gauss's rule on a piece of the curve.
 _GAUSS = np.polynomial.legendre.leggauss(5)
 
-# Whether a branch is long enough.
-Enough = Callable[[Branch], bool | np.bool_]
-
 
 @dataclass(frozen=True)
 class ContinuationOptions:
@@ -76,7 +73,7 @@ class ContinuationOptions:
 
 def continued(
     equations: LeverEquations,
-    enough: Enough,
+    enough: Callable[[Branch], bool | np.bool_],
     start: Branch | None = None,
     progress: Progress | None = None,
     options: ContinuationOptions | None = None,
@@ -129,7 +126,7 @@ class Continuation(ABC):
         self._equations, self.options, self._step = equations, options, step
         self._branch = self._beginning() if start is None else start
 
-    def until(self, enough: Enough) -> Branch:
+    def until(self, enough: Callable[[Branch], bool | np.bool_]) -> Branch:
         """Go on until the branch is long enough, or something melts.
 
         Raises

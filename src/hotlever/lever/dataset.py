@@ -34,7 +34,6 @@ from hotlever.lever.equations import (
 from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.observables import with_bridge
 from hotlever.materials import Kind
-from hotlever.materials.sections import LAWS
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parts import SECTIONS
 from hotlever.probe.probe_parameters import usual_parameters
@@ -227,7 +226,7 @@ def probe_of(data: xr.Dataset) -> Probe:
         If it does not say, or has a material with laws of its own, whose class is not at hand.
     """
     # every dataset has a circuit, without which the probe would be in the reference's
-    names = [name for name in (*SECTIONS, LAWS) if name in data.attrs or name == "circuit"]
+    names = [name for name in (*SECTIONS, "laws") if name in data.attrs or name == "circuit"]
     return Probe.from_sections({name: _section(data, name) for name in names}, "sweep")
 
 

@@ -29,7 +29,7 @@ from hotlever.air.stores import HeatInAir
 from hotlever.contact.law import ContactLaw, contact_of
 from hotlever.lever.films import Rim
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.laws import BASE, GAP, GAS, LawsAtPoints
+from hotlever.lever.laws import LawsAtPoints
 from hotlever.lever.newton import refined
 from hotlever.lever.space import LEVER, TIP, Constraint, Factors, Space, SurfaceTangent
 from hotlever.lever.terminals import Terminals
@@ -48,7 +48,7 @@ from hotlever.materials.air import kirchhoff_variable
 from hotlever.materials.laws import Evaluated
 from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit, Wiring
-from hotlever.probe.surroundings import THE_PAPERS, Physics
+from hotlever.probe.surroundings import Physics
 from hotlever.types import Array, Index
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
@@ -111,11 +111,12 @@ class LeverEquations:
         space: Space,
         materials: Mapping[str, Kind],
         circuit: Circuit,
-        physics: Physics = THE_PAPERS,
+        physics: Physics | None = None,
         motions: Mapping[str, Motion] | None = None,
         laws: type[LawsAtPoints] = LawsAtPoints,
         contact: ContactLaw | None = None,
     ) -> None:
+        physics = physics or Physics()  # of the paper
         self.space, self.materials, self.motions = space, materials, motions or {}
         self.circuit, self.base_temperature_K = circuit, circuit.base_temperature_K
         self.terminals = Terminals(space, circuit)
@@ -355,7 +356,10 @@ class LeverEquations:
                 tested[..., column] += moved[name].tested(at_points, weights)
         # by these parameters heat leaves the surface or the leg ends, whatever radiates or touches
         surface = [
-            name for name in names if name in {GAS, GAP, BASE, "chip_K_per_mW"} or self._has_losses
+            name
+            for name in names
+            if name in {"gas_conductivity", "surface_gap_um", "base_temperature_K", "chip_K_per_mW"}
+            or self._has_losses
         ]
         if surface:
             columns = [names.index(name) for name in surface]
@@ -368,13 +372,13 @@ class LeverEquations:
 
         Properties being the same.
         """
-        moving = [name for name in names if name == BASE or name in self.motions]
+        moving = [name for name in names if name == "base_temperature_K" or name in self.motions]
         if not moving:
             return {}
         fields, fluxes, tangent = self.at(x)[0], self.fluxes(x), self.tangent(x)
         return {
             name: tangent.fluxes(self.terminals.warmed_by_base(fields))
-            if name == BASE
+            if name == "base_temperature_K"
             else self.motions[name].of_fluxes(fields, fluxes, tangent)
             for name in moving
         }
@@ -391,12 +395,12 @@ class LeverEquations:
             getattr(self, points).add_heat(weak, stacked)
         air, (theta, kappa_air) = self.space.air, self.kirchhoff(x)
         for column, name in enumerate(names):
-            if name == GAS:
+            if name == "gas_conductivity":
                 weak[..., column] += air.weak_form(theta / air.gas_conductivity)
-            elif name == BASE:
+            elif name == "base_temperature_K":
                 cold = self.kirchhoff(np.zeros_like(x))[1]
                 weak[..., column] += air.weak_form(kappa_air - cold)
-            elif name == GAP:
+            elif name == "surface_gap_um":
                 weak[..., column] += air.change_with_gap(theta)
             elif name == "chip_K_per_mW":
                 by_chip = -(self.terminals.chip_mW_per_K**2)

@@ -231,7 +231,8 @@ class FullSpace(Space):
     def _loss_to(self, air: Any, element: Index, shares: Array) -> AirLoss:
         """Return the loss to air at sites in elements, with their basis functions there."""
         unknowns = self._T[self.elements.dofs[element]]
-        return AirLoss(air, unknowns, shares, self.size + 1, ElementLosses(element, shares))
+        losses = ElementLosses(element, shares)
+        return AirLoss(air, unknowns, shares, self.size + 1, losses.add_to)
 
     def factorised(
         self, tangent: Tangent, surface: SurfaceTangent, constraint: Constraint, conductance: Array

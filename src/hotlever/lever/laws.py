@@ -31,10 +31,6 @@ from hotlever.units import (
     PER_CM_TO_MILLI_PER_UM,
 )
 
-#: Parameters of no material: how many times as well as air the gas conducts, the distance of a
-#: surface below, and what moves all temperatures and that of the surroundings.
-GAS, GAP, BASE = "gas_conductivity", "surface_gap_um", "base_temperature_K"
-
 
 class FilmLaws:
     """The laws of one film at its points.
@@ -154,7 +150,7 @@ class FilmLaws:
 def names_in_laws(material: str, kind: Kind) -> dict[str, str]:
     """Return what the laws of a material call each parameter, by its name in the probe."""
     own = {full_name(material, name): name for name in kind.parameters}
-    return {"T": "T", BASE: "surroundings_K"} | own
+    return {"T": "T", "base_temperature_K": "surroundings_K"} | own
 
 
 def carriers_of(film: PlacedFilm, space: Space, materials: Mapping[str, Kind]) -> Carrier:
@@ -238,8 +234,8 @@ class LawsAtPoints:
                     change[points] += unit[points] * film.counted_um * by_own[own[name]]
                 elif name in self.motions:
                     change[points] += unit[points] * self.motions[name].rim[number] * value
-        if BASE in by:
-            by[BASE] += of_base * by["T"]
+        if "base_temperature_K" in by:
+            by["base_temperature_K"] += of_base * by["T"]
         return heat, by
 
     @property
@@ -276,9 +272,9 @@ class LawsAtPoints:
             change = changes.kappa
             if name == "T":
                 change -= filling * self.space.plate_um * kappa_by["T"]
-            elif name == GAS:
+            elif name == "gas_conductivity":
                 change -= share * self.space.plate_um * kappa
-            elif name == GAP:
+            elif name == "surface_gap_um":
                 share_more = PER_CM_TO_MILLI_PER_UM * air.operator.filling_by_gap
                 change -= share_more * air.gas_conductivity * self.space.plate_um * kappa
             elif name in self.motions:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, branch_end
-from hotlever.lever.continuation import Enough, continued
+from hotlever.lever.continuation import continued
 from hotlever.lever.dataset import (
     at_bias,
     checked_bias,
@@ -164,7 +164,9 @@ class Lever:
         rise = hottest_K - self.circuit.base_temperature_K
         return self._branch_until(lambda branch: branch.values[-1, TIP_RISE] >= rise, progress)
 
-    def _branch_until(self, enough: Enough, progress: Progress | None = None) -> Branch:
+    def _branch_until(
+        self, enough: Callable[[Branch], bool | np.bool_], progress: Progress | None = None
+    ) -> Branch:
         """Return a branch that is long enough, going on from the one at hand."""
         try:
             self._branch = continued(self.equations, enough, self._branch, progress)

@@ -8,15 +8,14 @@ and from the circuit; all that compares a lever with a measurement has them from
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hotlever.lever.branch import TIP_RISE, Branch
-from hotlever.lever.continuation import Enough, continued
+from hotlever.lever.continuation import continued
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.laws import BASE
 from hotlever.lever.space import TIP, Constraint, Factors
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
@@ -77,7 +76,7 @@ def observed_by(circuit: Circuit, outputs: Array, slopes: Array, names: Sequence
         "current": current_mA,
         "reader": reader_V,
         "bridge": circuit.bridge_change(lever_V, 0.0) + of_divider,
-        "tip": rise_K + [float(name == BASE) for name in names],
+        "tip": rise_K + [float(name == "base_temperature_K") for name in names],
     }
     return np.stack([values[name] for name in OBSERVABLES])
 
@@ -129,7 +128,9 @@ def knee_by_parameter(branch: Branch, output_slopes: Array, names: Sequence[str]
     assert u is not None
     steeper = spline_through(branch.u, output_slopes[:, 0], 5).derivative()(u)
     along, curvature = branch.curve(u, 1)[TIP_RISE], branch.curve(u, 2)[0]
-    return np.asarray(-along * steeper / curvature + [float(name == BASE) for name in names])
+    return np.asarray(
+        -along * steeper / curvature + [float(name == "base_temperature_K") for name in names]
+    )
 
 
 # --- derivatives by parameters --------------------------------------------------------------------
@@ -245,7 +246,7 @@ class Linearised:
         probe: Probe,
         names: tuple[str, ...],
         branch: Branch,
-        enough: Enough,
+        enough: Callable[[Branch], bool | np.bool_],
         derivatives: LeverEquations | None = None,
         factors: Factors | None = None,
     ) -> Linearised:

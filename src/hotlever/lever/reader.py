@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.dataset import checked_bias, probe_attributes
-from hotlever.lever.laws import GAP
 from hotlever.lever.lever import Lever
 from hotlever.lever.noise import SOURCES, NoiseOptions, Response, spectral_densities
 from hotlever.probe import Probe
@@ -107,7 +106,7 @@ class Reader:
         if self.is_held:
             voltage = state.reader_V
             current = self._source_mA - self._conductance * voltage
-        slope, delay = response.by_parameter(GAP)
+        slope, delay = response.by_parameter("surface_gap_um")
         by_source = spectral_densities(response, self.noise, slope)
         noise = float(np.sqrt(by_source.sum()))
         per_V = response.by_bias if self.is_held else np.nan

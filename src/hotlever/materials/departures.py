@@ -27,9 +27,6 @@ from numpy.typing import ArrayLike
 from hotlever.materials.laws import FORMULA_FROM, FORMULA_TO
 from hotlever.types import Array
 
-#: Temperatures (K) between which the modes are those of the process.
-MODES_FROM, MODES_TO = 300.0, 1300.0
-
 
 @dataclass(frozen=True)
 class Departure:
@@ -74,6 +71,8 @@ class SmoothFactor(Departure):
     ----------
     spread_cold : float
         Standard deviation of δ at 300 K, from where it is linear in T.
+    low_K, high_K : float
+        Temperatures between which the modes are those of the process.
 
     Examples
     --------
@@ -84,6 +83,8 @@ class SmoothFactor(Departure):
 
     spread_cold: float = 0.0
     count: int = 3
+    low_K: float = 300.0
+    high_K: float = 1300.0
 
     def spread(self, T: ArrayLike) -> Array:
         """Return the standard deviation of δ at temperatures (K), stated at 300 K and 1000 K."""
@@ -109,17 +110,24 @@ class SmoothFactor(Departure):
     @property
     def variance_left(self) -> float:
         """The share of the variance of the process that more modes would have."""
-        x, weights = _nodes()
+        x, weights = self._nodes
         T = np.exp(x)
         return float(
             1.0 - weights @ (self.modes(T) ** 2).sum(axis=0) / (weights @ self.spread(T) ** 2)
         )
 
+    @property
+    def _nodes(self) -> tuple[Array, Array]:
+        """Points in ln T and weights, of which the sum is one."""
+        points, weights = leggauss(40)
+        low, high = np.log(self.low_K), np.log(self.high_K)
+        return low + 0.5 * (points + 1.0) * (high - low), 0.5 * weights
+
     @cached_property
     def _modes(self) -> Array:
         """Their series of Chebyshev polynomials, (modes, degree + 1)."""
         # Nyström's method: the integral equation at points, and by it the modes anywhere
-        x, weights = _nodes()
+        x, weights = self._nodes
         spread, root = self.spread(np.exp(x)), np.sqrt(weights)
         kernel = spread[:, None] * _correlation(x, x) * spread
         variances, vectors = np.linalg.eigh(root[:, None] * kernel * root)
@@ -142,13 +150,6 @@ def _position(T: Array) -> Array:
     """Return ln T between −1 and 1 in the range of formulas; the ends beyond it."""
     inside = np.clip(T, FORMULA_FROM, FORMULA_TO)
     return np.asarray(2.0 / _WIDTH * np.log(inside / FORMULA_FROM) - 1.0)
-
-
-def _nodes() -> tuple[Array, Array]:
-    """Return points in ln T and weights, of which the sum is one."""
-    points, weights = leggauss(40)
-    low, high = np.log(MODES_FROM), np.log(MODES_TO)
-    return low + 0.5 * (points + 1.0) * (high - low), 0.5 * weights
 
 
 def _correlation(x: Array, y: Array) -> Array:

@@ -206,7 +206,7 @@ def _power(x: Any, dx: dict[str, Any], y: Any) -> Dual:
     return z, _chain((y * lower, dx))
 
 
-def _chain(*terms: tuple[Any, dict[str, Any]]) -> dict[str, Any]:
+def _chain(*terms: Dual) -> dict[str, Any]:
     """Return the sum of derivatives, each times a factor."""
     total: dict[str, Any] = {}
     for factor, by in terms:

@@ -19,12 +19,8 @@ from hotlever.errors import InputError
 from hotlever.materials.departures import DEPARTURES, Departure, departure_of
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 
-INVERSION = "inversion_temperature"
-
 #: What the two kinds of silicon are called that the section ``[material]`` describes.
 LOW_DOPED, HIGH_DOPED = "low-doped", "high-doped"
-#: What is known of films of other materials: they differ from the bulk, and from each other.
-_FILM = 0.2
 
 
 class Parameter(NamedTuple):
@@ -91,7 +87,8 @@ def _emissivity(value: float) -> Parameter:
 def _scale(of: str, symbol: str) -> Parameter:
     """Return the row of the scale of a law that a probe file states."""
     meaning = f"scale of {of} where that is a table or a formula"
-    return Parameter(f"{of}_scale", symbol, "1", 1.0, 0.2, 5.0, meaning, spread=_FILM, usual=True)
+    # films differ from the bulk, and from each other
+    return Parameter(f"{of}_scale", symbol, "1", 1.0, 0.2, 5.0, meaning, spread=0.2, usual=True)
 
 
 def _coefficients(departure: Departure) -> list[Parameter]:
@@ -175,13 +172,13 @@ PARAMETERS = {name: parameter for name, parameter in OF_SILICON.items() if param
 OF_METAL = _table(
     Parameter(
         *("resistivity", "ρ₂₉₃", "Ω cm", 1e-5, 1e-6, 1e-3, "resistivity at 293 K"),
-        spread=_FILM,
+        spread=0.2,
         usual=True,
     ),
     Parameter(
         *("tcr", "α", "K⁻¹", 1e-3, -5e-4, 5e-3),
         "temperature coefficient of the resistivity",
-        spread=_FILM,
+        spread=0.2,
         usual=True,
     ),
     _scale("resistivity", "c_ρ"),
@@ -206,7 +203,7 @@ OF_DIELECTRIC = _table(
     Parameter(
         *("kappa", "κ₃₀₀", "W cm⁻¹ K⁻¹", 0.01, 1e-3, 1.0),
         "thermal conductivity at 300 K",
-        spread=_FILM,
+        spread=0.2,
         usual=True,
     ),
     Parameter(
@@ -388,7 +385,7 @@ def heading(name: str) -> str:
     >>> heading("n_d"), heading("p"), heading("inversion_temperature")
     ('n_d (1e17 cm⁻³)', 'p', 'T_i (K)')
     """
-    if name == INVERSION:
+    if name == "inversion_temperature":
         return "T_i (K)"
     unit = scaled_unit(name)
     return f"{name} ({unit})" if unit else name

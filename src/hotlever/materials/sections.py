@@ -24,9 +24,6 @@ from hotlever.tables import read_table
 from hotlever.text import with_unit
 from hotlever.units import name_and_unit, product_conversion, unknown_unit
 
-#: The section of stored values in which the classes are named.
-LAWS = "laws"
-
 
 def material_of(
     values: Mapping[str, Any],
@@ -256,7 +253,7 @@ def classes_at_hand(laws: Any, where: str) -> dict[str, type[Record]]:
         Naming the first material whose class was not imported before.
     """
     if not isinstance(laws, Mapping):
-        raise InputError(f"{where}: [{LAWS}] must be a section, found {quoted(laws)}")
+        raise InputError(f"{where}: [laws] must be a section, found {quoted(laws)}")
     # of classes made again under a name, in a notebook, the last
     classes = {class_name(each): each for base in (Kind, Material) for each in _made_of(base)}
     for name, law in laws.items():

@@ -12,7 +12,7 @@ with boron, whose concentration `n` is then, holes are the majority and electron
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,8 +23,6 @@ from hotlever.types import Array
 Carrier = Literal["electron", "hole"]
 # Density (cm⁻³) and mobility (cm² V⁻¹ s⁻¹) of carriers, and what they are.
 Carried = tuple[Evaluated, Evaluated, Carrier]
-#: Majority first.
-_CARRIERS: tuple[Carrier, Carrier] = ("electron", "hole")
 
 #: Melting point (K): no state of a lever beyond it is meaningful.
 MELTING_POINT = 1687.0
@@ -252,7 +250,7 @@ def carried_in_n_silicon(
     return [
         (density, mobility_law.formula(T, n, p, impurity_exponent, carrier), carrier)
         for density, carrier in zip(
-            carriers(T, n, band_gap, intrinsic_scale), _CARRIERS, strict=True
+            carriers(T, n, band_gap, intrinsic_scale), get_args(Carrier), strict=True
         )
     ]
 

@@ -38,8 +38,6 @@ _GAUSS = [
     (0.5 * (1.0 + node), 0.5 * weight)
     for node, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True)
 ]
-#: Temperatures (K) that a law may be stated for.
-_LEAST_K, _MOST_K = 1.0, 1e4
 
 # A list, which becomes a tuple.
 _Numbers = Annotated[tuple[float, ...], Strict(False), PlainSerializer(list)]
@@ -52,6 +50,9 @@ class StatedLaw(Record):
     noun: ClassVar[str]
     #: Temperatures at which the slope steps.
     steps: ClassVar[tuple[float, ...]] = ()
+    #: Temperatures (K) that it may be stated for.
+    least_K: ClassVar[float] = 1.0
+    most_K: ClassVar[float] = 1e4
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -170,10 +171,10 @@ class Formula(StatedLaw):
 
     @model_validator(mode="after")
     def _is_a_formula_between_temperatures(self) -> Self:
-        if not _LEAST_K <= self.from_K < self.to_K <= _MOST_K:
+        if not self.least_K <= self.from_K < self.to_K <= self.most_K:
             raise ValueError(
                 f"from_K = {self.from_K:g} and to_K = {self.to_K:g}: expected rising temperatures "
-                f"from {_LEAST_K:g} to {_MOST_K:g} K"
+                f"from {self.least_K:g} to {self.most_K:g} K"
             )
         parsed(self.formula)
         return self
@@ -243,9 +244,10 @@ class Table(StatedLaw):
             raise ValueError(
                 f"{T[row + 1]:g} K follows {T[row]:g} K, expected temperatures that rise"
             )
-        if T[0] < _LEAST_K or T[-1] > _MOST_K:
+        if T[0] < self.least_K or T[-1] > self.most_K:
             raise ValueError(
-                f"{T[0]:g} to {T[-1]:g} K, expected temperatures from {_LEAST_K:g} to {_MOST_K:g} K"
+                f"{T[0]:g} to {T[-1]:g} K, expected temperatures from {self.least_K:g} to "
+                f"{self.most_K:g} K"
             )
         return self
 

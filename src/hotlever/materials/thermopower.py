@@ -59,19 +59,12 @@ class _Cubic(NamedTuple):
         return value, b + along * (2.0 * c + along * 3.0 * d)
 
 
-class _Reduced(NamedTuple):
-    """S e/k_B in size plus the logarithm of the density, by w = ln(1 + density / that of states).
-
-    And its derivative by the scattering exponent.
-    """
-
-    value: _Cubic
-    by_exponent: _Cubic
-
-
 @lru_cache(maxsize=64)
-def _reduced_seebeck(scattering_exponent: float) -> _Reduced:
+def _reduced_seebeck(scattering_exponent: float) -> tuple[_Cubic, _Cubic]:
     """Tabulate the reduced Seebeck coefficient of a parabolic band.
+
+    It is S e/k_B in size plus the logarithm of the density, by w = ln(1 + density / that of
+    states); and its derivative by the scattering exponent.
 
     With the relaxation time τ ∝ E^r it is the mean energy of the transport less the Fermi energy,
     both over k_B T: ⟨x⟩ − η, with weights x^(r + 3/2) (−∂f/∂x).
@@ -91,8 +84,8 @@ def _reduced_seebeck(scattering_exponent: float) -> _Reduced:
     log_x = np.log(x)
     mean, mean_log = weight @ x, weight @ log_x
     rows = mean - eta + np.log(density), weight @ (x * log_x) - mean * mean_log
-    functions = (Chebyshev.fit(nodes, row, degree, domain=domain) for row in rows)
-    return _Reduced(*map(_Cubic.of, functions))
+    value, by_exponent = (Chebyshev.fit(nodes, row, degree, domain=domain) for row in rows)
+    return _Cubic.of(value), _Cubic.of(by_exponent)
 
 
 def _edge(x: Array, eta: Array) -> Array:
@@ -144,18 +137,18 @@ def seebeck_of_band(
     (-1363, -1363)
     """
     (density, d_density), (full, d_full) = carriers, states
-    reduced = _reduced_seebeck(scattering_exponent)
+    reduced, by_exponent = _reduced_seebeck(scattering_exponent)
     ratio = density / full
     w = np.log1p(ratio)
     scale = -BOLTZMANN if carrier == "electron" else BOLTZMANN
-    value, slope = reduced.value(w)
+    value, slope = reduced(w)
     by_ratio = scale * (slope / (1.0 + ratio) - 1.0 / ratio)
     names = set(d_density) | set(d_full)
     by = {
         name: by_ratio * (d_density.get(name, 0.0) - ratio * d_full.get(name, 0.0)) / full
         for name in names
     }
-    by["scattering_exponent"] = scale * reduced.by_exponent(w)[0]
+    by["scattering_exponent"] = scale * by_exponent(w)[0]
     return scale * (value - np.log(ratio)), by
 
 

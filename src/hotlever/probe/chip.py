@@ -7,18 +7,15 @@ through its holder, in milliseconds or more. At rest both count, in pulses the s
 from __future__ import annotations
 
 import math
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.materials.heat import thermal_conductivity
 from hotlever.probe.layout import Layout
-from hotlever.probe.parts import ProbeParts
+from hotlever.probe.parts import ProbeParts, ProbesParts
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
-
-_Probe = TypeVar("_Probe", bound=ProbeParts)
 
 
 def mean_inverse_distance(a: ArrayLike, b: ArrayLike) -> Array:
@@ -68,14 +65,14 @@ def usual_chip(probe: ProbeParts) -> float:
     return spreading_K_per_mW(probe.layout(), probe.circuit.base_temperature_K) + 1.0
 
 
-def on_usual_chip(probe: _Probe, without: bool = False) -> _Probe:
+def on_usual_chip(probe: ProbesParts, without: bool = False) -> ProbesParts:
     """Return a probe on a chip that gets warm as is usual, if its file says nothing of one."""
     if probe.circuit.chip_K_per_mW or without:
         return probe
     return probe.replace({"chip_K_per_mW": usual_chip(probe)})
 
 
-def in_pulses(probe: _Probe) -> _Probe:
+def in_pulses(probe: ProbesParts) -> ProbesParts:
     """Return a probe as it is in pulses, while its holder stays cold."""
     at_rest = probe.circuit.chip_K_per_mW
     if not at_rest:

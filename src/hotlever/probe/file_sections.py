@@ -12,7 +12,7 @@ from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text
 from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind
 from hotlever.materials.kinds import Silicon
-from hotlever.materials.sections import LAWS, classes_at_hand, materials_of
+from hotlever.materials.sections import classes_at_hand, materials_of
 from hotlever.materials.stated import names_stated
 from hotlever.probe.circuit import Contact
 from hotlever.probe.parts import (
@@ -25,9 +25,7 @@ from hotlever.probe.parts import (
 from hotlever.probe.priors import priors_of
 from hotlever.probe.shapes import (
     PARAMETRIC,
-    PARAMETRIC_DRAWING,
     SHAPE_SECTIONS,
-    SHAPES,
     Shape,
     ThreeLeg,
 )
@@ -91,8 +89,8 @@ def parts_of(
     InputError
         Naming the section and key, what was found and what is expected.
     """
-    classes = classes_at_hand(values.get(LAWS, {}), where) if like is None else like.classes
-    values = {name: section for name, section in values.items() if name != LAWS}
+    classes = classes_at_hand(values.get("laws", {}), where) if like is None else like.classes
+    values = {name: section for name, section in values.items() if name != "laws"}
     for name, section in values.items():
         if name not in SECTIONS:
             raise unknown_name("section", name, SECTIONS, where)
@@ -150,11 +148,11 @@ def _shape_of(
 ) -> Shape:
     """Make the shape that some sections of a probe file describe; `kinds` are of its materials."""
     values, here = sections["probe"], f"{where}: [probe]"
-    name = values.get("shape")
+    name, shapes = values.get("shape"), (*PARAMETRIC, "drawing")
     if name is None:
-        raise InputError(f"{here}: shape is missing (one of: {', '.join(SHAPES)})")
-    if not isinstance(name, str) or name not in (*SHAPES, PARAMETRIC_DRAWING):
-        raise unknown_name("shape", str(name), SHAPES, here)
+        raise InputError(f"{here}: shape is missing (one of: {', '.join(shapes)})")
+    if not isinstance(name, str) or name not in (*shapes, "parametric-drawing"):
+        raise unknown_name("shape", str(name), shapes, here)
     if name == "drawing":
         # imported here: most probes are drawn by their dimensions
         from hotlever.probe.drawing.shape import DrawnShape
@@ -163,7 +161,7 @@ def _shape_of(
     for section in SHAPE_SECTIONS[1:]:
         if section in sections:
             raise InputError(f'{where}: section [{section}] means nothing with shape = "{name}"')
-    if name == PARAMETRIC_DRAWING:
+    if name == "parametric-drawing":
         from hotlever.probe.drawing.parametric import ParametricDrawing
 
         drawn = None if like is None else like.shape
@@ -362,5 +360,5 @@ def other_sections(probe: ProbeParts, without: Container[str] = ()) -> str:
         effects = dict.fromkeys(Physics.model_fields, True)
         lines += section_lines("physics", effects, Physics.description(), start="# ")[1:]
     if probe.laws:
-        lines += section_lines(LAWS, probe.laws, {})
+        lines += section_lines("laws", probe.laws, {})
     return "\n".join(lines) + "\n"

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from hotlever.errors import InputError, counted
 from hotlever.probe.drawing.edges import outline_edges, terminal_edges
-from hotlever.probe.drawing.layers import REQUIRED, terminal_part
+from hotlever.probe.drawing.layers import terminal_part
 from hotlever.probe.drawing.outlines import (
     DrawingError,
     Ring,
@@ -595,7 +595,7 @@ def _probe_file(
     else:
         lines += _drawn_lines("layers", ("silicon", "heater"), inference.layers, reasons, "1/0")
     ends = {role: reasons.get(terminal_part(role), "") for role in inference.terminals}
-    lines += _drawn_lines("terminals", REQUIRED, inference.terminals, ends, "10/0")
+    lines += _drawn_lines("terminals", ("supply", "ground"), inference.terminals, ends, "10/0")
     without = ("material",) if has_film else ()
     return "\n".join(lines) + "\n" + other_sections(reference, without)
 

@@ -17,7 +17,7 @@ from hotlever.types import Array, Index
 if TYPE_CHECKING:
     from skfem import MeshTet, MeshTri
 
-#: How far off (µm) a point is still on a line.
+#: How far off (µm) a point is still on a line, or a corner.
 ON_LINE = 1e-6
 #: As many squares of its width as a drawn heater may have: it is meshed in steps of its width.
 MOST_SQUARES = 100.0

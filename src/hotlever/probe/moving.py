@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,8 +24,6 @@ from hotlever.probe.parts import ProbeParts
 from hotlever.probe.probe_parameters import OF_THE_TIP
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
-
-T = TypeVar("T")
 
 #: What is no match costs more than any (µm²).
 _UNLIKE = 1e12
@@ -237,7 +235,7 @@ def _ring(like: tuple[Point, ...], ring: tuple[Point, ...]) -> tuple[float, tupl
     return float(by_first[first]), (*ring[first:], *ring[:first])
 
 
-def _cheapest(pairs: list[list[tuple[float, T]]]) -> list[T] | None:
+def _cheapest(pairs: list[list[tuple[float, Any]]]) -> list[Any] | None:
     """Return for each row the one that makes all together cheapest, None if one is unlike."""
     if not pairs:
         return []

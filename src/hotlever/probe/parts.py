@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from pydantic import ConfigDict, Field, SerializeAsAny, model_validator
@@ -13,12 +13,11 @@ from pydantic import ConfigDict, Field, SerializeAsAny, model_validator
 from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, REFERENCE, Kind, Material, full_name
 from hotlever.materials.kind import class_name
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
-from hotlever.materials.sections import LAWS
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Layout
 from hotlever.probe.monitor_sections import Monitor, Monitors
 from hotlever.probe.shapes import SHAPE_SECTIONS, Shape
-from hotlever.probe.surroundings import THE_PAPERS, Physics, Surroundings
+from hotlever.probe.surroundings import Physics, Surroundings
 from hotlever.probe.tip import SampleContact, Tip
 from hotlever.quantities import OBSERVABLES
 from hotlever.records import Record
@@ -77,7 +76,7 @@ class ProbeParts(Record):
     surroundings: Surroundings = Surroundings()
     tip: Tip | None = None
     contact: SampleContact | None = None
-    physics: Physics = THE_PAPERS
+    physics: Physics = Physics()
     prior: PriorTexts | None = None
     monitor: Monitors | None = None
 
@@ -228,7 +227,7 @@ class ProbeParts(Record):
             }
         sections |= {name: part.model_dump() for name, part in self.parts.items()}
         if self.laws:
-            sections[LAWS] = dict(self.laws)
+            sections["laws"] = dict(self.laws)
         return {name: with_values(section) for name, section in sections.items()}
 
     def _owner(self, name: str) -> tuple[str, Record | None]:
@@ -277,3 +276,6 @@ class ProbeParts(Record):
             If there is no such effect.
         """
         return self.model_copy(update={"physics": Physics.of(effects, where)})
+
+
+ProbesParts = TypeVar("ProbesParts", bound=ProbeParts)

@@ -19,7 +19,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple, TypeVar
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -28,7 +28,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.materials.departures import DEPARTURES
 from hotlever.materials.parameters import Parameter, own_name
 from hotlever.probe.chip import on_usual_chip
-from hotlever.probe.parts import ProbeParts
+from hotlever.probe.parts import ProbeParts, ProbesParts
 from hotlever.probe.probe_parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.records import StandardError
@@ -54,8 +54,6 @@ SCALES = {
 METERS, THERMOMETER = 1e-3, 0.015
 #: How a spread is written: in the parameter's unit, as a share of its value, or as a factor.
 Written = Literal["unit", "share", "factor"]
-
-ProbesParts = TypeVar("ProbesParts", bound=ProbeParts)
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,6 @@ from hotlever.materials import LOW_DOPED
 from hotlever.probe.layout import Layout, Part, Region, Taper, Terminal, rectangle
 from hotlever.records import Record
 
-#: No part of a lever is smaller (µm), nor are two that do not touch nearer to each other.
-_SMALLEST = 0.01
 #: The dimension that is the same for all edges, and how far off it is at most (µm).
 EDGE_BIAS, MOST_EDGE_BIAS = "edge_bias_um", 2.0
 
@@ -106,8 +104,12 @@ class Shape(Record):
 
 
 class Parametric(Shape):
-    """A shape made of dimensions, as drawn, and what etching makes of them."""
+    """A shape made of dimensions, as drawn, and what etching makes of them.
 
+    No part is smaller than `smallest_um`, nor are two that do not touch nearer to each other.
+    """
+
+    smallest_um: ClassVar[float] = 0.01
     if TYPE_CHECKING:
         # a field of each shape, after its drawing: fields stand in probe files as they come
         edge_bias_um: float
@@ -141,18 +143,18 @@ class Parametric(Shape):
         for name in self._by_edge_bias() if self.edge_bias_um else ():
             size_um = getattr(etched, name)
             _need(
-                size_um >= _SMALLEST,
+                size_um >= self.smallest_um,
                 f"with edge_bias_um = {self.edge_bias_um:g}, {name} is {size_um:.2g} µm, expected "
-                f"{_SMALLEST} µm or more",
+                f"{self.smallest_um} µm or more",
             )
         etched._parts_fit()
         layout = self.layout()
         for region in layout.regions:
             narrow, long = region.sides
             _need(
-                narrow >= _SMALLEST,
-                f"the {region.name} is {narrow:.2g} µm long or wide, expected {_SMALLEST} µm or "
-                "more",
+                narrow >= self.smallest_um,
+                f"the {region.name} is {narrow:.2g} µm long or wide, expected "
+                f"{self.smallest_um} µm or more",
             )
             # a heater is meshed in steps of its narrow side
             slender = 30.0
@@ -199,9 +201,9 @@ class ThreeLeg(Parametric):
         )
         widest = self.centre_leg_width_um + 2 * self.gap_um
         _need(
-            self.heater_width_um < widest - 2 * _SMALLEST,
+            self.heater_width_um < widest - 2 * self.smallest_um,
             f"heater_width_um = {self.heater_width_um:g} must be less than the {widest:g} µm "
-            f"between the outer legs, by {2 * _SMALLEST} µm",
+            f"between the outer legs, by {2 * self.smallest_um} µm",
         )
         half, centre = self.reader_length_um / 2, self._reader_centre
         _need(
@@ -368,8 +370,5 @@ class UShape(Parametric):
 
 
 PARAMETRIC: dict[str, type[Parametric]] = {"three-leg": ThreeLeg, "u-shape": UShape}
-#: Made in Python only.
-PARAMETRIC_DRAWING: Literal["parametric-drawing"] = "parametric-drawing"
-SHAPES = (*PARAMETRIC, "drawing")
 #: Sections of a probe file that describe a shape; those of a drawing come first to last.
 SHAPE_SECTIONS = ("probe", "layers", "terminals")

@@ -141,7 +141,3 @@ class Physics(Record):
 
     def __bool__(self) -> bool:
         return bool(self.effects)
-
-
-#: The physics of the paper.
-THE_PAPERS = Physics()

@@ -23,7 +23,7 @@ from hotlever.estimate.tip_table import OF_THE_CONTACT, STATED, TABLE_COLUMNS, e
 from hotlever.estimate.uncertainty import Uncertainty
 from hotlever.estimate.uncertainty_budget import Budget, InputQuantity, TemperatureBudget
 from hotlever.lever import Lever
-from hotlever.materials.parameters import INVERSION, sentence
+from hotlever.materials.parameters import sentence
 from hotlever.quantities import QUANTITIES
 from hotlever.report.report_page import Block, Page
 from hotlever.text import significant, with_unit
@@ -167,7 +167,8 @@ def _add_uncertainty(page: Page, uncertainty: Uncertainty) -> None:
         page.figure(
             "posterior",
             figures.posterior_corner(
-                uncertainty.posterior, {**optimum, INVERSION: fit.inversion_temperature_K}
+                uncertainty.posterior,
+                {**optimum, "inversion_temperature": fit.inversion_temperature_K},
             ),
             "Posterior of each quantity and pair. Above each histogram: its median and half of "
             "its 68 % interval.",

@@ -18,7 +18,7 @@ from hotlever.materials import LOW_DOPED, full_name
 from hotlever.materials.doping import diffusion_length
 from hotlever.materials.parameters import parameter_named
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.shapes import EDGE_BIAS, PARAMETRIC_DRAWING
+from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.steps import each
 from hotlever.types import Array, Progress
@@ -96,7 +96,7 @@ class Design:
         ]
         thickness = [name for name in names if name.startswith("layers.")]
         shape = self.probe.shape
-        own = shape.dimensions() if shape.shape == PARAMETRIC_DRAWING else ()
+        own = shape.dimensions() if shape.shape == "parametric-drawing" else ()
         of_shape = ("heater_length_um", "heater_width_um", "scale", "thickness_um")
         first = (*own, *of_shape, *thickness, *of_heater, *ANNEALING)
         # a share of what is zero is nothing

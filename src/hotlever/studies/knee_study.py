@@ -42,7 +42,7 @@ from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import solve
 from hotlever.lever import Branch, Lever, OperatingPoint
 from hotlever.lever.lever import COARSE
-from hotlever.materials.departures import FACTORS, MODES_FROM, MODES_TO, departure_of
+from hotlever.materials.departures import FACTORS, departure_of
 from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.silicon import intrinsic_density, inversion_temperature
 from hotlever.probe import Probe, Tip
@@ -258,7 +258,8 @@ def measured_carriers(T: ArrayLike) -> Array:
 
 def _departed(probe: Probe, law: str, ratio: Callable[[Array], Array]) -> Probe:
     """Return a probe one of whose laws is another, by the modes of its departure."""
-    factor, T = FACTORS[law], np.linspace(MODES_FROM, MODES_TO, 100)
+    factor = FACTORS[law]
+    T = np.linspace(factor.low_K, factor.high_K, 100)
     coefficients = np.linalg.lstsq(factor.modes(T).T, np.log(ratio(T)), rcond=None)[0]
     return probe.with_(**dict(zip(factor.names, coefficients.tolist(), strict=True)))
 
@@ -274,7 +275,7 @@ def scattered_at_surfaces(T: ArrayLike, c_kappa: float) -> Array:
     It is what c_κ adds at 300 K: M. Asheghi et al., J. Appl. Phys. 91, 5079 (2002).
     """
     bulk = thermal_conductivity(np.asarray(T, dtype=float))[0]
-    added = (1.0 / c_kappa - 1.0) / thermal_conductivity(np.array(MODES_FROM))[0]
+    added = (1.0 / c_kappa - 1.0) / thermal_conductivity(np.array(300.0))[0]
     return np.asarray(1.0 / (1.0 + added * bulk) / c_kappa)
 
 

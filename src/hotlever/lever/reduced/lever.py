@@ -186,10 +186,6 @@ class ReducedLever:
         return cls(space, few, points, ResponseSurface(there, **fitted), lever.probe)
 
 
-#: What solves the branch of any similar probe: a lever as it is, on a coarse mesh, or reduced.
-BranchSolver = SimilarLevers | ReducedLever
-
-
 @one_blas_thread
 def estimated_error(lever: Lever, branch: Branch, u: Array) -> Array:
     """Estimate how far a reduced lever's branch is from the full lever's, at fixed biases.

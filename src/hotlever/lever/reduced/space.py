@@ -25,9 +25,6 @@ from hotlever.lever.space import Constraint, Space, SurfaceTangent
 from hotlever.lever.transport import Tangent
 from hotlever.types import Array, Index
 
-#: Random combinations of the training integrals that a cubature is made to reproduce.
-_SKETCH = 420
-
 
 def proper_orthogonal_modes(snapshots: Array, most: int | None = None, least: float = 0.0) -> Array:
     """Return the leading modes of snapshots (n, size), scaled so that their largest entry is one.
@@ -75,9 +72,11 @@ def empirical_cubature(
     weights : ndarray, shape (m,)
     """
     rng = np.random.default_rng(0)
-    sketch = np.zeros((_SKETCH, weights.size))
+    # random combinations of the training integrals that the cubature is made to reproduce
+    count = 420
+    sketch = np.zeros((count, weights.size))
     for some in integrands:
-        rows = rng.integers(0, _SKETCH, len(some))
+        rows = rng.integers(0, count, len(some))
         signs = rng.choice((-1.0, 1.0), len(some))
         np.add.at(sketch, rows, signs[:, None] * some * weights)
     values, vectors = np.linalg.eigh(sketch @ sketch.T)

@@ -155,12 +155,10 @@ def checked_frequencies(frequency_Hz: ArrayLike) -> Array:
     return frequency
 
 
-#: Harmonics that are told, and columns of a file.
-HARMONICS = ("first", "second", "third")
+#: Columns of a file of harmonics.
 HARMONIC_COLUMNS = (
-    "frequency_Hz",
-    *(f"{name}{kind}" for name in HARMONICS for kind in ("_harmonic_V", "_harmonic_deg")),
-    "mean_tip_K",
+    *("frequency_Hz", "first_harmonic_V", "first_harmonic_deg", "second_harmonic_V"),
+    *("second_harmonic_deg", "third_harmonic_V", "third_harmonic_deg", "mean_tip_K"),
 )
 
 
@@ -220,10 +218,10 @@ def harmonics(
     seen = {"": lever_V}
     if lever.circuit.has_bridge:
         # the bias has a first harmonic alone
-        driven_V = np.array([amplitude_V, *np.zeros(len(HARMONICS) - 1)])
+        driven_V = np.array([amplitude_V, *np.zeros(2)])
         seen["bridge_"] = lever.circuit.bridge_change(lever_V, driven_V)
     for of, volts in seen.items():
-        for number, name in enumerate(HARMONICS):
+        for number, name in enumerate(("first", "second", "third")):
             columns |= _polar(f"{name}_{of}harmonic", "V", volts[:, number])
     attributes: dict[str, Any] = {"bias_V": offset_V, "amplitude_V": amplitude_V}
     attributes |= probe_attributes(lever.probe)
@@ -286,7 +284,7 @@ class HarmonicBalance:
             if not np.isfinite(x).all():
                 break
             if self._small(change, np.fft.rfft(x, axis=1)):
-                lever_V = 2.0 * np.fft.rfft(x[-1])[1 : len(HARMONICS) + 1] / self._times
+                lever_V = 2.0 * np.fft.rfft(x[-1])[1:4] / self._times
                 rise = self._equations.space.tip_rise(x)
                 return lever_V, self._equations.base_temperature_K + float(rise.mean())
         raise ComputationError(

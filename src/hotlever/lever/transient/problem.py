@@ -18,7 +18,6 @@ import numpy as np
 
 from hotlever.air.stores import HeatInAir
 from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations, heat_held, heat_left
-from hotlever.lever.laws import GAS
 from hotlever.lever.space import LEVER, Factors
 from hotlever.probe import Circuit
 from hotlever.types import Array
@@ -156,7 +155,7 @@ class TransientProblem:
                 name, current
             )
         lag = np.zeros((len(in_air), 1, len(names)))
-        for column in (column for column, name in enumerate(names) if name == GAS):
+        for column in (column for column, name in enumerate(names) if name == "gas_conductivity"):
             # stores in a gas that conducts better follow faster
             away = self._air.rates * (in_air - self._air.follows(lever))
             lag[..., column] = away / self.equations.space.air.gas_conductivity

@@ -22,12 +22,6 @@ from typing import Any
 MOST_POLYGONS = 20_000
 #: Points within this (µm) are one: a file does not state them better.
 _SAME_UM = 1e-6
-#: How lines begin in which gdstk and ezdxf warn.
-WARNS = ("[GDSTK] ", "ezdxf: ")
-#: How many cubic curves stand for a circle: they are off by less than 1e-8 of its radius.
-_CURVES = 16
-
-Ring = list[tuple[float, float]]
 
 
 class Refusal(Exception):
@@ -246,6 +240,8 @@ class _Drawing:
     ) -> None:
         self.document, self.unit_um = document, unit_um
         self.tolerance_um, self.largest_um = tolerance_um, largest_um
+        #: How many cubic curves stand for a circle: they are off by less than 1e-8 of its radius.
+        self.segments = 16
         self.outlines = Outlines()
         self.labels: list[tuple[str, str, float, float]] = []
         self.hidden: dict[str, str] = {}
@@ -344,7 +340,7 @@ class _Drawing:
         try:
             if kind in ("IMAGE", "WIPEOUT", "VIEWPORT"):
                 raise TypeError
-            curve = path.make_path(entity, segments=_CURVES)
+            curve = path.make_path(entity, segments=self.segments)
         except TypeError:
             self.outlines.leave_out(name, f"{kind} without an outline")
             return
@@ -407,14 +403,16 @@ class _Drawing:
         for name, polyline in self.wide:
             self._fill(name, polyline.dxftype(), self._faces(polyline), "all")
 
-    def _ring(self, corners: Iterable[Any]) -> Ring:
+    def _ring(self, corners: Iterable[Any]) -> list[tuple[float, float]]:
         points = [(point.x * self.unit_um, point.y * self.unit_um) for point in corners]
         if len(points) > 1 and points[0] == points[-1]:
             points.pop()
         self.outlines.count(points)
         return points
 
-    def _fill(self, name: str, kind: str, rings: list[Ring], rule: str) -> None:
+    def _fill(
+        self, name: str, kind: str, rings: list[list[tuple[float, float]]], rule: str
+    ) -> None:
         """Add an area; what of it is a line adds nothing."""
         areas = [ring for ring in rings if not _is_line(ring)]
         if areas:
@@ -422,7 +420,7 @@ class _Drawing:
         else:
             self.outlines.leave_out(name, f"{kind} without an area")
 
-    def _faces(self, polyline: Any) -> list[Ring]:
+    def _faces(self, polyline: Any) -> list[list[tuple[float, float]]]:
         """Return the areas of a polyline that has a width."""
         from ezdxf.render.trace import TraceBuilder
 
@@ -430,7 +428,7 @@ class _Drawing:
         radius_um = 2 * self.unit_um * max(radius for _, radius in _segments(polyline))
         lines = math.pi * math.sqrt(radius_um / (2 * self.tolerance_um))
         segments = min(math.ceil(lines), 2000)
-        trace = TraceBuilder.from_polyline(polyline, segments=max(segments, _CURVES))
+        trace = TraceBuilder.from_polyline(polyline, segments=max(segments, self.segments))
         faces = trace.faces_wcs(polyline.ocs(), 0.0)
         return [self._ring(face) for face in faces]
 
@@ -465,7 +463,7 @@ def _plain(name: Any) -> str:
     return text if len(text) <= 40 else f"{text[:39]}…"
 
 
-def _is_line(ring: Ring) -> bool:
+def _is_line(ring: list[tuple[float, float]]) -> bool:
     """Whether all corners of a ring are on one line."""
     (x, y), size = ring[0], extent_of(ring)
     fan = pairwise((x1 - x, y1 - y) for x1, y1 in ring)
@@ -482,7 +480,7 @@ def main() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (options["memory"], options["memory"]))
     except (ImportError, ValueError, OSError):
         pass
-    logging.basicConfig(format=f"{WARNS[1]}%(message)s")
+    logging.basicConfig(format="ezdxf: %(message)s")
     unit_um, tolerance_um = options["unit_um"], options["tolerance_um"]
     try:
         with open(path, "rb") as file:

@@ -34,10 +34,8 @@ from hotlever.probe.drawing.outlines import (
     polygons,
 )
 from hotlever.probe.layout import Film, Layout, Point, Region, Terminal
+from hotlever.probe.mesh import ON_LINE
 from hotlever.types import Array, Index
-
-#: How far off (µm) a point is still a corner, or on a line.
-_SAME_UM = 1e-6
 
 
 def terminal_edges(
@@ -273,7 +271,7 @@ def _check_etched(why: str, body: str, regions: Iterable[Region], tolerance_um: 
         what = f"{why} a part of the lever turns over, expected a smaller shift"
         raise DrawingError(what, body, place=turned[0].centroid)
     whole = shapely.union_all(shapes)
-    if abs(whole.area - sum(shape.area for shape in shapes)) > _SAME_UM * whole.length:
+    if abs(whole.area - sum(shape.area for shape in shapes)) > ON_LINE * whole.length:
         what = f"{why} parts of the lever overlap, expected a smaller shift"
         raise DrawingError(what, body, place=whole)
     for shape in shapes:
@@ -353,7 +351,7 @@ class _OutlineRates:
         for region in layout.regions:
             edges = region.edges
             _, _, away = self._nearest(edges.mean(axis=1))
-            for start, end in edges[away > _SAME_UM]:
+            for start, end in edges[away > ON_LINE]:
                 for at in (start, end):
                     directions.setdefault(_key(at), []).append(_unit(end - start))
         return directions
@@ -388,7 +386,7 @@ class _OutlineRates:
         borders = self._borders.get(_key(at), [])
         # others run along the outline
         steep = [border / (border @ normal) for border in borders if abs(border @ normal) > 0.3]
-        if not steep or any(np.abs(steep[0] - other).max() > _SAME_UM for other in steep):
+        if not steep or any(np.abs(steep[0] - other).max() > ON_LINE for other in steep):
             return None
         return np.asarray(self._rates[edge] * steep[0])
 

@@ -20,9 +20,6 @@ from hotlever.probe.drawing.outlines import Ring
 from hotlever.probe.shapes import EDGE_BIAS, edge_bias
 from hotlever.records import Record
 
-#: Terminals that a lever must have.
-REQUIRED = ("supply", "ground")
-
 
 class DrawnPart(Record):
     """What has outlines in a drawing; one of two points is a line."""
@@ -207,7 +204,7 @@ def terminal_values(section: Mapping[str, Any], where: str) -> dict[str, dict[st
     InputError
         If a required one is missing, or a key is wrong.
     """
-    for name in REQUIRED:
+    for name in ("supply", "ground"):
         if name not in section:
             raise _missing(name, section, where)
     terminals = {}

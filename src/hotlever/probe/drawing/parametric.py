@@ -16,7 +16,7 @@ from hotlever.probe.drawing.kit import Drawing
 from hotlever.probe.drawing.shape import DrawnShape
 from hotlever.probe.layout import Layout
 from hotlever.probe.parts import PARTS
-from hotlever.probe.shapes import EDGE_BIAS, PARAMETRIC_DRAWING, Shape, edge_bias
+from hotlever.probe.shapes import EDGE_BIAS, Shape, edge_bias
 
 #: The shapes of functions that probes of this process were made of, by the functions' names.
 _SHAPES: dict[str, type[ParametricDrawing]] = {}
@@ -31,7 +31,7 @@ class ParametricDrawing(Shape):
 
     draw: ClassVar[Callable[..., Drawing]]
 
-    shape: Literal["parametric-drawing"] = PARAMETRIC_DRAWING
+    shape: Literal["parametric-drawing"] = "parametric-drawing"
     function: str
     edge_bias_um: float = edge_bias()
     #: That of each material, by name; no key of a probe file.

@@ -21,7 +21,6 @@ from hotlever.files import whole_file
 from hotlever.materials import HIGH_DOPED
 from hotlever.probe.drawing.edges import check_apart, covered, cut_away, etched, terminal_edges
 from hotlever.probe.drawing.layers import (
-    REQUIRED,
     DrawnLayer,
     DrawnTerminal,
     layer_values,
@@ -270,7 +269,7 @@ def _parts(
     def fault(what: str, part: str, numbers: set[int]) -> DrawingError:
         return DrawingError(what, part, place=partition.pieces[min(numbers)].shape)
 
-    for name in REQUIRED:
+    for name in ("supply", "ground"):
         if at[name] <= insulates:
             raise fault("it touches no conductor", terminal_part(name), at[name])
     pieces = range(len(partition.pieces))
@@ -278,17 +277,17 @@ def _parts(
     heaters = drawn - insulates
     if drawn and not heaters:
         raise fault("it conducts no current", "heater", drawn)
-    at_supply, at_ground = (at[name] for name in REQUIRED)
+    at_supply, at_ground = (at[name] for name in ("supply", "ground"))
     supply, ground = (
         partition.reached(start, heaters | insulates) for start in (at_supply, at_ground)
     )
     if not heaters:
         if not supply & ground:
             what = "no conductor joins it with the supply"
-            raise fault(what, terminal_part(REQUIRED[1]), at_ground)
+            raise fault(what, terminal_part("ground"), at_ground)
         return ["heater" if number in supply & ground else "reader branch" for number in pieces]
     if not supply or not ground:
-        name = REQUIRED[0] if not supply else REQUIRED[1]
+        name = "ground" if supply else "supply"
         raise fault("it lies on the heater", terminal_part(name), at[name])
     if supply & ground:
         what = "supply and ground are joined without it: no current has to pass"

@@ -20,7 +20,6 @@ from shapely import LineString
 
 from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.files import read_bytes
-from hotlever.probe.drawing.drawing_formats import WARNS
 from hotlever.probe.drawing.outlines import Ring, rings_of, united, without_nested
 from hotlever.probe.layout import Point
 
@@ -223,7 +222,8 @@ def _read_apart(
         raise InputError(f"{path}: {' '.join(sheet['error'].split())}")
     # the libraries write their warnings there, gdstk not by way of Python
     lines = done.stderr.decode(errors="replace").splitlines()
-    warned = list(dict.fromkeys(line for line in lines if line.startswith(WARNS)))
+    of_library = "[GDSTK] ", "ezdxf: "
+    warned = list(dict.fromkeys(line for line in lines if line.startswith(of_library)))
     remarks = [
         ("", f"warning while the file was read: {excerpt(line, 200)}") for line in warned[:5]
     ]
