@@ -27,8 +27,6 @@ from hotlever.types import Array
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-#: Share of a parameter, or of all resistances, by which it is changed for a derivative.
-_STEP = 1e-3
 #: By this name the interface stands in probe files and fits.
 INTERFACE = "interface_K_per_mW"
 
@@ -50,6 +48,8 @@ class ContactLaw:
     ----------
     probe : Probe
         With a tip and a contact.
+    step : float
+        Share of a parameter, or of all resistances, by which it is changed for a derivative.
 
     Attributes
     ----------
@@ -58,11 +58,11 @@ class ContactLaw:
         interface, which makes the flux more uniform.
     """
 
-    def __init__(self, probe: Probe) -> None:
+    def __init__(self, probe: Probe, step: float = 1e-3) -> None:
         tip, contact = probe.tip, probe.contact
         assert tip is not None
         assert contact is not None
-        self._probe, self._tip = probe, tip
+        self._probe, self._tip, self._step = probe, tip, step
         self._others: dict[tuple[str, float], ContactLaw] = {}
         self.base_temperature_K = probe.circuit.base_temperature_K
         layers = contact.layers
@@ -142,8 +142,8 @@ class ContactLaw:
 
         value = odds(self)
         by = {name: self._by(name, odds, value) for name in names}
-        change = odds(self, 1.0 + _STEP) - odds(self, 1.0 - _STEP)
-        return value, {**by, "T": np.where(rise > least_K, change / (2.0 * _STEP * warm), 0.0)}
+        change = odds(self, 1.0 + self._step) - odds(self, 1.0 - self._step)
+        return value, {**by, "T": np.where(rise > least_K, change / (2.0 * self._step * warm), 0.0)}
 
     def along_axis(self, tip_K: float, depth_um: Array) -> tuple[Array, Array, Array]:
         """Return heights (µm) on the cone, the temperatures (K) there, and those under its middle.
@@ -158,7 +158,7 @@ class ContactLaw:
     @property
     def sum_by_interface(self) -> float:
         """How the sum of the resistances changes with that of the interface."""
-        step = _STEP * self.below_apex_K_per_mW
+        step = self._step * self.below_apex_K_per_mW
         more = self._changed(INTERFACE, self.interface_K_per_mW + step)
         return (more.below_apex_K_per_mW - self.below_apex_K_per_mW) / step
 
@@ -176,7 +176,7 @@ class ContactLaw:
         if name not in self.names:
             return np.zeros_like(here)
         (value,) = self._probe.values([name])
-        step = _STEP * (self.below_apex_K_per_mW if name == INTERFACE else value)
+        step = self._step * (self.below_apex_K_per_mW if name == INTERFACE else value)
         # an interface may have none, and no less: by both sides further up, then
         ways = (0.0, 1.0, 2.0) if name == INTERFACE else (-1.0, 0.0, 1.0)
         low, middle, high = (what(self._changed(name, value + way * step)) for way in ways)

@@ -34,10 +34,6 @@ from hotlever.probe.tip import Tip
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
-#: Polynomials that the flux from the disc is made of.
-_TERMS = 48
-
-
 # --- the cone -------------------------------------------------------------------------------------
 
 
@@ -200,7 +196,7 @@ def axis_rise(
     depths = np.array(thicknesses_um) / radius_um
     at = np.asarray(depth_um) / radius_um
     flux, _ = _flux(radius_um, kappas, thicknesses_um, interface_K_per_mW)
-    odd: Array = 2.0 * np.arange(_TERMS, dtype=float) + 1.0
+    odd: Array = 2.0 * np.arange(flux.size, dtype=float) + 1.0
     # in a half-space each polynomial has a closed form, and so has what is left of it at the top
     rise = ((np.sqrt(1.0 + at**2) - at)[:, None] ** odd / odd) @ flux
     if len(depths):
@@ -215,11 +211,12 @@ def _flux(
     kappas: Sequence[float],
     thicknesses_um: Sequence[float],
     interface_K_per_mW: float,
+    count: int = 48,
 ) -> tuple[Array, float]:
-    """Return the polynomials of the flux, over the rise of the disc, and 1/(κ₁ a) (K/mW)."""
+    """Return so many polynomials of the flux, over the rise of the disc, and 1/(κ₁ a) (K/mW)."""
     # 1/(W/(m K) µm) is 1e6 K/W
     unit = 1e3 / (kappas[0] * radius_um)
-    order = np.arange(_TERMS, dtype=float)
+    order = np.arange(count, dtype=float)
     system = _half_space(order)
     if len(thicknesses_um):
         system = system + _layers(order, kappas, np.array(thicknesses_um) / radius_um)

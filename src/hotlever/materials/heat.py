@@ -30,7 +30,6 @@ _SHOMATE = (22.81719, 3.899510, -0.082885, 0.042111, -0.354063)
 _PER_VOLUME = 2.329 / 28.0855
 #: Temperature (K) whose enthalpy is zero.
 STANDARD_TEMPERATURE = 298.15
-_SOURCE = "Shomate equation, NIST Chemistry WebBook, SRD 69; Chase, NIST-JANAF (1998)"
 #: Constant of Stefan and Boltzmann (W cm⁻² K⁻⁴), CODATA 2018.
 STEFAN_BOLTZMANN = 5.670374419e-12
 #: Impedance of free space (Ω), CODATA 2018.
@@ -148,7 +147,10 @@ def _sondheimer(depth: Array) -> tuple[Array, Array]:
 # --- held -----------------------------------------------------------------------------------------
 
 
-@law(meant_for=(290.0, 1685.0), source=_SOURCE)
+@law(
+    meant_for=(290.0, 1685.0),
+    source="Shomate equation, NIST Chemistry WebBook, SRD 69; Chase, NIST-JANAF (1998)",
+)
 def heat_capacity(T: ArrayLike) -> Evaluated:
     """Heat capacity of silicon at constant pressure, in J cm⁻³ K⁻¹.
 
@@ -164,7 +166,10 @@ def heat_capacity(T: ArrayLike) -> Evaluated:
     return _capacity(t), {"T": np.where(T < FORMULA_FROM, 0.0, _PER_VOLUME * slope)}
 
 
-@law(meant_for=(290.0, 1685.0), source=_SOURCE)
+@law(
+    meant_for=(290.0, 1685.0),
+    source="Shomate equation, NIST Chemistry WebBook, SRD 69; Chase, NIST-JANAF (1998)",
+)
 def enthalpy(T: ArrayLike) -> Evaluated:
     """Enthalpy of silicon above that at 298.15 K, in J cm⁻³: the integral of the heat capacity.
 
