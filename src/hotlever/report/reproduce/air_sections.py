@@ -161,7 +161,7 @@ def tip_section(page: Findings) -> None:
         "knee (K)": (effects.knee_K, ".1f"),
         "moved by (K)": (effects.moved_K, "+.1f"),
         "T at equal power (K)": (effects.at_power_K, "+.1f"),
-        "a tipless fit misses the knee by (K)": (effects.missed_K, "+.1f"),
+        "a tipless fit misses the knee by (K)": (effects.missed_K, "+.2f"),
     }
     page.columns("tips", columns)
     least, most = effects.missed_K.min().item(), effects.missed_K.max().item()

@@ -292,9 +292,13 @@ def _of_the_ramp(found: Ensemble) -> dict[str, Any]:
 
 
 def _of(values: xr.DataArray, nearest: str) -> str:
-    """Return the value of the nearest layout, and the range over those that were computed."""
-    low, high = _range(values)
-    return f"{values.sel(layout=nearest).item():+.1f} ({low:+.0f} to {high:+.0f})"
+    """Return the value of the nearest layout, and the range over those that were computed.
+
+    The range only where its ends differ, to a kelvin.
+    """
+    ends = dict.fromkeys(f"{end:+z.0f}" for end in _range(values))
+    over = f" ({' to '.join(ends)})" if len(ends) > 1 else ""
+    return f"{values.sel(layout=nearest).item():+z.1f}{over}"
 
 
 def _range(values: xr.DataArray) -> tuple[float, float]:
@@ -320,7 +324,7 @@ def _in_air(page: Findings) -> None:
         (Suspect.RAMAN, Suspect.SURFACES, Suspect.IN_AIR, Suspect.TOGETHER),
     )
     rows = [
-        (str(suspect), *(f"{value.item():+.1f}" for value in both.values()))
+        (str(suspect), *(f"{value.item():+z.1f}" for value in both.values()))
         for suspect in study.suspect.values
         for both in [study[["moved_K", "shift_K"]].sel(suspect=suspect)]
     ]
