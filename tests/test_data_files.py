@@ -150,7 +150,7 @@ def old_workbook(path, rows):
 
 
 def test_an_old_workbook_is_read(tmp_path):
-    pytest.importorskip("python_calamine")
+    pytest.importorskip("xlrd")
     table = [["Time", "AI", "AV", "RES"]]
     table += [[0.5 * n, i, v, "#REF"] for n, (i, v) in enumerate(zip(CURRENT, BIAS, strict=True))]
     path = old_workbook(tmp_path / "iv.xls", table)
@@ -284,6 +284,18 @@ def test_an_unknown_compression_is_named(tmp_path, monkeypatch):
         read_measurement(path)
 
 
+def test_a_dimension_without_values_is_no_column(tmp_path):
+    """Sweeps below each other, as QCoDeS exports a loop: netCDF stores their number too."""
+    xr = pytest.importorskip("xarray")
+    pytest.importorskip("netCDF4")
+    columns = {"I_h": (("sweep", "V_b"), np.stack([CURRENT, 1.3 * CURRENT]), {"units": "A"})}
+    data = xr.Dataset(columns, {"V_b": ("V_b", BIAS, {"units": "V"})})
+    data.to_netcdf(tmp_path / "qcodes.nc")
+    assert file_groups(tmp_path / "qcodes.nc") == ["/"]
+    measured = read_measurement(tmp_path / "qcodes.nc", {"I_h": "I_h 2"})
+    np.testing.assert_allclose(measured.current_mA, 1.3e3 * CURRENT, rtol=1e-15)
+
+
 # --- MATLAB ---------------------------------------------------------------------------------------
 
 
@@ -319,6 +331,12 @@ def test_a_matlab_file_of_version_7_3_is_read(tmp_path):
         raw.write(b"MATLAB 7.3 MAT-file")
     data = read_measurement(path, {"V_b (V)": "V_b", "I_h (mA)": "I_h"})
     assert data.bias_V.tolist() == BIAS.tolist()
+
+
+def test_complex_numbers_that_are_real_are_numbers(tmp_path):
+    savemat(tmp_path / "iv.mat", {"V_b": BIAS, "I_h": 1e3 * CURRENT + 0j})
+    data = read_measurement(tmp_path / "iv.mat", {"V_b (V)": "V_b", "I_h (mA)": "I_h"})
+    np.testing.assert_allclose(data.current_mA, 1e3 * CURRENT, rtol=1e-15)
 
 
 def test_matlab_counts_along_columns_and_says_what_is_empty(tmp_path):
@@ -363,7 +381,7 @@ def test_a_file_without_numbers_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("module", "extra", "content"),
     [
-        ("python_calamine", "excel", b"PK\x03\x04 xl/workbook.xml"),
+        ("openpyxl", "excel", b"PK\x03\x04 xl/workbook.xml"),
         ("h5py", "hdf5", b"\x89HDF\r\n\x1a\n"),
     ],
 )

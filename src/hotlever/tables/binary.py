@@ -15,9 +15,10 @@ import io
 import logging
 import re
 import struct
+import warnings
 import zipfile
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -64,7 +65,8 @@ class _Format:
     def read(self, raw: bytes, where: str, take: Callable[[Groups], T]) -> T:
         """Return what is taken of the tables; errors of the library are those of the input."""
         try:
-            with self.groups(raw, where) as groups:
+            # a damaged file has numbers that are none
+            with np.errstate(invalid="ignore"), self.groups(raw, where) as groups:
                 return take(groups)
         except ImportError:
             raise InputError(
@@ -136,8 +138,10 @@ def _format_of(raw: bytes) -> _Format | None:
     old = raw.startswith(b"\xd0\xcf\x11\xe0") and (
         "Workbook".encode("utf-16-le") in raw or "Book\0".encode("utf-16-le") in raw
     )
-    if old or (raw.startswith(b"PK") and b"xl/workbook.xml" in raw):
-        return _Format("workbook", "excel", "python-calamine", _workbook_groups)
+    if old:
+        return _Format("workbook", "excel", "xlrd", _old_workbook_groups)
+    if raw.startswith(b"PK") and b"xl/workbook.xml" in raw:
+        return _Format("workbook", "excel", "openpyxl", _workbook_groups)
     return None
 
 
@@ -452,6 +456,8 @@ class _Node:
         values = np.squeeze(np.asarray(value))
         if values.dtype.kind in "SUO" and values.ndim == 0:
             self.settings.append(f"# {heading}: {_cell(_decoded(values.item()))}")
+        elif values.dtype.kind == "c" and not values.imag.any():
+            self.add(name, values.real, unit)
         elif values.dtype.kind not in "iufb" or values.ndim > 2:
             self.settings.append(f"# left out, no column of real numbers: {heading}")
         elif values.ndim == 0:
@@ -566,8 +572,9 @@ def _add_dataset(node: _Node, key: str, dataset: Any) -> None:
     said = {name: np.ravel(value)[:1].tolist() for name, value in dataset.attrs.items()}
     unit = next((_decoded(said[name][0]) for name in names if said.get(name)), "")
     kind = _decoded(*said.get("MATLAB_class", [""]))
-    if "MATLAB_empty" in said:
-        # its values are the lengths of its sides
+    bare_dimension = "This is a netCDF dimension but not a netCDF variable"
+    if "MATLAB_empty" in said or str(_decoded(*said.get("NAME", [""]))).startswith(bare_dimension):
+        # its values are the lengths of its sides, or none
         return
     if dataset.size is None or dataset.size > MOST_LINES * node.most:
         node.settings.append(f"# left out, too large: {_cell(key)}")
@@ -641,28 +648,68 @@ def _walk_matlab(
 
 @contextmanager
 def _workbook_groups(raw: bytes, where: str) -> Iterator[Groups]:
-    """Give the sheets of a workbook that hold numbers, hidden ones too."""
-    import python_calamine
+    """Give the sheets of a packed workbook that hold numbers, hidden ones too."""
+    import openpyxl
 
-    if raw.startswith(b"PK"):
-        _check_sheets(raw, where)
-    try:
-        book = python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(raw))
-        sheets = {
-            _cell(each.name): book.get_sheet_by_index(index).to_python(skip_empty_area=False)
-            for index, each in enumerate(book.sheets_metadata)
-            if each.typ == python_calamine.SheetTypeEnum.WorkSheet
-        }
-    except BaseException as error:
-        # what the library, in Rust, has not foreseen is no Exception
-        if type(error).__name__ == "PanicException":
-            raise ValueError(str(error)) from error
-        raise
-    yield {
-        name: partial(_sheet_lines, rows, where)
-        for name, rows in sheets.items()
-        if any(isinstance(cell, int | float) for row in rows for cell in row)
-    }
+    _check_sheets(raw, where)
+    with warnings.catch_warnings():
+        # of styles and charts, which hold no numbers
+        warnings.simplefilter("ignore")
+        packed = io.BytesIO(_without_fills(raw))
+        book = openpyxl.load_workbook(packed, read_only=True, data_only=True)
+        try:
+            sheets = {each.title: each.iter_rows(values_only=True) for each in book.worksheets}
+            groups = _sheets(sheets, where)
+        finally:
+            book.close()
+    yield groups
+
+
+def _without_fills(raw: bytes) -> bytes:
+    """Return a workbook whose cells are of no colour: the library refuses an empty ``<fill/>``.
+
+    Instruments write such. The formats of numbers, which tell dates, stay.
+    """
+    packed = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(raw)) as parts, zipfile.ZipFile(packed, "w") as others:
+        for name in parts.namelist():
+            content = parts.read(name)
+            if name == "xl/styles.xml":
+                fill = rb"(?s)<fill\b[^>]*/>|<fill\b[^>]*>.*?</fill>"
+                content = re.sub(fill, b"<fill><patternFill/></fill>", content)
+            others.writestr(name, content)
+    return packed.getvalue()
+
+
+@contextmanager
+def _old_workbook_groups(raw: bytes, where: str) -> Iterator[Groups]:
+    """Give the sheets of an .xls file that hold numbers, hidden ones too."""
+    import xlrd
+
+    # it prints what it finds odd
+    with xlrd.open_workbook(file_contents=raw, logfile=io.StringIO()) as book:
+
+        def value(cell: Any) -> Any:
+            if cell.ctype == xlrd.XL_CELL_DATE:
+                return xlrd.xldate_as_datetime(cell.value, book.datemode)
+            return (
+                xlrd.error_text_from_code[cell.value]
+                if cell.ctype == xlrd.XL_CELL_ERROR
+                else cell.value
+            )
+
+        sheets = {sheet.name: [list(map(value, row)) for row in sheet.get_rows()] for sheet in book}
+        yield _sheets(sheets, where)
+
+
+def _sheets(sheets: Mapping[str, Iterable[Sequence[Any]]], where: str) -> Groups:
+    """Return the tables of sheets that hold numbers."""
+    groups: dict[str, Callable[[], list[str]]] = {}
+    for name, cells in sheets.items():
+        rows = list(islice(cells, MOST_LINES + 1))
+        if any(isinstance(cell, int | float) for row in rows for cell in row):
+            groups[_cell(name)] = partial(_sheet_lines, rows, where)
+    return groups
 
 
 def _check_sheets(raw: bytes, where: str) -> None:
@@ -672,7 +719,7 @@ def _check_sheets(raw: bytes, where: str) -> None:
     ------
     InputError
         If so. A formula may lack its value where a program that does not calculate wrote it, and
-        the library, which fills a rectangle, would take it for an empty cell.
+        the library would take it for an empty cell.
     """
     with zipfile.ZipFile(io.BytesIO(raw)) as parts:
         size = sum(part.file_size for part in parts.infolist())
@@ -695,7 +742,7 @@ def _check_sheets(raw: bytes, where: str) -> None:
 
 
 def _check_extent(sheet: bytes, where: str) -> None:
-    """Refuse a sheet whose cells are few and far apart: the rectangle around them is filled."""
+    """Refuse a sheet whose cells are few and far apart: rows are filled up to the last one."""
     cells = re.findall(rb'<(?:\w+:)?c\b[^>]*\br="([A-Z]{1,3})(\d{1,7})"', sheet)
     rows = max((int(row) for _, row in cells), default=0)
     _check_length(rows, where)
@@ -711,12 +758,13 @@ def _check_extent(sheet: bytes, where: str) -> None:
 def _sheet_lines(rows: Sequence[Sequence[Any]], where: str) -> list[str]:
     """Return the rows of a sheet as lines, empty ones too, so that they keep their numbers."""
     _check_length(len(rows), where)
-    table = [list(map(_cell, row)) for row in rows]
+    table = [["" if cell is None else _cell(cell) for cell in row] for row in rows]
     width = max(number for cells in table for number, cell in enumerate(cells, start=1) if cell)
     lines = []
     for cells in table:
         # words alone in the first cell are what text files have as comments
-        alone = cells[0] and not any(cells[1:]) and decimal(cells[0]) is None
+        alone = any(cells) and cells[0] and not any(cells[1:]) and decimal(cells[0]) is None
+        cells += [""] * (width - len(cells))
         filled = "\t".join(cells[:width]) if any(cells) else ""
         lines.append(f"# {cells[0]}" if alone else filled)
     return lines
