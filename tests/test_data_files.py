@@ -339,6 +339,14 @@ def test_complex_numbers_that_are_real_are_numbers(tmp_path):
     np.testing.assert_allclose(data.current_mA, 1e3 * CURRENT, rtol=1e-15)
 
 
+def test_what_is_no_column_is_named_where_it_is_missed(tmp_path):
+    savemat(tmp_path / "iv.mat", {"V_b": BIAS, "I_h": CURRENT + 1e-6j})
+    left_out = "; left out: no column of real numbers: I_h$"
+    for columns in ({"V_b (V)": "V_b"}, {"V_b (V)": "V_b", "I_h (A)": "I_h"}):
+        with pytest.raises(InputError, match=left_out):
+            read_measurement(tmp_path / "iv.mat", columns)
+
+
 def test_matlab_counts_along_columns_and_says_what_is_empty(tmp_path):
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "iv.mat"

@@ -334,6 +334,7 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
         "'V_r (mV)', 'V_bridge (mV)', 'T_tip (K)', or 'V_l (V)' and 'I_h (mA)'; beside a time V_b, "
         "or a wave form "
         f"such as --pulse 10V,5us, and any of them; other names with {_assignment('V_b', example)}"
+        f"{table.without}"
     )
 
 

@@ -310,6 +310,13 @@ class TextTable:
         pairs = [key_and_value(line) for _, line in self.comments]
         return {key: value for key, value in reversed(pairs) if value}
 
+    @property
+    def without(self) -> str:
+        """What of a binary file is no column, and why, to end an error with."""
+        mark = "# left out, "
+        parts = [line.removeprefix(mark) for _, line in self.comments if line.startswith(mark)]
+        return f"; left out: {excerpt('; '.join(parts), 160)}" if parts else ""
+
     def where(self, row: int) -> str:
         """Name file and line of a row (-1: the header row), to begin an error with."""
         return f"{self.path}: line {self.header if row < 0 else self.lines[row][0]}"
@@ -334,7 +341,8 @@ class TextTable:
                 return indices[0]
         if not heading.isdecimal() and self.is_named:
             names = [excerpt(name) for name in self.names[:9]]
-            raise unknown_name("column", heading, names, self.where(-1))
+            unknown = unknown_name("column", heading, names, self.where(-1))
+            raise InputError(f"{unknown}{self.without}")
         if heading.isdecimal() and len(heading) < 5 and 1 <= int(heading) <= len(self.names):
             return int(heading) - 1
         hint = " or heading" if self.is_named else ""
