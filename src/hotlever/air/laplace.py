@@ -107,6 +107,7 @@ def _in_one_frame(first: Panels, second: Panels, i: Index, j: Index) -> NDArray[
     """Return which pairs of panels are rectangles turned by the same angle, see `frame`."""
     (axis, angle), (other_axis, other_angle) = first.frame, second.frame
     between = np.abs(angle[i] - other_angle[j])
+    # rectangles that are turned by less against each other are parallel
     parallel = np.minimum(between, np.pi / 2 - between) < 2e-6
     return np.asarray((axis[i] >= 0) & (other_axis[j] >= 0) & parallel)
 

@@ -138,7 +138,7 @@ def refined(
         Relative, of the largest entry of each column.
     """
     solution = solve(right_hand_side)
-    for _ in range(12):
+    for _ in range(12):  # at most: what does not settle is returned as it is
         correction = solve(missing(solution))
         solution = solution + correction
         sizes = (np.abs(some / scale).max(axis=0) for some in (correction, solution))

@@ -150,8 +150,9 @@ def checked_frequencies(frequency_Hz: ArrayLike) -> Array:
         If one is out of bounds, or there is none.
     """
     frequency = np.atleast_1d(np.asarray(frequency_Hz, dtype=float))
-    if not frequency.size or not ((frequency >= 1e-3) & (frequency <= 1e8)).all():
-        raise InputError("expected frequencies from 0.001 to 1e+08 Hz")
+    lowest, highest = 1e-3, 1e8  # Hz; the real rates that answers are expanded in reach as far
+    if not frequency.size or not ((frequency >= lowest) & (frequency <= highest)).all():
+        raise InputError(f"expected frequencies from {lowest:g} to {highest:g} Hz")
     return frequency
 
 
@@ -317,6 +318,7 @@ class HarmonicBalance:
 
 def _steps(lever: Lever, start: State, amplitude: float) -> Array:
     """Return states of a lever at rest whose bias is stepped up, and down."""
+    # after so many of the slowest time constants the lever is at rest
     until = 12.0 * abs(float(slowest_modes(start)[0][0]))
     states = [start.x]
     for bias in (start.bias_V + amplitude, start.bias_V - amplitude):

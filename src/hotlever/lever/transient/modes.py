@@ -83,7 +83,7 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
         return constants, changes
     for mode in range(count):
         # what goes along with the lever depends on how fast it goes
-        for _ in range(6):
+        for _ in range(6):  # until the time constant changes by less than 1e-4
             rate, last = 1.0 / abs(constants[mode]), constants[mode]
             bound = air.bound(rate) if last > 0.0 else air.taken_up(rate) / rate
             times, modes = _modes(equations, x, factors, count, air.coordinates, bound)
