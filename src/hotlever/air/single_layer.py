@@ -229,9 +229,10 @@ def screened_potential(points: Array, corners: Array, q: Numbers) -> Numbers:
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     to_corner = corners - points[..., None, :]
     height = np.abs(np.einsum("...d,...d->...", to_corner[..., 0, :], normal))
-    # points along each half of an edge
+    # along each half of an edge ∫ (exp(−qR) − 1) dR from the plane's height on, by its points
     nodes, weights = np.polynomial.legendre.leggauss(4)
-    total = np.zeros((len(q), *to_corner.shape[:-2]), dtype=q.dtype)
+    rates = q.reshape(-1, *(1,) * height.ndim)
+    screened, alone = np.zeros((len(q), *height.shape), dtype=q.dtype), np.zeros(height.shape)
     last = corners.shape[-2] - 1
     for corner in range(last + 1):
         start = to_corner[..., corner, :]
@@ -247,13 +248,8 @@ def screened_potential(points: Array, corners: Array, q: Numbers) -> Numbers:
             half = 0.5 * (high - low)
             for node, weight in zip(nodes, weights, strict=True):
                 flat = away**2 + (low + half * (1.0 + node)) ** 2
-                far = np.sqrt(flat + height**2)
+                apart = np.sqrt(flat + height**2) - height
                 share = weight * half * away / np.maximum(flat, 1e-24)
-                total += share * _between(q, height, far)
-    return total
-
-
-def _between(q: Numbers, near: Array, far: Array) -> Numbers:
-    """Return ∫ (exp(−qR) − 1) dR between two distances, (k, ...)."""
-    rates, apart = q.reshape(-1, *(1,) * far.ndim), far - near
-    return np.asarray(-np.exp(-rates * near) * np.expm1(-rates * apart) / rates - apart)
+                screened += share * np.expm1(-rates * apart)
+                alone += share * apart
+    return np.asarray(-np.exp(-rates * height) * screened / rates - alone)
