@@ -277,6 +277,14 @@ def test_fit_notes_where_data_and_probe_differ(run, tmp_path):
             "--table-by: goes with --table",
         ),
         (
+            ("calibrate", EXAMPLE, "--table", "t.csv", "--table-by", ""),
+            "unknown quantity ''",
+        ),
+        (
+            ("design", "--minimise", "knee_K", "--within", "heater_length_um=3:6", "--at", ""),
+            "--at",
+        ),
+        (
             ("fit", EXAMPLE, "--posterior", "--samples", "0"),
             "--samples 0: expected a number from 1",
         ),

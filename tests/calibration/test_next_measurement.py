@@ -264,6 +264,12 @@ def test_what_cannot_be_is_said_in_one_line(run, words, expected):
     assert expected in err.splitlines()[-1]
 
 
+@pytest.mark.parametrize("words", [("--quantity", "kne"), ("--allow", "spectrum")])
+def test_a_wrong_name_is_refused_before_data_are_calibrated(run, words):
+    status, _, err = run("next", EXAMPLES / "lever-a.csv", *words)
+    assert (status, err.count("\n")) == (2, 1)
+
+
 def test_no_spectra_are_proposed_of_a_heater_without_silicon():
     film = Probe.from_file(EXAMPLES / "palladium-on-nitride.toml")
     plan = plan_next(probe=film, count=3, at_K=400.0)

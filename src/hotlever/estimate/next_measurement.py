@@ -584,6 +584,26 @@ class Plan:
         )
 
 
+def check_names(quantity: str, allowed: Iterable[str]) -> None:
+    """Refuse a quantity, or kinds of measurement, of which there are none.
+
+    Raises
+    ------
+    InputError
+        If so.
+    """
+    if quantity not in get_args(Aim):
+        raise unknown_name("quantity", quantity, get_args(Aim))
+    for kind in allowed:
+        if kind == "pulse":
+            raise InputError(
+                "pulse: a calibration is of rows at rest, to which a pulse adds nothing; expected "
+                f"some of {', '.join(KINDS)}"
+            )
+        if kind not in KINDS:
+            raise unknown_name("kind of measurement", kind, KINDS)
+
+
 def plan_next(
     calibration: Estimate | None = None,
     *,
@@ -651,6 +671,7 @@ def plan_next(
     >>> plan.proposals.bias_V.values[0]  # doctest: +SKIP
     8.25
     """
+    check_names(quantity, allowed or ())
     lever = (
         LinearisedLever.of_priors(probe or Probe.reference(), priors)
         if calibration is None
@@ -658,8 +679,6 @@ def plan_next(
     )
     most = _allowed(lever, allowed)
     limit = np.inf if stay_below_K is None else stay_below_K
-    if quantity not in get_args(Aim):
-        raise unknown_name("quantity", quantity, get_args(Aim))
     if quantity == "knee" and at_K is not None:
         raise InputError("at_K: the knee has a temperature of its own; leave it out")
     bias, highest_K, safe = _safe_biases(lever, bias, limit)
@@ -791,16 +810,8 @@ def _allowed(
         observables = {*lever.weights, *(["tip"] if lever.probe.heater_silicon else [])}
         usual = {kind: of_kind for kind, of_kind in KINDS.items() if kind != "dimensions"}
         return {kind: None for kind, of_kind in usual.items() if {*of_kind} <= observables}
-    for kind in allowed:
-        if kind == "pulse":
-            raise InputError(
-                "pulse: a calibration is of rows at rest, to which a pulse adds nothing; expected "
-                f"some of {', '.join(KINDS)}"
-            )
-        if kind not in KINDS:
-            raise unknown_name("kind of measurement", kind, KINDS)
-        if kind == "reader" and kind not in lever.probe.observables:
-            raise InputError("reader: the probe has no reader; expected some of bias, spectra")
+    if "reader" in allowed and "reader" not in lever.probe.observables:
+        raise InputError("reader: the probe has no reader; expected some of bias, spectra")
     return dict(allowed)
 
 

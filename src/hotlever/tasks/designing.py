@@ -97,7 +97,8 @@ def vary_design(
         at_most_one(minimise=minimise, maximise=maximise)
         refuse("does not go with --minimise or --maximise", **beside)
         changed = read_probe(reporter, probe, physics=physics)
-        _optimise(reporter, changed, minimise, maximise, within, at or "700K", output, plot)
+        point = "700K" if at is None else at
+        _optimise(reporter, changed, minimise, maximise, within, point, output, plot)
         return
     refuse("goes with --minimise or --maximise", within=within, at=at)
     power_mW = 2.0 if power is None else power

@@ -295,7 +295,7 @@ def calibrate_files(
             f"--at: found {quoted(at)}, expected a bias such as 8V of one data file, or several "
             "data files"
         )
-    table_options = _table_options(table_by or "temperature", table_step)
+    table_options = _table_options("temperature" if table_by is None else table_by, table_step)
     law = None if power_law is None else read_power_law(power_law)
     of_lever = None if fit is None else read_fit(fit)
     stated = beforehand.probe
@@ -447,6 +447,7 @@ def propose(
     with 99 % certainty, and how sure what counts is known then. Without data: where to begin.
     """
     from hotlever.estimate import plan_next, read_calibration
+    from hotlever.estimate.next_measurement import check_names
 
     if quantity == "knee":
         refuse("the knee has a temperature of its own; leave it out", at=at)
@@ -455,6 +456,7 @@ def propose(
     most = 100
     check_number("--count", count, 1, most)
     allowed = parse_kinds(allow, most)
+    check_names(quantity, allowed or ())  # before a measurement is calibrated
     limits = list((allowed or {"": None}).values())
     usual = sum(number or 0 for number in limits) if all(limits) else 5
     choices: dict[str, Any] = {
