@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import sys
 import zipfile
+from datetime import timedelta
 
 import numpy as np
 import pytest
@@ -105,7 +106,7 @@ def test_a_sheet_whose_cells_are_far_apart_is_refused(tmp_path):
 
 
 def old_workbook(path, rows):
-    """Write a sheet of an .xls file: numbers and words in the records of BIFF 8."""
+    """Write a sheet of an .xls file: numbers, dates and words in the records of BIFF 8."""
 
     def record(kind, content=b""):
         return struct.pack("<HH", kind, len(content)) + content
@@ -116,15 +117,19 @@ def old_workbook(path, rows):
     cells = b""
     for row, values in enumerate(rows):
         for column, value in enumerate(values):
-            place = struct.pack("<HHH", row, column, 0)
+            # formatted as a number, or as a date that is so many days after the year 1900
+            place = struct.pack("<HHH", row, column, isinstance(value, timedelta))
+            if isinstance(value, timedelta):
+                value /= timedelta(days=1)
             if isinstance(value, str):
                 text = struct.pack("<HB", len(value), 0) + value.encode("latin-1")
                 cells += record(0x204, place + text)
             else:
                 cells += record(0x203, place + struct.pack("<d", value))
     name = struct.pack("<BBBB", 0, 0, 4, 0) + b"Data"
-    offset = len(begin(5)) + len(record(0x85, b"1234" + name)) + 4
-    book = begin(5) + record(0x85, struct.pack("<I", offset) + name) + record(0x0A)
+    formats = b"".join(record(0xE0, struct.pack("<HH16x", 0, number)) for number in (0, 14))
+    offset = len(begin(5) + formats) + len(record(0x85, b"1234" + name)) + 4
+    book = begin(5) + formats + record(0x85, struct.pack("<I", offset) + name) + record(0x0A)
     book = (book + begin(0x10) + cells + record(0x0A)).ljust(4096, b"\0")
     # a compound file: one sector of the table of sectors, one of names, then those of the book
     sectors = len(book) // 512
@@ -158,6 +163,15 @@ def test_an_old_workbook_is_read(tmp_path):
     assert data.bias_V.tolist() == BIAS.tolist()
     np.testing.assert_allclose(data.current_mA, 1e3 * CURRENT, rtol=1e-15)
     assert not any("'#REF'" in note for note in data.notes)
+
+
+@pytest.mark.parametrize("days", [46000.5, 3e6, 9e8])
+def test_what_an_old_workbook_has_formatted_as_a_date_may_be_none(tmp_path, days):
+    pytest.importorskip("xlrd")
+    table = [["Day", "V_b (V)", "I_h (A)"]]
+    table += [[timedelta(days), v, i] for i, v in zip(CURRENT, BIAS, strict=True)]
+    data = read_measurement(old_workbook(tmp_path / "iv.xls", table))
+    assert data.bias_V.tolist() == BIAS.tolist()
 
 
 def test_an_empty_cell_is_no_value(tmp_path):

@@ -19,7 +19,7 @@ import warnings
 import zipfile
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice, zip_longest
@@ -691,7 +691,10 @@ def _old_workbook_groups(raw: bytes, where: str) -> Iterator[Groups]:
 
         def value(cell: Any) -> Any:
             if cell.ctype == xlrd.XL_CELL_DATE:
-                return xlrd.xldate_as_datetime(cell.value, book.datemode)
+                # what only looks like a date in its format may be none; Excel shows such as ####
+                with suppress(OverflowError):
+                    return xlrd.xldate_as_datetime(cell.value, book.datemode)
+                return "#VALUE!"
             return (
                 xlrd.error_text_from_code[cell.value]
                 if cell.ctype == xlrd.XL_CELL_ERROR
