@@ -29,6 +29,7 @@ from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.lever.reduced.training import cached_reduction
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
+from hotlever.probe.probe_parameters import usual_parameters
 from problems import (
     BIAS,
     EXAMPLE,
@@ -184,7 +185,9 @@ def main():
     full_fit = processor_seconds(
         lambda: fit(
             data,
-            model=lambda probe, bias: ExperimentAtRest(SimilarLevers(Lever(probe)), None, bias),
+            model=lambda probe, bias: ExperimentAtRest(
+                SimilarLevers(Lever(probe)), None, bias, usual_parameters(probe)
+            ),
         )
     )
     problem = peer_problem(probe, lever.space.mesh, degree=3, quadrature=5, bias=BIAS)
