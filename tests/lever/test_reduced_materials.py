@@ -118,5 +118,5 @@ def test_a_batch_of_film_levers_is_fitted(tmp_path, monkeypatch):
     )
     assert not done.failures
     assert progress[-1] == (8, 8)
-    found = [one["parameters"]["film.resistivity"]["value"] for one in done.results.values()]
+    found = [one.parameters["film.resistivity"].value for one in done.results.values()]
     assert found == pytest.approx([1.8e-5, 2.2e-5], rel=3e-3)
