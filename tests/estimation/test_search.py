@@ -240,3 +240,32 @@ def test_a_lever_that_cannot_be_drawn_is_none_to_try(reference_curve):
     assert objective.at(probe, objective.point(shorter)) == shorter
     with pytest.raises(InputError, match="probe: heater_length_um"):
         objective.at(probe, objective.point(longer))
+
+
+#: I_h (mA) at 40 even biases up to 13 V of a u-shape with other laws, whose tip is at 690 K at
+#: 12.36 V (lever 33 of `foreign_levers`).
+FOREIGN_MA = """
+0.05273 0.10545 0.15857 0.21133 0.26452 0.31748 0.36909 0.42167 0.47279 0.52743 0.57876 0.63048
+0.68444 0.73758 0.7868 0.84006 0.89372 0.94416 1.00291 1.04805 1.10195 1.15442 1.20528 1.25524
+1.30664 1.35749 1.41384 1.45959 1.5097 1.56047 1.61001 1.65811 1.70837 1.76246 1.80656 1.86102
+1.90252 1.95211 1.99689 2.0302
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("coarse_meshes")
+def test_a_lever_that_jumps_where_the_data_do_not_is_left_for_another():
+    """It described the currents less well, and stated 928 K with a band from 838 K on."""
+    current = np.array(FOREIGN_MA.split(), dtype=float)
+    bias = np.linspace(0.325, 13.0, current.size)
+    probe = Probe.u_shape()
+    nothing = np.full(current.size, np.nan)
+    data = Measurement(bias, current, nothing, nothing, nothing, medium="vacuum")
+    found = calibrate(data, probe=probe)
+    low, high = (
+        np.interp(12.36, found.table.bias_V, found.table[name])
+        for name in ("tip_low_K", "tip_high_K")
+    )
+    assert found.describes_data
+    assert low < 690.0 < high
+    assert not any("jumps" in note for note in found.notes)

@@ -130,8 +130,8 @@ class Search:
     def from_anywhere(self, experiment: ExperimentAtRest) -> Optimum:
         """Search from a lever of which little may be known.
 
-        If it shows something else than the data, or the search leads to a lever that does, it first
-        grows; of two ends the one that describes the data better counts.
+        If it shows something else than the data, or the search leads to a lever that does, or that
+        jumps on the way, it first grows; of two ends the one that describes the data better counts.
 
         Raises
         ------
@@ -143,18 +143,24 @@ class Search:
         with suppress(ComputationError):
             if not _is_far(problem.residuals, optimiser.predictor.predict(problem.start)):
                 ends.append(optimiser.solve_and_confirm(problem.start, problem.options.robust))
-                if ends[0].describes_data:
+                if ends[0].describes_data and not _jumps(ends[0]):
                     return ends[0]
         before = optimiser.predictor.evaluations
-        grown, nearer, before = self._grown(experiment, before)
-        if ends and nearer == problem.start:
-            # cold rows say nothing else, and the same search would come to the same end
-            return ends[0]
-        try:
-            ends.append(self.near(grown, nearer, before))
-        except ComputationError:
-            if not ends:
-                raise
+        # by fewer portions a lever comes another way: worth it where the first ends at jumps
+        for portions in (6, 4):
+            try:
+                grown, nearer, before = self._grown(experiment, before, portions)
+                if ends and nearer == problem.start:
+                    # cold rows say nothing else, and the same search would come to the same end
+                    break
+                ends.append(self.near(grown, nearer, before))
+            except ComputationError:
+                if not ends:
+                    raise
+                break
+            if not (ends[-1].describes_data and _jumps(ends[-1])):
+                break
+            before = ends[-1].predictor.evaluations
         return min(ends, key=lambda end: (not end.describes_data, end.misfit))
 
     def _optimiser(self, experiment: Experiment, start: Probe, before: int = 0) -> Optimiser:
@@ -165,9 +171,9 @@ class Search:
         return Optimiser(objective, predictor)
 
     def _grown(
-        self, experiment: ExperimentAtRest, before: int
+        self, experiment: ExperimentAtRest, before: int, portions: int
     ) -> tuple[ExperimentAtRest, Probe, int]:
-        """Return a lever that shows nearly what was measured, up to the hottest portion of rows.
+        """Return a lever that shows nearly what was measured, but for the hottest of some portions.
 
         With it the experiment is returned that is to be searched on with, and the levers that were
         solved, with those `before`. Without priors the usual ones close what cold rows leave open.
@@ -180,7 +186,6 @@ class Search:
         bias = np.abs(measurement.bias_V)
         current = measurement.current(start.circuit)
         heated = np.unique(bias[np.isfinite(current) & (bias > 0)])
-        portions = 6  # the last of which is all of the rows
         # each is to be met within some per cent: the next moves the lever anyway
         options = SearchOptions(
             most_branches=4, decrement=2.0, scatter_rounds=0, first_region=0.7, largest_region=1.2
@@ -218,6 +223,19 @@ def _is_far(residuals: Residuals, at: Prediction) -> bool:
     share = residuals.difference(at.values) / residuals.largest
     # by the median: a few wrong rows are no other lever
     return bool(np.nanmax(np.nanmedian(np.abs(share), axis=1)) > 0.06)
+
+
+def _jumps(end: Optimum) -> bool:
+    """Whether a lever jumps below the highest bias.
+
+    Rows beside a jump may be on either side of it, so that a search may end at jumps that the data
+    have not, where another lever describes them better without.
+    """
+    prediction, circuit = end.prediction, end.probe.circuit
+    if not isinstance(prediction, PredictionAtRest) or not circuit.starts_cold:
+        return False
+    highest = np.abs(prediction.columns["bias_V"]).max(keepdims=True)
+    return bool(prediction.surrogate.branch.read(circuit, highest).jumps)
 
 
 def _has_moved(drawn: Probe, probe: Probe) -> bool:
