@@ -13,6 +13,7 @@ import pytest
 
 import hotlever
 from experiments import full_experiment
+from foreign_levers import owners_probe
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, calibrate, fit
 from hotlever.estimate.diagnosis import Diagnosis
@@ -245,22 +246,24 @@ def test_a_lever_that_cannot_be_drawn_is_none_to_try(reference_curve):
 #: I_h (mA) at 40 even biases up to 13 V of a u-shape with other laws, whose tip is at 690 K at
 #: 12.36 V (lever 33 of `foreign_levers`).
 FOREIGN_MA = """
-0.05273 0.10545 0.15857 0.21133 0.26452 0.31748 0.36909 0.42167 0.47279 0.52743 0.57876 0.63048
-0.68444 0.73758 0.7868 0.84006 0.89372 0.94416 1.00291 1.04805 1.10195 1.15442 1.20528 1.25524
-1.30664 1.35749 1.41384 1.45959 1.5097 1.56047 1.61001 1.65811 1.70837 1.76246 1.80656 1.86102
-1.90252 1.95211 1.99689 2.0302
+0.05273474 0.1054503 0.1585658 0.21133 0.2645211 0.3174807 0.3690855 0.4216711 0.4727949
+0.5274337 0.5787637 0.6304764 0.6844372 0.7375838 0.7868016 0.8400557 0.893717 0.9441552
+1.002909 1.048046 1.101948 1.154418 1.20528 1.255238 1.306643 1.357486 1.413838 1.459589
+1.509704 1.560474 1.610007 1.65811 1.708375 1.76246 1.806561 1.86102 1.902516 1.952108 1.996894
+2.030201
 """
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarse_meshes")
-def test_a_lever_that_jumps_where_the_data_do_not_is_left_for_another():
+def test_a_lever_that_jumps_where_the_data_do_not_is_left_for_another(tmp_path):
     """It described the currents less well, and stated 928 K with a band from 838 K on."""
-    current = np.array(FOREIGN_MA.split(), dtype=float)
-    bias = np.linspace(0.325, 13.0, current.size)
-    probe = Probe.u_shape()
-    nothing = np.full(current.size, np.nan)
-    data = Measurement(bias, current, nothing, nothing, nothing, medium="vacuum")
+    current = FOREIGN_MA.split()
+    bias = np.linspace(0.325, 13.0, len(current))
+    data, probe = tmp_path / "iv.csv", tmp_path / "probe.toml"
+    rows = [f"{volts:.7g},{milliamps}" for volts, milliamps in zip(bias, current, strict=True)]
+    data.write_text("\n".join(["V_b (V),I_h (mA)", *rows]))
+    probe.write_text(owners_probe("u-shape", "vacuum"))
     found = calibrate(data, probe=probe)
     low, high = (
         np.interp(12.36, found.table.bias_V, found.table[name])
