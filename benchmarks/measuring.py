@@ -201,7 +201,9 @@ def ends(count: int) -> None:
                 after, text = end(kind, twin, Path(folder), rng)
             seconds[kind].append(after)
             aloud += "MAY STILL BE ON" in text
-            lines = (Path(folder) / "iv.csv").read_text().splitlines()
+            # an end that comes before the first row leaves no file
+            output = Path(folder) / "iv.csv"
+            lines = output.read_text().splitlines() if output.exists() else []
             whole = [line.count(",") == 1 for line in lines if line[0] not in "#V"]
             rows += sum(whole)
             print(number, kind, round(after, 2), len(whole), file=sys.stderr, flush=True)

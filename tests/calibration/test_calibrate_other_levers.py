@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.estimate import calibrate, fit
+from hotlever.estimate import Estimate, calibrate, fit
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, default_priors
@@ -95,7 +95,7 @@ def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, re
     content = both.content()
     assert len(content["gum_correlation"]) == len(content["gum"])
     assert content["effective_dof"] is None
-    assert both.file().model_validate(content, context="").result().content() == content
+    assert Estimate.of_file(both.file().model_validate(content, context="")).content() == content
     assert both.medium == "air"
     assert {"fit", "measurement", "air"} <= set(both.table.source.values.tolist())
     error = np.abs(both.table.tip_K - air.tip_temperature(both.table.power_mW))
