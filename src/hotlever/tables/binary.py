@@ -241,8 +241,6 @@ def _experiment_order(raw: bytes) -> str:
 @contextmanager
 def _experiment_groups(raw: bytes, where: str) -> Iterator[Groups]:
     """Give the waves of each folder of an experiment, and the scales that they have."""
-    import igor2  # noqa: F401
-
     order, at, path, known = _experiment_order(raw), 0, ["/"], {"/": _Node.empty()}
     while at < len(raw):
         kind, _, size = struct.unpack_from(f"{order}HHi", raw, at)
