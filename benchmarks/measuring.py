@@ -21,6 +21,7 @@ import sys
 import tempfile
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -146,8 +147,11 @@ def levers(count: int) -> None:
 # --- ends -----------------------------------------------------------------------------------------
 
 
-def _small_files() -> None:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (450, 450))
+def _prepare(small_files: bool) -> None:
+    # what a shell starts in its background ignores Ctrl-C, and so would a command started by it
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if small_files:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (450, 450))
 
 
 def end(kind: str, twin: TwinBench, folder: Path, rng: np.random.Generator) -> tuple[float, str]:
@@ -160,7 +164,7 @@ def end(kind: str, twin: TwinBench, folder: Path, rng: np.random.Generator) -> t
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=_small_files if kind == "disk" else None,
+        preexec_fn=partial(_prepare, small_files=kind == "disk"),
     ) as process:
         while not twin.output_on and process.poll() is None:
             time.sleep(0.01)

@@ -102,6 +102,23 @@ def test_it_is_off_after_the_supervising_process_is_killed(twin, measuring):
     assert "MAY STILL BE ON" not in err
 
 
+def test_it_is_off_at_once_though_nothing_is_asked_of_the_process_that_was_killed(twin):
+    """A measurement computes for seconds between two readings."""
+
+    def measure() -> None:
+        with Supervisor(Supply(twin.source)) as instrument:
+            instrument.set_bias(2.0)
+            killed = time.monotonic()
+            os.kill(instrument._process.pid, signal.SIGKILL)
+            assert is_off(twin)
+            assert time.monotonic() - killed < 2.0
+            instrument.read()
+
+    with pytest.raises(InstrumentError, match="supervises the source meter died") as raised:
+        measure()
+    assert "MAY STILL BE ON" not in str(raised.value)
+
+
 def test_the_supervising_process_does_not_hear_what_stops_a_command(twin, measuring):
     process, supervisor = measuring
     os.kill(supervisor, signal.SIGINT)

@@ -2,8 +2,9 @@
 
 The measurement asks it for what is to be set and read, through a pipe. Where that pipe closes,
 because the measurement is done, was interrupted, has failed or was killed, it turns the output off
-and asks the instrument whether it is. What nobody can turn off any more, since the line is broken
-or this process was killed itself, is said aloud: a source meter keeps its output on.
+and asks the instrument whether it is. Where this process dies itself the measurement turns it off,
+at once, whatever it is computing. What nobody can turn off, since the line is broken or both were
+killed, is said aloud as far as somebody is left to say it: a source meter keeps its output on.
 """
 
 from __future__ import annotations
@@ -12,10 +13,11 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from types import TracebackType
 from typing import Any
 
@@ -65,6 +67,7 @@ class Supervisor:
 
     def __init__(self, supply: Supply) -> None:
         self._supply = supply
+        self._is_ending = self._is_off = False
         self.identity = ""
 
     def __enter__(self) -> Supervisor:
@@ -99,6 +102,17 @@ class Supervisor:
         self._process = context.Process(target=supervise, args=(theirs, self._supply), daemon=False)
         self._process.start()
         theirs.close()
+        self._watch = threading.Thread(target=self._turn_off_if_it_dies, daemon=True)
+        self._watch.start()
+
+    def _turn_off_if_it_dies(self) -> None:
+        """Turn the output off where the supervising process ends before it is asked to.
+
+        The measurement may be computing for seconds before it asks it for something again.
+        """
+        wait([self._process.sentinel])
+        if not self._is_ending:
+            self._is_off = _turned_off(None, self._supply)
 
     def _ask(self, request: float | str) -> Any:
         try:
@@ -120,8 +134,13 @@ class Supervisor:
 
     def _end(self, error: BaseException | None) -> None:
         """Have the output turned off; raise InstrumentError if nobody confirms that it is."""
+        self._is_ending = True
+        if self._is_turned_off():
+            return
         # whoever owned the instrument may have died
-        if self._is_turned_off() or _turned_off(None, self._supply):
+        if not self._process.is_alive():
+            self._watch.join()
+        if self._is_off or _turned_off(None, self._supply):
             return
         before = f"{error}; " if error is not None and str(error) else ""
         raise InstrumentError(f"{before}{_still_on(self._supply.source)}") from error
