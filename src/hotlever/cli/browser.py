@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Option
+from typer import Option
 
 from hotlever.errors import InputError, unforeseen_error
 from hotlever.tasks.arguments import refuse
@@ -15,17 +15,24 @@ from hotlever.tasks.reporter import Reporter
 
 def open_app(
     reporter: Reporter,
-    folder: Annotated[
-        Path,
-        Argument(metavar="[FOLDER]", help="The project: its files are those of the command line."),
-    ] = Path(),
+    folder: Path = Path(),
     *,
-    port: Annotated[int, Option(help="Port to serve at; a free one if left out.")] = 0,
-    no_browser: Annotated[bool, Option("--no-browser", help="Print the address only.")] = False,
+    port: int = 0,
+    no_browser: bool = False,
     host: Annotated[str | None, Option(hidden=True)] = None,
     yes_share: Annotated[bool, Option("--yes-share", hidden=True)] = False,
 ) -> None:
-    """Open a page in your browser in which files are dropped and sliders moved."""
+    """Open a page in your browser in which files are dropped and sliders moved.
+
+    Parameters
+    ----------
+    folder : [FOLDER]
+        The project: its files are those of the command line.
+    port
+        Port to serve at; a free one if left out.
+    no_browser
+        Print the address only.
+    """
     try:
         import nicegui  # noqa: F401
     except ImportError:

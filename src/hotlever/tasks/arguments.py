@@ -65,38 +65,51 @@ Table = Annotated[
 
 @dataclass(frozen=True)
 class LeverArguments:
-    """A lever that is solved: a probe, and what is changed of it."""
+    """A lever that is solved: a probe, and what is changed of it.
+
+    Attributes
+    ----------
+    medium
+        vacuum or air; what the files say if left out.
+    set : NAME=VALUE
+        Change a value of the probe file.
+    """
 
     probe: ProbeFile = None
-    medium: Annotated[str | None, Option(help="vacuum or air; what the files say if left out.")] = (
-        None
-    )
-    set: Annotated[
-        list[str] | None,
-        Option("--set", metavar="NAME=VALUE", help="Change a value of the probe file."),
-    ] = None
+    medium: str | None = None
+    set: list[str] | None = None
     physics: Physics = None
 
 
 @dataclass(frozen=True)
 class WaveformOptions:
-    """A wave form of the bias."""
+    """A wave form of the bias.
 
-    step: Annotated[str | None, Option(metavar="V", help="Switch the bias on, and leave it.")] = (
-        None
-    )
-    pulse: Annotated[str | None, Option(metavar="V,TIME", help="A pulse, such as 10V,5us.")] = None
-    period: Annotated[str | None, Option(metavar="TIME", help="Of pulses that are repeated.")] = (
-        None
-    )
-    count: Annotated[int | None, Option(metavar="N", help="Number of pulses.")] = None
-    ramp: Annotated[
-        str | None, Option(metavar="V,TIME", help="Raise the bias, such as 8V,50us.")
-    ] = None
-    sine: Annotated[str | None, Option(metavar="V+V@FREQ", help="Such as 3V+0.5V@20kHz.")] = None
-    waveform: Annotated[
-        Path | None, Option(help="A table of times and biases, such as a supply takes.")
-    ] = None
+    Attributes
+    ----------
+    step : V
+        Switch the bias on, and leave it.
+    pulse : V,TIME
+        A pulse, such as 10V,5us.
+    period : TIME
+        Of pulses that are repeated.
+    count : N
+        Number of pulses.
+    ramp : V,TIME
+        Raise the bias, such as 8V,50us.
+    sine : V+V@FREQ
+        Such as 3V+0.5V@20kHz.
+    waveform
+        A table of times and biases, such as a supply takes.
+    """
+
+    step: str | None = None
+    pulse: str | None = None
+    period: str | None = None
+    count: int | None = None
+    ramp: str | None = None
+    sine: str | None = None
+    waveform: Path | None = None
 
     def read(self) -> Waveform | None:
         """Return the one wave form that is told by a text or in a file; None if none is.
@@ -123,40 +136,40 @@ class WaveformOptions:
 
 @dataclass(frozen=True)
 class HistoryOptions(WaveformOptions):
-    """A wave form, and the times that are reported."""
+    """A wave form, and the times that are reported.
 
-    until: Annotated[str | None, Option(metavar="TIME", help="When to stop.")] = None
-    at: Annotated[
-        str | None,
-        Option(metavar="TIME,...", help="Times to report; where the solver stepped if left out."),
-    ] = None
+    Attributes
+    ----------
+    until : TIME
+        When to stop.
+    at : TIME,...
+        Times to report; where the solver stepped if left out.
+    """
+
+    until: str | None = None
+    at: str | None = None
 
 
 @dataclass(frozen=True)
 class PriorOptions:
-    """What is known of a lever before it is measured: one like it, its physics, priors and laws."""
+    """What is known of a lever before it is measured: one like it, its physics, priors and laws.
 
-    probe: Annotated[
-        Path | None,
-        Option(help="Probe file of levers like these; the reference probe if left out."),
-    ] = None
+    Attributes
+    ----------
+    probe
+        Probe file of levers like these; the reference probe if left out.
+    prior : NAME=VALUE±SPREAD
+        What is known beforehand, as n_d=3.3e17±15%, n_d=1e17×/3 (to a factor), dimensions=±2%,
+        usual (what a calibration takes) or none; repeated.
+    laws : paper|uncertain
+        Whether laws of silicon hold to the letter or are as uncertain as published values differ;
+        left out: uncertain in a calibration, the paper's in a fit.
+    """
+
+    probe: Path | None = None
     physics: Physics = None
-    prior: Annotated[
-        list[str] | None,
-        Option(
-            metavar="NAME=VALUE±SPREAD",
-            help="What is known beforehand, as n_d=3.3e17±15%, n_d=1e17×/3 (to a factor), "
-            "dimensions=±2%, usual (what a calibration takes) or none; repeated.",
-        ),
-    ] = None
-    laws: Annotated[
-        str | None,
-        Option(
-            metavar="paper|uncertain",
-            help="Whether laws of silicon hold to the letter or are as uncertain as published "
-            "values differ; left out: uncertain in a calibration, the paper's in a fit.",
-        ),
-    ] = None
+    prior: list[str] | None = None
+    laws: str | None = None
 
     def priors(self, probe: Probe) -> dict[str, str] | None:
         """Return what is known of a probe like it, as `parse_priors` does."""
@@ -166,20 +179,19 @@ class PriorOptions:
 
 @dataclass(frozen=True)
 class MeasuredOptions(PriorOptions):
-    """What is known before a lever is measured, and what its files do not say themselves."""
+    """What is known before a lever is measured, and what its files do not say themselves.
 
-    medium: Annotated[
-        str | None,
-        Option(help="vacuum, air or unknown (both are tried); what the files say if left out."),
-    ] = None
-    column: Annotated[
-        list[str] | None,
-        Option(
-            metavar="'QUANTITY (UNIT)=NAME'",
-            help="Which column of the data is which quantity, as 'I_h (uA)=Current' or by its "
-            "number; or a file of such lines; repeated.",
-        ),
-    ] = None
+    Attributes
+    ----------
+    medium
+        vacuum, air or unknown (both are tried); what the files say if left out.
+    column : 'QUANTITY (UNIT)=NAME'
+        Which column of the data is which quantity, as 'I_h (uA)=Current' or by its number; or a
+        file of such lines; repeated.
+    """
+
+    medium: str | None = None
+    column: list[str] | None = None
 
 
 def _types_of_results(values: Mapping[str, Any]) -> tuple[str, ...]:
@@ -188,31 +200,27 @@ def _types_of_results(values: Mapping[str, Any]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class DataArguments:
-    """Data files of one lever or several, where results go, and who works on them."""
+    """Data files of one lever or several, where results go, and who works on them.
 
-    data: Annotated[
-        list[Path], Argument(metavar="DATA.csv...", help="Measurement files, one for each lever.")
-    ]
-    output: Annotated[
-        Path | None,
-        Option(
-            "-o", "--output", help="Result file (JSON); a folder of them with several data files."
-        ),
-        Written(types_of=_types_of_results),
-    ] = None
-    report: Annotated[
-        Path | None, Option(help="Write a page with figures to this folder."), Written()
-    ] = None
-    processes: Annotated[
-        int | None,
-        Option(metavar="N", help="Local processes; one for each processor if left out."),
-    ] = None
-    scheduler: Annotated[
-        str | None,
-        Option(
-            metavar="ADDRESS", help="Dask scheduler for several data files, as tls://HOST:8786."
-        ),
-    ] = None
+    Attributes
+    ----------
+    data : DATA.csv...
+        Measurement files, one for each lever.
+    output
+        Result file (JSON); a folder of them with several data files.
+    report
+        Write a page with figures to this folder.
+    processes : N
+        Local processes; one for each processor if left out.
+    scheduler : ADDRESS
+        Dask scheduler for several data files, as tls://HOST:8786.
+    """
+
+    data: Annotated[list[Path], Argument()]
+    output: Annotated[Path | None, Written(types_of=_types_of_results)] = None
+    report: Annotated[Path | None, Written()] = None
+    processes: int | None = None
+    scheduler: str | None = None
 
 
 # --- what options tell together -----------------------------------------------------------------

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from contextlib import suppress
-from typing import Annotated
-
-from typer import Option
 
 from hotlever.tasks.reporter import Reporter
 
@@ -14,9 +11,15 @@ from hotlever.tasks.reporter import Reporter
 def show_cache(
     reporter: Reporter,
     *,
-    clear: Annotated[bool, Option("--clear", help="Remove all that is kept.")] = False,
+    clear: bool = False,
 ) -> None:
-    """Show what is kept on disk to save time: reduced levers, operators of the air, states."""
+    """Show what is kept on disk to save time: reduced levers, operators of the air, states.
+
+    Parameters
+    ----------
+    clear
+        Remove all that is kept.
+    """
     from hotlever.cache import CACHE_VARIABLE, cache_folder, kept_files, largest_size
 
     folder = cache_folder()

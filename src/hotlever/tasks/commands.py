@@ -1,16 +1,20 @@
 """The commands, and the command line made of them.
 
-A command is a function of what it tells (`hotlever.tasks.reporter.Reporter`) and of its arguments
-and options, whose types say what the command line has of them and whose docstring is the help; a
-parameter that is a dataclass stands for its fields. It returns an exit status, or nothing. What it
-computes with is imported when it is called, so that the command line answers at once.
+A command is a function of what it tells (`hotlever.tasks.reporter.Reporter`), of its arguments, and
+of its options, which are told by name. Their types say what the command line takes, and the
+docstring is the help: above all of the command, and below of each parameter, with what stands for
+its value in place of a type. A parameter that is a dataclass stands for its fields. A command
+returns an exit status, or nothing. What it computes with is imported when it is called, so that the
+command line answers at once.
 """
 
 from __future__ import annotations
 
 import inspect
+import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import fields, is_dataclass
 from functools import wraps
 from pathlib import Path
@@ -18,6 +22,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import typer
 import typer.core
+from typer.models import ParameterInfo
 
 from hotlever import __version__
 from hotlever.errors import InputError, unknown_name
@@ -102,32 +107,65 @@ def arguments_of(words: Sequence[str]) -> dict[str, Any]:
 
 
 def parameters_of(command: Command) -> dict[str, inspect.Parameter]:
-    """Return what a command is told, by name: of a group of options each of them."""
+    """Return what a command is told, by name, as typer takes it: of a group each of its options."""
     told = dict[str, inspect.Parameter]()
+    _, of_command = _documentation(command)
     _, *parameters = inspect.signature(command, eval_str=True).parameters.values()
     for parameter in parameters:
+        group: Any = parameter.annotation
         if is_dataclass(parameter.annotation):
-            group: Any = parameter.annotation
             types = get_type_hints(group, include_extras=True)
-            own = inspect.signature(group).parameters.values()
-            named = [each.replace(annotation=types[each.name]) for each in own]
+            own = [
+                each.replace(annotation=types[each.name], kind=inspect.Parameter.KEYWORD_ONLY)
+                for each in inspect.signature(group).parameters.values()
+            ]
+            # options of a group may be those of another one, and some more
+            documented = dict[str, tuple[str, str]]()
+            for base in reversed(inspect.getmro(group)):
+                documented |= _documentation(base)[1]
         else:
-            named = [parameter]
-        told |= {each.name: each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in named}
+            own, documented = [parameter], of_command
+        told |= {each.name: _option(each, *documented.get(each.name, ("", ""))) for each in own}
     return told
+
+
+def _documentation(documented: Any) -> tuple[str, dict[str, tuple[str, str]]]:
+    """Return the help in a docstring: of all, and by parameter or attribute its value and help."""
+    text = inspect.cleandoc(documented.__doc__ or "")
+    help_text, *entries = re.split(r"\n\n(?:Parameters|Attributes)\n-+\n", text)
+    entry = re.compile(r"^(\w+)(?: : (.+))?\n((?: {4}.+(?:\n|\Z))+)", re.MULTILINE)
+    found = entry.findall("".join(entries))
+    return help_text, {name: (value, " ".join(words.split())) for name, value, words in found}
+
+
+def _option(parameter: inspect.Parameter, value: str, words: str) -> inspect.Parameter:
+    """Return a parameter as typer takes it: an option if it is told by its name alone."""
+    kind: Any = parameter.annotation
+    kind, *marks = get_args(kind) if get_origin(kind) is Annotated else [kind]
+    name, by_name = parameter.name, inspect.Parameter.KEYWORD_ONLY
+    info: Any = copy(next((mark for mark in marks if isinstance(mark, ParameterInfo)), None))
+    if info is None:
+        flags = [*["-o"] * (name == "output"), f"--{name.replace('_', '-')}"]
+        if parameter.kind is not by_name:
+            info = typer.Argument()
+        else:
+            # what is on unless it is switched off has two names, which typer finds
+            info = typer.Option(*flags if parameter.default is not True else ())
+    if words:
+        info.metavar, info.help = value or None, words
+    others = [mark for mark in marks if not isinstance(mark, ParameterInfo)]
+    return parameter.replace(kind=by_name, annotation=Annotated[kind, info, *others])
 
 
 def _grouped(command: Command, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of options as a command takes them: those of a group as one."""
-    parameters = inspect.signature(command, eval_str=True).parameters.values()
-    groups: dict[str, Any] = {
-        each.name: each.annotation for each in parameters if is_dataclass(each.annotation)
-    }
-    inside = {name: [field.name for field in fields(group)] for name, group in groups.items()}
-    named = {name for names in inside.values() for name in names}
-    return {name: value for name, value in values.items() if name not in named} | {
-        name: group(**{key: values[key] for key in inside[name]}) for name, group in groups.items()
-    }
+    alone, groups = dict(values), dict[str, Any]()
+    for parameter in inspect.signature(command, eval_str=True).parameters.values():
+        group: Any = parameter.annotation
+        if is_dataclass(parameter.annotation):
+            own = {field.name: alone.pop(field.name) for field in fields(group)}
+            groups[parameter.name] = group(**own)
+    return alone | groups
 
 
 def written_by(command: Command) -> dict[str, Written]:
@@ -135,7 +173,6 @@ def written_by(command: Command) -> dict[str, Written]:
     return {
         name: mark
         for name, parameter in parameters_of(command).items()
-        if get_origin(parameter.annotation) is Annotated
         for mark in get_args(parameter.annotation)
         if isinstance(mark, Written)
     }
@@ -247,6 +284,7 @@ def _called(command: Command, call: Call) -> Callable[..., None]:
 
     parameters = list(parameters_of(command).values())
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__doc__ = _documentation(command)[0]
     return run
 
 

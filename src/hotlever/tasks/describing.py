@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from typer import Argument, Option
-
 from hotlever.errors import unknown_name
 from hotlever.files import write_text
 from hotlever.tasks.arguments import Plot, ProbeFile, Written
@@ -21,14 +19,18 @@ if TYPE_CHECKING:
 def new_probe(
     reporter: Reporter,
     *,
-    output: Annotated[
-        Path | None,
-        Option("-o", "--output", help="File; standard output if left out."),
-        Written((".toml",)),
-    ] = None,
-    shape: Annotated[str, Option(help="One of: three-leg, u-shape.")] = "three-leg",
+    output: Annotated[Path | None, Written((".toml",))] = None,
+    shape: str = "three-leg",
 ) -> None:
-    """Write the reference probe as a commented file."""
+    """Write the reference probe as a commented file.
+
+    Parameters
+    ----------
+    output
+        File; standard output if left out.
+    shape
+        One of: three-leg, u-shape.
+    """
     from hotlever.probe import Probe
 
     if shape not in (shapes := ("three-leg", "u-shape")):
@@ -45,9 +47,15 @@ def show_probe(
     probe: ProbeFile = None,
     *,
     plot: Plot = None,
-    mesh: Annotated[bool, Option("--mesh", help="Draw the triangles of the mesh too.")] = False,
+    mesh: bool = False,
 ) -> None:
-    """Draw and describe a probe."""
+    """Draw and describe a probe.
+
+    Parameters
+    ----------
+    mesh
+        Draw the triangles of the mesh too.
+    """
     from hotlever.probe.drawing.outlines import DrawingError
 
     try:
@@ -158,21 +166,26 @@ def _regions(layout: Layout) -> list[str]:
 
 def propose_probe(
     reporter: Reporter,
-    drawing: Annotated[Path, Argument(metavar="DRAWING", help="GDSII, OASIS or DXF file.")],
+    drawing: Path,
     *,
     plot: Plot = None,
-    output: Annotated[
-        Path | None,
-        Option("-o", "--output", help="Probe file to write; standard output if left out."),
-        Written((".toml",)),
-    ] = None,
-    cell: Annotated[str | None, Option(help="Of GDSII or OASIS; the top cell if left out.")] = None,
-    unit: Annotated[
-        str | None,
-        Option(help="Of the drawing's numbers, as mm; what the file says if left out."),
-    ] = None,
+    output: Annotated[Path | None, Written((".toml",))] = None,
+    cell: str | None = None,
+    unit: str | None = None,
 ) -> None:
-    """Say what a drawing holds, and propose a probe file for it."""
+    """Say what a drawing holds, and propose a probe file for it.
+
+    Parameters
+    ----------
+    drawing : DRAWING
+        GDSII, OASIS or DXF file.
+    output
+        Probe file to write; standard output if left out.
+    cell
+        Of GDSII or OASIS; the top cell if left out.
+    unit
+        Of the drawing's numbers, as mm; what the file says if left out.
+    """
     from hotlever.probe.drawing.outlines import DrawingError
     from hotlever.probe.drawing.sheet import UNITS
     from hotlever.probe.importing import import_drawing
@@ -204,17 +217,17 @@ def propose_probe(
 
 def list_materials(
     reporter: Reporter,
-    probe: Annotated[
-        Path | None,
-        Argument(
-            metavar="[PROBE.toml]",
-            help="Probe file whose materials are listed; all kinds and presets if left out.",
-        ),
-    ] = None,
+    probe: Path | None = None,
     *,
     plot: Plot = None,
 ) -> None:
-    """List kinds of material, or those of a probe: parameters, units, bounds, laws, sources."""
+    """List kinds of material, or those of a probe: parameters, units, bounds, laws, sources.
+
+    Parameters
+    ----------
+    probe : [PROBE.toml]
+        Probe file whose materials are listed; all kinds and presets if left out.
+    """
     from hotlever.materials.catalogue import curves, listing
 
     chosen: tuple[Any, ...] = ()

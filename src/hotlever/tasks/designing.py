@@ -24,18 +24,8 @@ def vary_design(
     probe: ProbeFile = None,
     *,
     physics: Physics = None,
-    vary: Annotated[
-        list[str] | None,
-        Option(
-            metavar="NAME=START:STOP:COUNT",
-            help="Sweep a number of the probe file, annealing_K or annealing_min; repeated: each "
-            "with each, as a map. A table of sensitivities if left out.",
-        ),
-    ] = None,
-    power: Annotated[
-        float | None,
-        Option(help="Power (mW) in vacuum at which the tip temperature is given; 2 if left out."),
-    ] = None,
+    vary: list[str] | None = None,
+    power: float | None = None,
     annealing_K: Annotated[
         float | None,
         Option(
@@ -47,33 +37,13 @@ def vary_design(
         float | None,
         Option(help=f"Annealing (min) that the delta is of; {ANNEALING_S / 60.0:g} if left out."),
     ] = None,
-    air: Annotated[bool, Option(help="Solve in air too, for k.")] = True,
-    minimise: Annotated[
-        str | None,
-        Option(
-            metavar="QUANTITY",
-            help="Find the design whose quantity is least, such as time_constant_us; it writes a "
-            "probe file (-o FILE.toml).",
-        ),
-    ] = None,
-    maximise: Annotated[str | None, Option(metavar="QUANTITY", help="Or greatest.")] = None,
-    within: Annotated[
-        list[str] | None,
-        Option(
-            metavar="NAME=LOW:HIGH",
-            help="Bounds of a number that may change, or of a quantity (one may be left out).",
-        ),
-    ] = None,
-    at: Annotated[
-        str | None,
-        Option(
-            metavar="POINT",
-            help="Working point: a tip temperature, or as 8V or 2mW; 700K if left out.",
-        ),
-    ] = None,
+    air: bool = True,
+    minimise: str | None = None,
+    maximise: str | None = None,
+    within: list[str] | None = None,
+    at: str | None = None,
     output: Annotated[
         Path | None,
-        Option("-o", "--output", help="FILE.csv or FILE.nc; standard output if left out."),
         Written(
             types_of=lambda values: (
                 (".toml",) if values["minimise"] or values["maximise"] else (".csv", ".nc")
@@ -82,7 +52,29 @@ def vary_design(
     ] = None,
     plot: Plot = None,
 ) -> None:
-    """Show how knee, tip temperature and loss to air depend on a probe's design."""
+    """Show how knee, tip temperature and loss to air depend on a probe's design.
+
+    Parameters
+    ----------
+    vary : NAME=START:STOP:COUNT
+        Sweep a number of the probe file, annealing_K or annealing_min; repeated: each with each, as
+        a map. A table of sensitivities if left out.
+    power
+        Power (mW) in vacuum at which the tip temperature is given; 2 if left out.
+    air
+        Solve in air too, for k.
+    minimise : QUANTITY
+        Find the design whose quantity is least, such as time_constant_us; it writes a probe file
+        (-o FILE.toml).
+    maximise : QUANTITY
+        Or greatest.
+    within : NAME=LOW:HIGH
+        Bounds of a number that may change, or of a quantity (one may be left out).
+    at : POINT
+        Working point: a tip temperature, or as 8V or 2mW; 700K if left out.
+    output
+        FILE.csv or FILE.nc; standard output if left out.
+    """
     from hotlever.datasets import write_dataset
     from hotlever.studies import design as study
 

@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from typer import Argument, Option
-
 from hotlever.errors import ComputationError, HotleverError, InputError, quoted, unknown_name
 from hotlever.files import FOLDER, TABLE, check_outputs, write_text
 from hotlever.tasks.arguments import (
@@ -53,38 +51,14 @@ def fit_files(
     *,
     beforehand: MeasuredOptions,
     drive: WaveformOptions,
-    observables: Annotated[
-        str | None,
-        Option(help="Some of current,reader,tip,bridge; all that the file has if left out."),
-    ] = None,
-    fix: Annotated[
-        list[str] | None, Option(metavar="NAME[=VALUE]", help="Hold a parameter.")
-    ] = None,
-    free: Annotated[
-        str | None,
-        Option(
-            metavar="NAME[,...]",
-            help="Vary more than is usual: any parameter of a material, as film.lorenz_ratio, or "
-            "of the probe.",
-        ),
-    ] = None,
-    robust: Annotated[
-        bool, Option("--robust", help="Lessen the weight of points far off the others.")
-    ] = False,
-    weights: Annotated[
-        str,
-        Option(help="maximum: of each observable, as in the paper; or errors, as measured."),
-    ] = "maximum",
-    posterior: Annotated[
-        bool,
-        Option("--posterior", help="Sample the posterior; predict the tip with its band."),
-    ] = False,
-    samples: Annotated[
-        int | None, Option(metavar="N", help="Of the posterior; 2000 if left out.")
-    ] = None,
-    profiles: Annotated[
-        bool, Option("--profiles", help="Profile the likelihood of each parameter.")
-    ] = False,
+    observables: str | None = None,
+    fix: list[str] | None = None,
+    free: str | None = None,
+    robust: bool = False,
+    weights: str = "maximum",
+    posterior: bool = False,
+    samples: int | None = None,
+    profiles: bool = False,
 ) -> int:
     """Find the material parameters that make the model match a measurement.
 
@@ -93,6 +67,25 @@ def fit_files(
 
     With several data files: of each lever, in parallel, and how the levers scatter. The same
     command again goes on where it was stopped.
+
+    Parameters
+    ----------
+    observables
+        Some of current,reader,tip,bridge; all that the file has if left out.
+    fix : NAME[=VALUE]
+        Hold a parameter.
+    free : NAME[,...]
+        Vary more than is usual: any parameter of a material, as film.lorenz_ratio, or of the probe.
+    robust
+        Lessen the weight of points far off the others.
+    weights
+        maximum: of each observable, as in the paper; or errors, as measured.
+    posterior
+        Sample the posterior; predict the tip with its band.
+    samples : N
+        Of the posterior; 2000 if left out.
+    profiles
+        Profile the likelihood of each parameter.
     """
     from hotlever.estimate import FitOptions, fit
     from hotlever.estimate.many import fit_many
@@ -216,59 +209,49 @@ def calibrate_files(
     reporter: Reporter,
     levers: DataArguments,
     *,
-    fit: Annotated[Path | None, Option(help="A fit of this lever (hotlever fit -o).")] = None,
-    power_law: Annotated[
-        Path | None, Option(help="Power law in vacuum (JSON), or a calibration file.")
-    ] = None,
+    fit: Path | None = None,
+    power_law: Path | None = None,
     beforehand: MeasuredOptions,
-    pulse: Annotated[
-        str | None,
-        Option(metavar="TIME[,PERIOD]", help="Calibrate a pulse too, such as 5us or 5us,100us."),
-    ] = None,
-    posterior: Annotated[
-        bool, Option("--posterior", help="Take the limits from samples of the posterior.")
-    ] = False,
-    samples: Annotated[
-        int | None, Option(metavar="N", help="Of the posterior; 2000 if left out.")
-    ] = None,
-    at: Annotated[
-        str | None,
-        Option(
-            metavar="BIAS|POWER",
-            help="Bias of the uncertainty budget, as 8V; the hottest tip if left out. With several "
-            "levers where they are compared, as 8V or 2mW; the highest bias that all of them were "
-            "measured at if left out.",
-        ),
-    ] = None,
-    budget_of: Annotated[
-        str,
-        Option(help="What the uncertainty budget is of: tip, or apex of a tip in contact."),
-    ] = "tip",
-    table: Annotated[
-        Path | None,
-        Option(
-            help="Write the table for an instrument, or for its pulses, to this CSV file; with "
-            "several data files each has one beside its calibration."
-        ),
-        Written((".csv",)),
-    ] = None,
-    table_by: Annotated[
-        str | None,
-        Option(help="What the rows are even in: temperature (if left out), power or bias."),
-    ] = None,
-    table_step: Annotated[
-        str | None,
-        Option(
-            metavar="STEP",
-            help="Between the rows, as 10K, 0.05mW or 0.1V; left out: for 50 rows or more.",
-        ),
-    ] = None,
+    pulse: str | None = None,
+    posterior: bool = False,
+    samples: int | None = None,
+    at: str | None = None,
+    budget_of: str = "tip",
+    table: Annotated[Path | None, Written((".csv",))] = None,
+    table_by: str | None = None,
+    table_step: str | None = None,
     plot: Plot = None,
 ) -> int:
     """Find the tip temperature of a lever from its I-V curve, with its error.
 
     With several data files: of each lever, in parallel, and where the levers differ. The same
     command again goes on where it was stopped.
+
+    Parameters
+    ----------
+    fit
+        A fit of this lever (hotlever fit -o).
+    power_law
+        Power law in vacuum (JSON), or a calibration file.
+    pulse : TIME[,PERIOD]
+        Calibrate a pulse too, such as 5us or 5us,100us.
+    posterior
+        Take the limits from samples of the posterior.
+    samples : N
+        Of the posterior; 2000 if left out.
+    at : BIAS|POWER
+        Bias of the uncertainty budget, as 8V; the hottest tip if left out. With several levers
+        where they are compared, as 8V or 2mW; the highest bias that all of them were measured at if
+        left out.
+    budget_of
+        What the uncertainty budget is of: tip, or apex of a tip in contact.
+    table
+        Write the table for an instrument, or for its pulses, to this CSV file; with several data
+        files each has one beside its calibration.
+    table_by
+        What the rows are even in: temperature (if left out), power or bias.
+    table_step : STEP
+        Between the rows, as 10K, 0.05mW or 0.1V; left out: for 50 rows or more.
     """
     from hotlever.estimate import calibrate, read_fit
     from hotlever.estimate.levers import Setting
@@ -365,86 +348,53 @@ def _write_pages(result: Estimate, folder: Path) -> Path:
 
 def propose(
     reporter: Reporter,
-    data: Annotated[
-        Path | None,
-        Argument(
-            metavar="[DATA]",
-            help="Calibration (hotlever calibrate -o CAL.json), or a measurement file, which is "
-            "calibrated first; left out: a lever that was not measured yet.",
-        ),
-    ] = None,
+    data: Path | None = None,
     *,
     beforehand: MeasuredOptions,
-    allow: Annotated[
-        str | None,
-        Option(
-            metavar="KIND[=COUNT],...",
-            help="Some of bias,spectra,reader,dimensions, and at most how many, as "
-            "bias=15,spectra=3; bias and spectra if left out, and reader where it was measured.",
-        ),
-    ] = None,
-    count: Annotated[
-        int | None,
-        Option(metavar="N", help="Proposals; 5, or as many as are allowed, if left out."),
-    ] = None,
-    quantity: Annotated[
-        str,
-        Option(
-            metavar="tip|knee",
-            help="Whose error counts: that of the tip temperature --at, or of that at the knee.",
-        ),
-    ] = "tip",
-    at: Annotated[
-        str | None,
-        Option(
-            metavar="TEMPERATURE",
-            help="Tip temperature whose error counts, as 800K; if left out the hottest that was "
-            "measured, or without data the hottest that may be.",
-        ),
-    ] = None,
-    stay_below: Annotated[
-        str | None,
-        Option(
-            metavar="TEMPERATURE",
-            help="Propose nothing at which the tip could be hotter with more than 1 % probability, "
-            "as 900K; what melts if left out.",
-        ),
-    ] = None,
-    bias: Annotated[
-        str | None,
-        Option(
-            metavar="START:STOP:COUNT",
-            help="Biases that can be taken (V); even ones to half beyond those measured if left "
-            "out.",
-        ),
-    ] = None,
-    cost: Annotated[
-        list[str] | None,
-        Option(
-            metavar="KIND=TIME",
-            help="Of one measurement, as spectra=10min; repeated for each kind. The gain is then "
-            "that per minute.",
-        ),
-    ] = None,
-    noise: Annotated[
-        list[str] | None,
-        Option(
-            metavar="NAME=SHARE",
-            help="Of a measurement to come, as current=0.2%, tip=1% (of the rise) or "
-            "dimensions=2%; that of the data, or what is usual, if left out; repeated.",
-        ),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        Option("-o", "--output", help="CSV file; a table in words if left out."),
-        Written((".csv",)),
-    ] = None,
+    allow: str | None = None,
+    count: int | None = None,
+    quantity: str = "tip",
+    at: str | None = None,
+    stay_below: str | None = None,
+    bias: str | None = None,
+    cost: list[str] | None = None,
+    noise: list[str] | None = None,
+    output: Annotated[Path | None, Written((".csv",))] = None,
     plot: Plot = None,
 ) -> None:
     """Say what to measure next, so that a tip temperature or the knee's is known best.
 
     One row for each proposal, best first: how hot the tip would be there, and how hot at most
     with 99 % certainty, and how sure what counts is known then. Without data: where to begin.
+
+    Parameters
+    ----------
+    data : [DATA]
+        Calibration (hotlever calibrate -o CAL.json), or a measurement file, which is calibrated
+        first; left out: a lever that was not measured yet.
+    allow : KIND[=COUNT],...
+        Some of bias,spectra,reader,dimensions, and at most how many, as bias=15,spectra=3; bias and
+        spectra if left out, and reader where it was measured.
+    count : N
+        Proposals; 5, or as many as are allowed, if left out.
+    quantity : tip|knee
+        Whose error counts: that of the tip temperature --at, or of that at the knee.
+    at : TEMPERATURE
+        Tip temperature whose error counts, as 800K; if left out the hottest that was measured, or
+        without data the hottest that may be.
+    stay_below : TEMPERATURE
+        Propose nothing at which the tip could be hotter with more than 1 % probability, as 900K;
+        what melts if left out.
+    bias : START:STOP:COUNT
+        Biases that can be taken (V); even ones to half beyond those measured if left out.
+    cost : KIND=TIME
+        Of one measurement, as spectra=10min; repeated for each kind. The gain is then that per
+        minute.
+    noise : NAME=SHARE
+        Of a measurement to come, as current=0.2%, tip=1% (of the rise) or dimensions=2%; that of
+        the data, or what is usual, if left out; repeated.
+    output
+        CSV file; a table in words if left out.
     """
     from hotlever.estimate import plan_next, read_calibration
     from hotlever.estimate.next_measurement import check_names

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Option
-
 from hotlever.files import FOLDER, check_outputs, write_text
 from hotlever.tasks.arguments import Written, refuse
 from hotlever.tasks.reporter import Reporter
@@ -15,18 +13,18 @@ from hotlever.tasks.reporter import Reporter
 def reproduce(
     reporter: Reporter,
     *,
-    output: Annotated[
-        Path, Option("-o", "--output", help="Folder for the page and its figures."), Written()
-    ] = Path("reproduce"),
-    quick: Annotated[
-        bool,
-        Option(
-            "--quick",
-            help="Leave out what takes longest: k by geometry, the tip, the mesh; fewer levers.",
-        ),
-    ] = False,
+    output: Annotated[Path, Written()] = Path("reproduce"),
+    quick: bool = False,
 ) -> None:
-    """Compute the paper's tables and figures and put them on one page."""
+    """Compute the paper's tables and figures and put them on one page.
+
+    Parameters
+    ----------
+    output
+        Folder for the page and its figures.
+    quick
+        Leave out what takes longest: k by geometry, the tip, the mesh; fewer levers.
+    """
     from hotlever.report.reproduce import reproduce_page
 
     with reporter.progress("reproduce") as update:
@@ -36,18 +34,19 @@ def reproduce(
 
 def validate(
     reporter: Reporter,
-    case: Annotated[
-        Path | None,
-        Argument(metavar="[CASE.toml]", help="A case of your own, whose prediction is printed."),
-    ] = None,
+    case: Path | None = None,
     *,
-    output: Annotated[
-        Path | None,
-        Option("-o", "--output", help="Folder for the page and its table; validate if left out."),
-        Written(),
-    ] = None,
+    output: Annotated[Path | None, Written()] = None,
 ) -> None:
-    """Predict published numbers of other levers and compare them, on one page and in a table."""
+    """Predict published numbers of other levers and compare them, on one page and in a table.
+
+    Parameters
+    ----------
+    case : [CASE.toml]
+        A case of your own, whose prediction is printed.
+    output
+        Folder for the page and its table; validate if left out.
+    """
     if case is not None:
         why = "goes without a case of your own, whose prediction is printed"
         refuse(why, output=output)

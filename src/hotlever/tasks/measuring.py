@@ -30,58 +30,47 @@ TWIN = "twin"
 def measure_lever(
     reporter: Reporter,
     *,
-    source: Annotated[
-        str,
-        Option(
-            metavar="RESOURCE",
-            help="VISA name of the source meter, as TCPIP0::192.168.0.5::5025::SOCKET; or twin, or "
-            "twin:NUMBER for a certain one: no instrument but a solved lever, to try it.",
-        ),
-    ],
-    output: Annotated[
-        Path,
-        Option("-o", "--output", metavar="IV.csv", help="Rows, as they come, to this new file."),
-        Written((".csv",)),
-    ],
-    reader: Annotated[
-        str | None,
-        Option(metavar="RESOURCE", help="VISA name of a voltmeter at the reader; or twin."),
-    ] = None,
-    bias: Annotated[
-        str,
-        Option(metavar="START:STOP:COUNT", help="Wanted biases (V), and the most rows."),
-    ] = "1:11:25",
-    settle: Annotated[
-        str, Option(metavar="TIME", help="Between setting a bias and the row that counts.")
-    ] = "10s",
-    stay_below: Annotated[
-        str | None,
-        Option(
-            metavar="TEMPERATURE",
-            help="Take no bias at which the tip could be hotter with more than 1 % probability, as "
-            "900K; or knee; what melts if left out.",
-        ),
-    ] = None,
-    propose: Annotated[
-        bool, Option("--next", help="Take the biases that hotlever next proposes.")
-    ] = False,
-    compliance: Annotated[
-        str, Option(metavar="CURRENT", help="The most that the source lets through.")
-    ] = "5mA",
+    source: str,
+    output: Annotated[Path, Written((".csv",))],
+    reader: str | None = None,
+    bias: str = "1:11:25",
+    settle: str = "10s",
+    stay_below: str | None = None,
+    propose: Annotated[bool, Option("--next")] = False,
+    compliance: str = "5mA",
     beforehand: PriorOptions,
-    medium: Annotated[
-        str | None, Option(help="vacuum or air; what the probe file says if left out.")
-    ] = None,
-    calibration: Annotated[
-        Path | None,
-        Option(metavar="CAL.json", help="Write the calibration of all rows to this file."),
-        Written((".json",)),
-    ] = None,
+    medium: str | None = None,
+    calibration: Annotated[Path | None, Written((".json",))] = None,
 ) -> None:
     """Measure a lever with a source meter, bias by bias, so that its tip stays below a limit.
 
     Before each bias the rows so far say how hot the tip may get there. The output is turned off at
     the end, whatever ends it; set the instrument's own limits first all the same.
+
+    Parameters
+    ----------
+    source : RESOURCE
+        VISA name of the source meter, as TCPIP0::192.168.0.5::5025::SOCKET; or twin, or twin:NUMBER
+        for a certain one: no instrument but a solved lever, to try it.
+    output : IV.csv
+        Rows, as they come, to this new file.
+    reader : RESOURCE
+        VISA name of a voltmeter at the reader; or twin.
+    bias : START:STOP:COUNT
+        Wanted biases (V), and the most rows.
+    settle : TIME
+        Between setting a bias and the row that counts.
+    stay_below : TEMPERATURE
+        Take no bias at which the tip could be hotter with more than 1 % probability, as 900K; or
+        knee; what melts if left out.
+    propose
+        Take the biases that hotlever next proposes.
+    compliance : CURRENT
+        The most that the source lets through.
+    medium
+        vacuum or air; what the probe file says if left out.
+    calibration : CAL.json
+        Write the calibration of all rows to this file.
     """
     from hotlever.estimate import calibrate
     from hotlever.estimate.summary import calibration_text

@@ -10,8 +10,6 @@ from itertools import count as count_up
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Option
-
 from hotlever.errors import HistoryEndError, InputError
 from hotlever.files import FILM_TYPES, output_folder
 from hotlever.tasks.arguments import (
@@ -46,25 +44,21 @@ def simulate_in_time(
     lever: LeverArguments,
     output: Table = None,
     plot: Plot = None,
-    fields: Annotated[
-        Path | None,
-        Option(help="Write the fields as a series of VTU to this folder."),
-        Written(),
-    ] = None,
-    film: Annotated[
-        Path | None,
-        Option(
-            help="Animate temperature and tip to this file: .gif; a frame for each of --at, or 120."
-        ),
-        Written(FILM_TYPES),
-    ] = None,
-    report: Annotated[
-        Path | None,
-        Option(help="Folder for a page of the lever in time; goes without a wave form."),
-        Written(),
-    ] = None,
+    fields: Annotated[Path | None, Written()] = None,
+    film: Annotated[Path | None, Written(FILM_TYPES)] = None,
+    report: Annotated[Path | None, Written()] = None,
 ) -> None:
-    """Follow a lever in time: steps, pulses, ramps, sines, or what a file says."""
+    """Follow a lever in time: steps, pulses, ramps, sines, or what a file says.
+
+    Parameters
+    ----------
+    fields
+        Write the fields as a series of VTU to this folder.
+    film
+        Animate temperature and tip to this file: .gif; a frame for each of --at, or 120.
+    report
+        Folder for a page of the lever in time; goes without a wave form.
+    """
     from hotlever.datasets import in_a_file
     from hotlever.lever.fields import write_fields_in_time
     from hotlever.lever.transient import simulate, with_times

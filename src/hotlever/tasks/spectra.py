@@ -8,8 +8,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from typer import Argument, Option
-
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import FIGURE_TYPES, write_text
 from hotlever.tasks.arguments import (
@@ -32,92 +30,70 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ThermometerOptions:
-    """How the silicon line is found, and what its shift is read with, as the options say it."""
+    """How the silicon line is found, and what its shift is read with, as the options say it.
 
-    calibration: Annotated[
-        str | None,
-        Option(
-            metavar="CAL.json",
-            help="A calibration that --save-calibration wrote, or 'published' for the published "
-            "laws (then --reference is needed).",
-        ),
-    ] = None
-    calibrate_from: Annotated[
-        list[Path] | None,
-        Option(metavar="FILE_OR_DIR...", help="Hot-plate spectra to calibrate from; one or more."),
-    ] = None
-    temperatures: Annotated[
-        Path | None,
-        Option(
-            metavar="TABLE.csv",
-            help="Hot-plate temperatures: file name, temperature. Left out: header or file name.",
-        ),
-    ] = None
-    corrections: Annotated[
-        Path | None,
-        Option(
-            metavar="TABLE.csv",
-            help="By hand: file, start_cm-1 of the line, from_cm-1 and to_cm-1 of what is fitted, "
-            "use.",
-        ),
-    ] = None
-    reference: Annotated[
-        list[Path] | None,
-        Option(
-            metavar="FILE_OR_DIR",
-            help="Spectrum at room temperature on the instrument as it is now; may be repeated.",
-        ),
-    ] = None
-    law: Annotated[str, Option(metavar="linear|anharmonic", help="Calibration law.")] = "anharmonic"
-    shape: Annotated[
-        str | None,
-        Option(
-            metavar="lorentzian|voigt|fano",
-            help="Line shape; left out: that of the calibration, else lorentzian.",
-        ),
-    ] = None
-    resolution: Annotated[
-        float | None,
-        Option(
-            metavar="CM-1", help="FWHM of the spectrometer's response, for voigt; left out: fitted."
-        ),
-    ] = None
-    laser_power: Annotated[
-        float | None, Option(metavar="MW", help="Laser power on the lever, for its heating.")
-    ] = None
-    thermal_resistance: Annotated[
-        float | None,
-        Option(metavar="K/MW", help="Thermal resistance of the lever, K per mW of heat."),
-    ] = None
-    stress: Annotated[
-        float, Option(metavar="MPA", help="Unknown stress in the silicon; enters the error.")
-    ] = 0.0
+    Attributes
+    ----------
+    calibration : CAL.json
+        A calibration that --save-calibration wrote, or 'published' for the published laws (then
+        --reference is needed).
+    calibrate_from : FILE_OR_DIR...
+        Hot-plate spectra to calibrate from; one or more.
+    temperatures : TABLE.csv
+        Hot-plate temperatures: file name, temperature. Left out: header or file name.
+    corrections : TABLE.csv
+        By hand: file, start_cm-1 of the line, from_cm-1 and to_cm-1 of what is fitted, use.
+    reference : FILE_OR_DIR
+        Spectrum at room temperature on the instrument as it is now; may be repeated.
+    law : linear|anharmonic
+        Calibration law.
+    shape : lorentzian|voigt|fano
+        Line shape; left out: that of the calibration, else lorentzian.
+    resolution : CM-1
+        FWHM of the spectrometer's response, for voigt; left out: fitted.
+    laser_power : MW
+        Laser power on the lever, for its heating.
+    thermal_resistance : K/MW
+        Thermal resistance of the lever, K per mW of heat.
+    stress : MPA
+        Unknown stress in the silicon; enters the error.
+    """
+
+    calibration: str | None = None
+    calibrate_from: list[Path] | None = None
+    temperatures: Path | None = None
+    corrections: Path | None = None
+    reference: list[Path] | None = None
+    law: str = "anharmonic"
+    shape: str | None = None
+    resolution: float | None = None
+    laser_power: float | None = None
+    thermal_resistance: float | None = None
+    stress: float = 0.0
 
 
 def measure_spectra(
     reporter: Reporter,
-    spectra: Annotated[
-        list[Path], Argument(metavar="FILE_OR_DIR...", help="Spectra, or folders of spectra.")
-    ],
+    spectra: list[Path],
     *,
     thermometer: ThermometerOptions,
-    save_calibration: Annotated[
-        Path | None,
-        Option(metavar="CAL.json", help="Write the calibration to this file."),
-        Written((".json",)),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        Option("--output", "-o", metavar="FILE.csv", help="Left out: print."),
-        Written((".csv",)),
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        Option(metavar="FILE.png|.svg|.pdf", help="Figure of spectra and calibration."),
-        Written(FIGURE_TYPES),
-    ] = None,
+    save_calibration: Annotated[Path | None, Written((".json",))] = None,
+    output: Annotated[Path | None, Written((".csv",))] = None,
+    plot: Annotated[Path | None, Written(FIGURE_TYPES)] = None,
 ) -> None:
-    """Find the silicon line in Raman spectra and, calibrated, the temperature."""
+    """Find the silicon line in Raman spectra and, calibrated, the temperature.
+
+    Parameters
+    ----------
+    spectra : FILE_OR_DIR...
+        Spectra, or folders of spectra.
+    save_calibration : CAL.json
+        Write the calibration to this file.
+    output : FILE.csv
+        Left out: print.
+    plot : FILE.png|.svg|.pdf
+        Figure of spectra and calibration.
+    """
     from hotlever.raman import series
 
     setup = set_up(reporter, thermometer)
@@ -136,22 +112,25 @@ def measure_spectra(
 
 def join_spectra(
     reporter: Reporter,
-    bias_log: Annotated[Path, Argument(metavar="BIAS_LOG.csv", help="The bias sweep.")],
-    spectra: Annotated[
-        list[Path], Argument(metavar="FILE_OR_DIR...", help="Spectra, or folders of spectra.")
-    ],
+    bias_log: Path,
+    spectra: list[Path],
     *,
     thermometer: ThermometerOptions,
-    output: Annotated[
-        Path | None,
-        Option("--output", "-o", metavar="DATA.csv", help="Left out: print."),
-        Written((".csv",)),
-    ] = None,
+    output: Annotated[Path | None, Written((".csv",))] = None,
 ) -> None:
     """Join a bias log with tip spectra into the file that `hotlever fit` takes.
 
     A spectrum belongs to the row that names it in a 'file' column, or has the bias in its name
     (tip_5.25V.txt); else spectra and rows are paired in order.
+
+    Parameters
+    ----------
+    bias_log : BIAS_LOG.csv
+        The bias sweep.
+    spectra : FILE_OR_DIR...
+        Spectra, or folders of spectra.
+    output : DATA.csv
+        Left out: print.
     """
     from hotlever.raman.spectrum_tables import join, read_bias_log
 

@@ -6,9 +6,7 @@ Tables and figures, at rest or in time.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
-
-from typer import Option
+from typing import TYPE_CHECKING, Any
 
 from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
 from hotlever.tasks.arguments import HistoryOptions, LeverArguments, Plot, Table, refuse
@@ -29,39 +27,29 @@ if TYPE_CHECKING:
 def touch(
     reporter: Reporter,
     *,
-    sample: Annotated[
-        str | None,
-        Option(
-            metavar="LAYER,...",
-            help="From the top, such as polymer,100nm,silicon: materials or their W/(m K), each "
-            "but the last with its thickness; what the probe file says if left out.",
-        ),
-    ] = None,
-    radius: Annotated[
-        str | None,
-        Option(metavar="LENGTH", help="Of the contact, the tip's flat end, such as 5nm."),
-    ] = None,
-    interface: Annotated[
-        str | None,
-        Option(
-            metavar="RESISTANCE",
-            help="Such as 1e7K/W, or for an area 1e-8m2K/W; none at first.",
-        ),
-    ] = None,
-    bias: Annotated[
-        str | None,
-        Option(
-            metavar="START:STOP:COUNT",
-            help="In volts, ends included, or a single one; 1:11:25 if neither this nor a wave "
-            "form is given.",
-        ),
-    ] = None,
+    sample: str | None = None,
+    radius: str | None = None,
+    interface: str | None = None,
+    bias: str | None = None,
     history: HistoryOptions,
     lever: LeverArguments,
     output: Table = None,
     plot: Plot = None,
 ) -> None:
-    """Touch a sample with the tip: apex, heat into the sample, change of the current."""
+    """Touch a sample with the tip: apex, heat into the sample, change of the current.
+
+    Parameters
+    ----------
+    sample : LAYER,...
+        From the top, such as polymer,100nm,silicon: materials or their W/(m K), each but the last
+        with its thickness; what the probe file says if left out.
+    radius : LENGTH
+        Of the contact, the tip's flat end, such as 5nm.
+    interface : RESISTANCE
+        Such as 1e7K/W, or for an area 1e-8m2K/W; none at first.
+    bias : START:STOP:COUNT
+        In volts, ends included, or a single one; 1:11:25 if neither this nor a wave form is given.
+    """
     from hotlever.lever.contact import (
         CONTACT_COLUMNS,
         history_in_contact,
@@ -183,43 +171,38 @@ def what_the_current_tells(data: xr.Dataset, known: float = 1e-4) -> str:
 def approach(
     reporter: Reporter,
     *,
-    distance: Annotated[
-        str,
-        Option(
-            metavar="START:STOP:COUNT",
-            help="From the lever's lower face to the surface, ends included, or a single one.",
-        ),
-    ] = "0.3um:3um:10",
-    bias: Annotated[
-        str | None,
-        Option(
-            metavar="START:STOP:COUNT",
-            help="In volts, ends included, or a single one; the one up to 11 V that resolves the "
-            "distances best if left out.",
-        ),
-    ] = None,
-    pressure: Annotated[
-        str | None,
-        Option(
-            metavar="START:STOP:COUNT",
-            help="Of the air, in mbar, spaced evenly in the logarithm, or a single one; what the "
-            "probe file says if left out.",
-        ),
-    ] = None,
-    bandwidth: Annotated[str, Option(metavar="LOW:HIGH", help="Of what is read.")] = "1Hz:1kHz",
-    amplifier: Annotated[
-        str, Option(metavar="V", help="Noise at its input, for each √Hz.")
-    ] = "5nV",
-    hooge: Annotated[float, Option(help="Hooge's parameter of the silicon, for 1/f noise.")] = 0.0,
-    vibration: Annotated[
-        str | None,
-        Option(metavar="LENGTH", help="Of the lever itself, for each √Hz; none if left out."),
-    ] = None,
+    distance: str = "0.3um:3um:10",
+    bias: str | None = None,
+    pressure: str | None = None,
+    bandwidth: str = "1Hz:1kHz",
+    amplifier: str = "5nV",
+    hooge: float = 0.0,
+    vibration: str | None = None,
     lever: LeverArguments,
     output: Table = None,
     plot: Plot = None,
 ) -> None:
-    """Read the distance to a surface: signal, noise, resolution."""
+    """Read the distance to a surface: signal, noise, resolution.
+
+    Parameters
+    ----------
+    distance : START:STOP:COUNT
+        From the lever's lower face to the surface, ends included, or a single one.
+    bias : START:STOP:COUNT
+        In volts, ends included, or a single one; the one up to 11 V that resolves the distances
+        best if left out.
+    pressure : START:STOP:COUNT
+        Of the air, in mbar, spaced evenly in the logarithm, or a single one; what the probe file
+        says if left out.
+    bandwidth : LOW:HIGH
+        Of what is read.
+    amplifier : V
+        Noise at its input, for each √Hz.
+    hooge
+        Hooge's parameter of the silicon, for 1/f noise.
+    vibration : LENGTH
+        Of the lever itself, for each √Hz; none if left out.
+    """
     import numpy as np
 
     from hotlever.lever.lever import COARSE, Lever

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Option
-
 from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
 from hotlever.files import FIGURE_TYPES, output_folder
 from hotlever.tasks.arguments import (
@@ -38,53 +36,37 @@ def sweep(
     reporter: Reporter,
     lever: LeverArguments,
     *,
-    bias: Annotated[
-        str | None,
-        Option(
-            metavar="START:STOP:COUNT",
-            help="In volts, ends included, or a single one; 1:11:25 if left out.",
-        ),
-    ] = None,
-    and_back: Annotated[
-        bool,
-        Option(
-            "--and-back",
-            help="Let the bias go back as well: a lever that jumps does so elsewhere.",
-        ),
-    ] = False,
-    hold_resistance: Annotated[
-        str | None,
-        Option(
-            metavar="OHM",
-            help="The states that a controller of V_l/I_h holds, in place of a bias: such as "
-            "3kohm, 2.5kohm,3kohm or 2.5kohm:3.3kohm:9.",
-        ),
-    ] = None,
-    hold_power: Annotated[
-        str | None,
-        Option(metavar="WATT", help="The same of V_l I_h, such as 2.5mW or 1mW:4mW:7."),
-    ] = None,
-    model: Annotated[
-        str,
-        Option(
-            help="flat: the lever in its plane; full-3d: its true thickness and the air around it "
-            "(minutes; goes on where it was stopped).",
-        ),
-    ] = "flat",
+    bias: str | None = None,
+    and_back: bool = False,
+    hold_resistance: str | None = None,
+    hold_power: str | None = None,
+    model: str = "flat",
     output: Table = None,
     plot: Plot = None,
-    map: Annotated[
-        Path | None,
-        Option(help="Draw the temperature at the highest tip temperature to this file, as --plot."),
-        Written(FIGURE_TYPES),
-    ] = None,
-    fields: Annotated[
-        Path | None,
-        Option(help="Write the fields of each state as VTU to this folder."),
-        Written(),
-    ] = None,
+    map: Annotated[Path | None, Written(FIGURE_TYPES)] = None,
+    fields: Annotated[Path | None, Written()] = None,
 ) -> None:
-    """Solve a lever over a range of bias."""
+    """Solve a lever over a range of bias.
+
+    Parameters
+    ----------
+    bias : START:STOP:COUNT
+        In volts, ends included, or a single one; 1:11:25 if left out.
+    and_back
+        Let the bias go back as well: a lever that jumps does so elsewhere.
+    hold_resistance : OHM
+        The states that a controller of V_l/I_h holds, in place of a bias: such as 3kohm,
+        2.5kohm,3kohm or 2.5kohm:3.3kohm:9.
+    hold_power : WATT
+        The same of V_l I_h, such as 2.5mW or 1mW:4mW:7.
+    model
+        flat: the lever in its plane; full-3d: its true thickness and the air around it (minutes;
+        goes on where it was stopped).
+    map
+        Draw the temperature at the highest tip temperature to this file, as --plot.
+    fields
+        Write the fields of each state as VTU to this folder.
+    """
     from hotlever.datasets import in_a_file
     from hotlever.lever.dataset import SWEEP_COLUMNS
     from hotlever.lever.set_points import hold
@@ -154,22 +136,23 @@ def respond(
     reporter: Reporter,
     lever: LeverArguments,
     *,
-    bias: Annotated[str, Option(metavar="V", help="Of the operating point.")],
-    frequency: Annotated[
-        str,
-        Option(
-            metavar="START:STOP:COUNT",
-            help="Spaced evenly in the logarithm, or a single one.",
-        ),
-    ] = "1Hz:10MHz:71",
-    amplitude: Annotated[
-        str | None,
-        Option(metavar="V", help="Of a sine about the bias: harmonics of V_l instead (3ω method)."),
-    ] = None,
+    bias: str,
+    frequency: str = "1Hz:10MHz:71",
+    amplitude: str | None = None,
     output: Table = None,
     plot: Plot = None,
 ) -> None:
-    """Show impedance and thermal response to small signals at a bias, or harmonics."""
+    """Show impedance and thermal response to small signals at a bias, or harmonics.
+
+    Parameters
+    ----------
+    bias : V
+        Of the operating point.
+    frequency : START:STOP:COUNT
+        Spaced evenly in the logarithm, or a single one.
+    amplitude : V
+        Of a sine about the bias: harmonics of V_l instead (3ω method).
+    """
     from hotlever.datasets import in_a_file
     from hotlever.lever.transient.frequency_domain import (
         HARMONIC_COLUMNS,
