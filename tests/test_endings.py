@@ -47,6 +47,18 @@ def test_stopped_by_a_signal(tmp_path, number):
     assert (tmp_path / "a.csv").read_text() == "mine"
 
 
+def test_nothing_is_searched_for_cycles_as_a_command_ends(tmp_path):
+    script = (
+        "import atexit, gc, sys; from hotlever.cli import main\n"
+        "sys.argv = ['hotlever', 'materials']\n"
+        "atexit.register(lambda: print(len(gc.get_objects()), file=sys.stderr)); main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert int(done.stderr.splitlines()[-1]) < 1000
+
+
 IN_A_DESTRUCTOR = """
 import signal, sys, time
 from hotlever.cli import running
