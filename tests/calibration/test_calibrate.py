@@ -70,11 +70,10 @@ def test_the_knee_is_that_of_the_estimated_lever(calibrated, reference):
     assert calibrated.k == 1.0  # in vacuum the law is the lever's own
     assert calibrated.power_law.threshold_mW == pytest.approx(calibrated.knee.power_mW, rel=1e-6)
     knee, true = calibrated.knee, reference.knee
-    for name in ("lever_V", "current_mA", "power_mW"):
+    for name in ("lever_V", "current_mA", "power_mW", "tip_K"):
         error = getattr(knee, f"{name}_stderr")
-        assert 0 < error < 0.02 * getattr(true, name)
+        assert 0 < error < 0.03 * getattr(true, name)
         assert abs(getattr(knee, name) - getattr(true, name)) < 4 * error
-    assert calibrated.knee_tip_K == pytest.approx(true.tip_K, abs=15.0)
 
 
 def test_the_budget_adds_up_and_every_source_counts(calibrated):

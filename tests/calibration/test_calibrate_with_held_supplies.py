@@ -54,7 +54,7 @@ def test_the_table_is_by_the_bias_of_the_swept_supply(calibration, truth):
     np.testing.assert_allclose(read(calibration, "total_power_mW", bias), total, rtol=0.01)
     np.testing.assert_allclose(read(calibration, "power_mW", bias), truth.power_mW, atol=0.02)
     knee = Lever(TRUE, COARSE).knee()
-    assert calibration.knee_tip_K == pytest.approx(knee.tip_K.item(), abs=10.0)
+    assert calibration.knee.tip_K == pytest.approx(knee.tip_K.item(), abs=10.0)
     assert calibration.knee.lever_V == pytest.approx(knee.lever_V.item(), rel=0.01)
     # the tip is coldest near zero bias, and a bias for it is sought from there on
     at = float(calibration.bias_for(truth.tip_K.values[-2]))

@@ -87,7 +87,7 @@ def test_files_have_no_errors(folder):
     content = json.loads((folder / "cal.json").read_text())
     assert content["describes_data"] is False
     assert content["reason"]
-    errors = (*ERRORS, "k_stderr", "posterior_spread", "power_mW_stderr")
+    errors = (*ERRORS, "k_stderr", "posterior_spread", "power_mW_stderr", "tip_K_stderr")
     for key in (*errors, "tip_temperature_uncertainty_K"):
         values = numbers(content, key)
         assert values, key

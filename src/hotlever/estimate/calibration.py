@@ -108,7 +108,6 @@ def calibrated(
         k=k,
         k_stderr=k_stderr,
         knee=knee,
-        knee_tip_K=np.nan if own.knee is None else own.knee.tip_K,
         measured_rms_K=rms(_missed(solution.branch, measured, circuit)),
     )
 
@@ -230,13 +229,15 @@ def knee_with_errors(solution: Solution, branch: Branch) -> Knee:
     surrogate, circuit = solution.prediction.surrogate, solution.probe.circuit
 
     def values(branch: Branch) -> Array:
-        """Return V_l, I_h, P_l and V_b of a knee; NaN without one."""
+        """Return V_l, I_h, P_l, V_b and T_tip of a knee; NaN without one."""
         point = branch.knee
         if point is None:
-            return np.full(4, np.nan)
+            return np.full(5, np.nan)
         bias = circuit.bias(point.lever_V, point.current_mA)
-        return np.array([point.lever_V, point.current_mA, point.power_mW, bias])
+        return np.array([point.lever_V, point.current_mA, point.power_mW, bias, point.tip_K])
 
     changes = solution.posterior.changes(lambda at: values(surrogate.branch_at(at)))
     errors = np.sqrt(np.sum(changes**2, axis=0))
-    return Knee(*values(branch).tolist(), *errors.tolist())
+    *shown, tip = values(branch).tolist()
+    *of_shown, of_tip = errors.tolist()
+    return Knee(*shown, *of_shown, tip_K=tip, tip_K_stderr=of_tip)

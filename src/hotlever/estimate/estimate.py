@@ -117,8 +117,6 @@ class Estimate:
         Power of the knee over the threshold of the power law; NaN without a knee or a law.
     knee : Knee
         Of the estimated lever, or as measured; NaN where there is none, or all but its power.
-    knee_tip_K : float
-        Tip temperature there.
     table : xarray.Dataset
         ``TABLE_COLUMNS`` on the dimension ``bias``, evenly spaced over the measured range, with
         more rows where the tip rises by more than 10 K from one to the next; and ``budget_K``, the
@@ -159,7 +157,6 @@ class Estimate:
     k: float = np.nan
     k_stderr: float = np.nan
     knee: Knee = field(default_factory=Knee)
-    knee_tip_K: float = np.nan
     table: xr.Dataset = field(default_factory=xr.Dataset)
     measured_rms_K: float = np.nan
     pulse: PulseCalibration | None = None
@@ -217,9 +214,7 @@ class Estimate:
             "covariance": np.full_like(self.covariance, np.nan),
             "common_noise_covariance": np.full_like(self.common_noise_covariance, np.nan),
             "k_stderr": np.nan,
-            "knee": Knee(
-                self.knee.lever_V, self.knee.current_mA, self.knee.power_mW, self.knee.bias_V
-            ),
+            "knee": self.knee.without_errors(),
             "pulse": None,
             "gum": None,
         }

@@ -328,7 +328,7 @@ class IntervalSection(Section):
 class TipFields(Section):
     """What a file holds of the tip; nothing of a fit.
 
-    Beside what an `Estimate` has: of the knee ``tip_K`` and whether it was measured, the largest
+    Beside what an `Estimate` has: whether the knee was measured, the largest
     errors in the table, all in all and by source, and what follows from the budget for 95 %.
     """
 
@@ -374,8 +374,7 @@ class TipFields(Section):
         budgets, stated = budgets_of(estimate.table), estimate.gum
         values: dict[str, Any] = {
             "power_law_residual_K": estimate.law_residual_K,
-            "knee": vars(estimate.knee)
-            | {"tip_K": estimate.knee_tip_K, "measured": estimate.knee_measured},
+            "knee": vars(estimate.knee) | {"measured": estimate.knee_measured},
             "uncertainty_budget_K": {
                 name: part.max() for name, part in budgets["budget_K"].items()
             },
@@ -421,7 +420,6 @@ class TipFields(Section):
         return {
             "law_residual_K": self.power_law_residual_K,
             "knee": Knee(**knee),
-            "knee_tip_K": self.knee.get("tip_K", np.nan),
             "table": table,
             "pulse": None if self.pulse is None else self.pulse.pulse(),
             "gum": self._budget(table),

@@ -10,7 +10,7 @@ other dimensions and materials differ from the one whose temperatures are taken 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -177,8 +177,7 @@ def calibrated_by_knee(
         law_residual_K=residual,
         k=k,
         k_stderr=knee.power_mW_stderr / used.threshold_mW,
-        knee=knee,
-        knee_tip_K=float(reference.at(np.array(knee_mW), knee_mW)),
+        knee=replace(knee, tip_K=float(reference.at(np.array(knee_mW), knee_mW))),
         measured_rms_K=rms(measured.tip_K - own),
         probe=probe,
         measurement=measured,

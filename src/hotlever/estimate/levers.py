@@ -36,7 +36,7 @@ OF_A_CALIBRATION = {
     "knee_lever_V": Compared("knee V_l (V)", "V", "knee_lever_V{}", "lever voltage of the knee"),
     "knee_current_mA": Compared("knee I_h (mA)", "mA", "knee_current_mA{}", "current of the knee"),
     "knee_power_mW": Compared("knee P_l (mW)", "mW", "knee_power_mW{}", "power of the knee"),
-    "knee_tip_K": Compared("knee T_tip (K)", "K", "knee_tip_K", "tip temperature of the knee"),
+    "knee_tip_K": Compared("knee T_tip (K)", "K", "knee_tip_K{}", "tip temperature of the knee"),
     "k": Compared("k", "1", "k{}", "k"),
     "linear_K_per_mW": Compared("a (K/mW)", "K/mW", "linear_K_per_mW", "a"),
     "nonlinear_K": Compared("b (K)", "K", "nonlinear_K", "b"),
@@ -125,7 +125,7 @@ def _by_the_tip(
             "knee_lever_V": (knee.lever_V, knee.lever_V_stderr),
             "knee_current_mA": (knee.current_mA, knee.current_mA_stderr),
             "knee_power_mW": (knee.power_mW, knee.power_mW_stderr),
-            "knee_tip_K": (each.knee_tip_K, None),
+            "knee_tip_K": (knee.tip_K, knee.tip_K_stderr),
             "k": (each.k, each.k_stderr),
             **{name: (getattr(each.power_law, name, np.nan), None) for name in coefficients},
         }

@@ -206,7 +206,7 @@ def _knee_lines(calibration: Estimate) -> list[str]:
         return ["no knee as far as the lever can be heated"]
     if not knee.measured:
         power = value_with_error(knee.power_mW, knee.power_mW_stderr)
-        lines = [f"knee (estimated): {power} mW, tip {calibration.knee_tip_K:.0f} K"]
+        lines = [f"knee (estimated): {power} mW, tip {knee.tip_K:.0f} K"]
     elif calibration.knee_measured:
         lines = [f"knee: {_knee_point(calibration)}"]
     else:
@@ -225,7 +225,7 @@ def _knee_point(calibration: Estimate) -> str:
         f"{value_with_error(knee.current_mA, knee.current_mA_stderr)} mA, "
         f"{value_with_error(knee.power_mW, knee.power_mW_stderr)} mW at a bias of "
         f"{value_with_error(knee.bias_V, knee.bias_V_stderr)} V, "
-        f"tip {calibration.knee_tip_K:.0f} K"
+        f"tip {value_with_error(knee.tip_K, knee.tip_K_stderr)} K"
     )
 
 
