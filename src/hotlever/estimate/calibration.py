@@ -238,6 +238,6 @@ def knee_with_errors(solution: Solution, branch: Branch) -> Knee:
 
     changes = solution.posterior.changes(lambda at: values(surrogate.branch_at(at)))
     errors = np.sqrt(np.sum(changes**2, axis=0))
-    *shown, tip = values(branch).tolist()
-    *of_shown, of_tip = errors.tolist()
-    return Knee(*shown, *of_shown, tip_K=tip, tip_K_stderr=of_tip)
+    names = ("lever_V", "current_mA", "power_mW", "bias_V", "tip_K")
+    stderr = {f"{name}_stderr": error for name, error in zip(names, errors.tolist(), strict=True)}
+    return Knee(**dict(zip(names, values(branch).tolist(), strict=True)), **stderr)
