@@ -33,9 +33,9 @@ import psutil
 from playwright.sync_api import Error, Page, sync_playwright
 
 from hotlever.app import approaching, touching
-from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import PAGES
 from hotlever.app.project import safe_name
+from hotlever.app.session import Task
 from problems import table
 
 EXAMPLES = Path(__file__).parents[1] / "src" / "hotlever" / "examples"

@@ -16,8 +16,13 @@ from scipy.optimize import brentq, minimize_scalar
 
 from hotlever import Lever, Probe
 from hotlever.lever.similar import SimilarLevers
-from hotlever.studies.optimisation import Bounds, optimise
-from hotlever.studies.working_point import OF_THE_READER, SolvedDesign, WorkingPoint
+from hotlever.studies.optimisation import (
+    OF_THE_READER,
+    Bounds,
+    SolvedDesign,
+    WorkingPoint,
+    optimise,
+)
 from problems import table
 
 AT_6_V, AT_8_V = WorkingPoint("bias_V", 6.0), WorkingPoint("bias_V", 8.0)

@@ -13,7 +13,7 @@ from PIL import Image
 
 from experiments import on_coarse_meshes
 from hotlever.lever import State
-from hotlever.tasks.simulating import _Frames
+from hotlever.tasks.solving import _Frames
 
 
 def rows(text: str) -> list[dict[str, str]]:

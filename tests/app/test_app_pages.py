@@ -20,10 +20,9 @@ from nicegui.testing import User, user_simulation
 from PIL import Image
 
 from hotlever.app import live
-from hotlever.app.jobs import Jobs, Task
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.server import add_pages
-from hotlever.app.session import Session
+from hotlever.app.session import Jobs, Session, Task
 from hotlever.app.workers import Report
 from hotlever.errors import BranchEndError, HotleverError
 from hotlever.lever import Lever

@@ -18,10 +18,9 @@ from nicegui.testing import User
 from test_app_pages import Here, Run, drop, text_of, until, visit
 
 from app_in_browser import bad_files
-from hotlever.app.jobs import Task
 from hotlever.app.pages.start import QUESTIONS
 from hotlever.app.project import DRAWINGS, EXAMPLES, safe_name
-from hotlever.app.session import Session
+from hotlever.app.session import Session, Task
 from hotlever.probe import Probe
 
 #: Measurements, which only a fit or a calibration will refuse.

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from hotlever.app.jobs import Task
+from hotlever.app.session import Task
 from hotlever.errors import InputError
 from hotlever.tasks.commands import arguments_of
 

@@ -18,10 +18,9 @@ from test_app_pages import Here, drop, text_of, until, visit
 from test_pages_at_work import at_once, understood
 
 from hotlever.app import showing
-from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.task_page import MEDIA
 from hotlever.app.project import EXAMPLES
-from hotlever.app.session import Session
+from hotlever.app.session import Job, Session, Task
 from hotlever.estimate import calibrate
 from hotlever.estimate.power_law import EQ12
 from hotlever.files import CALIBRATION, TABLE

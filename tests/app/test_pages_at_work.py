@@ -17,11 +17,10 @@ from nicegui.testing import User
 from test_app_pages import Here, text_of, until, visit
 
 from hotlever.app import showing
-from hotlever.app.jobs import Job, Task, run
 from hotlever.app.pages.frame import ErrorBanner
 from hotlever.app.pages.simulate import Pulses
 from hotlever.app.project import EXAMPLES
-from hotlever.app.session import Session
+from hotlever.app.session import Job, Session, Task, run
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.errors import HotleverError
 

@@ -9,12 +9,14 @@ from hotlever import Lever, Probe
 from hotlever.lever.lever import COARSE
 from hotlever.lever.reader import over_surface
 from hotlever.lever.similar import SimilarLevers
-from hotlever.studies.optimisation import MOST_DESIGNS, optimise, optimum_text
-from hotlever.studies.working_point import (
+from hotlever.studies.optimisation import (
+    MOST_DESIGNS,
     OF_THE_READER,
     QUANTITIES,
     SolvedDesign,
     WorkingPoint,
+    optimise,
+    optimum_text,
 )
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")

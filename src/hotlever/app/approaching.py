@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from hotlever.air.bodies import BaseLine
-from hotlever.app.jobs import Task, probe_of, surrounded_probe
 from hotlever.app.live import coloured
+from hotlever.app.session import Task, probe_of, surrounded_probe
 from hotlever.app.workers import Report
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever import Branch, Lever

@@ -19,7 +19,7 @@ from matplotlib import colormaps
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from hotlever.app.jobs import Task, probe_of, surrounded_probe
+from hotlever.app.session import Task, probe_of, surrounded_probe
 from hotlever.app.workers import Report
 from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError

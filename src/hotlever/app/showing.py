@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from hotlever.app.jobs import Task, probe_of
 from hotlever.app.probe_fields import figure_file, svg
 from hotlever.app.project import file_stamp
+from hotlever.app.session import Task, probe_of
 from hotlever.app.workers import Report
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimate import Estimate, read_calibration, read_fit

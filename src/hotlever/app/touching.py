@@ -13,8 +13,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from hotlever.app.jobs import Task, probe_of, surrounded_probe
 from hotlever.app.live import coloured
+from hotlever.app.session import Task, probe_of, surrounded_probe
 from hotlever.app.workers import Report
 from hotlever.contact.law import INTERFACE
 from hotlever.contact.picture import contact_picture

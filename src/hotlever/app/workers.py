@@ -166,7 +166,7 @@ def _end_all() -> None:
 
 
 class Report:
-    """Tells the app of a call: a `hotlever.tasks.reporter.Reporter`.
+    """Tells the app of a call: a `hotlever.tasks.common_steps.Reporter`.
 
     Attributes
     ----------

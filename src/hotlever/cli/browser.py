@@ -9,8 +9,8 @@ from typer import Option
 
 from hotlever.errors import InputError, unforeseen_error
 from hotlever.tasks.arguments import refuse
+from hotlever.tasks.common_steps import Reporter
 from hotlever.tasks.parsing import check_number
-from hotlever.tasks.reporter import Reporter
 
 
 def open_app(

@@ -44,6 +44,7 @@ from hotlever.figures.estimate_figures import (
     tip_band,
 )
 from hotlever.figures.lever_figures import (
+    contact_overview,
     doping_profile,
     harmonics,
     heater_profiles,
@@ -51,6 +52,7 @@ from hotlever.figures.lever_figures import (
     history_overview,
     iv_curves,
     material_curves,
+    reader_overview,
     resistances,
     small_signals,
     sweep_overview,
@@ -67,7 +69,6 @@ from hotlever.figures.maps import (
 from hotlever.figures.probe_figures import outlines_drawing, probe_drawing
 from hotlever.figures.raman_figures import one_spectrum, raman_check, thermometry
 from hotlever.figures.style import COLOURS, entitle, figure, save_figure
-from hotlever.figures.surface_figures import contact_overview, reader_overview
 from hotlever.lever import probe_of
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """The commands, and the command line made of them.
 
-A command is a function of what it tells (`hotlever.tasks.reporter.Reporter`), of its arguments, and
-of its options, which are told by name. Their types say what the command line takes, and the
+A command is a function of who hears it (`hotlever.tasks.common_steps.Reporter`), of its arguments,
+and of its options, which are told by name. Their types say what the command line takes, and the
 docstring is the help: above all of the command, and below of each parameter, with what stands for
 its value in place of a type. A parameter that is a dataclass stands for its fields. A command
 returns an exit status, or nothing. What it computes with is imported when it is called, so that the
@@ -28,17 +28,21 @@ from hotlever import __version__
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import check_outputs
 from hotlever.tasks.arguments import Written
-from hotlever.tasks.caching import show_cache
-from hotlever.tasks.describing import list_materials, new_probe, propose_probe, show_probe
+from hotlever.tasks.common_steps import Reporter
+from hotlever.tasks.describing import (
+    list_materials,
+    new_probe,
+    propose_probe,
+    show_cache,
+    show_probe,
+)
 from hotlever.tasks.designing import vary_design
 from hotlever.tasks.estimating import calibrate_files, fit_files, propose
 from hotlever.tasks.evidence import reproduce, validate
 from hotlever.tasks.measuring import measure_lever
-from hotlever.tasks.reporter import Reporter
-from hotlever.tasks.simulating import simulate_in_time
+from hotlever.tasks.solving import respond, simulate_in_time, sweep
 from hotlever.tasks.spectra import join_spectra, measure_spectra
 from hotlever.tasks.surfaces import approach, touch
-from hotlever.tasks.sweeping import respond, sweep
 
 Command = Callable[..., int | None]
 

@@ -1,15 +1,16 @@
-"""Steps that commands have in common: read a probe, mesh its lever, write a table, draw."""
+"""Steps that commands have in common: tell, read a probe, mesh its lever, write a table, draw."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.tasks.arguments import LeverArguments, check_medium
 from hotlever.tasks.parsing import parse_settings
-from hotlever.tasks.reporter import Reporter
+from hotlever.types import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,6 +18,34 @@ if TYPE_CHECKING:
 
     from hotlever.lever import Lever
     from hotlever.probe import Probe
+
+
+class Reporter(Protocol):
+    """Who hears what a command tells beside the files that it writes: a terminal, or the app."""
+
+    def note(self, *texts: str) -> None:
+        """Say what should be known beside the result."""
+
+    def progress(self, label: str) -> AbstractContextManager[Progress]:
+        """Show how far the block is, which calls (steps done, steps in all)."""
+
+    def give(self, result: str) -> None:
+        """Give the result as text."""
+
+    def tell(self, text: str) -> None:
+        """Say something in one line."""
+
+    def fail(self, message: str) -> None:
+        """Say what went wrong with a part of the work."""
+
+    def tell_table(self, rows: Sequence[Sequence[str]]) -> None:
+        """Show rows of cells."""
+
+    def show(self, what: str, content: Any) -> None:
+        """Show what can be drawn on the way to the result, as the ``curve`` of a fit."""
+
+    def progress_bars(self, *labels: str) -> AbstractContextManager[tuple[Progress, ...]]:
+        """Show how far several parts of the work are, each from its first call on."""
 
 
 def read_probe(

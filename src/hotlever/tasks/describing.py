@@ -1,15 +1,16 @@
-"""Probes and materials, written, drawn, described and imported."""
+"""Probes and materials, written, drawn, described and imported; and what is kept on disk."""
 
 from __future__ import annotations
 
+from collections import defaultdict
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from hotlever.errors import unknown_name
 from hotlever.files import write_text
 from hotlever.tasks.arguments import Plot, ProbeFile, Written
-from hotlever.tasks.common_steps import draw, read_probe
-from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.common_steps import Reporter, draw, read_probe
 
 if TYPE_CHECKING:
     from hotlever.probe import Probe, ProbeMesh
@@ -236,3 +237,36 @@ def list_materials(
         chosen = own.made_of, own.layout().thickness_um
     draw(plot, lambda figures: figures.material_curves(curves(*chosen)))
     reporter.give("\n".join([*listing(*chosen[:1]), ""]))
+
+
+def show_cache(
+    reporter: Reporter,
+    *,
+    clear: bool = False,
+) -> None:
+    """Show what is kept on disk to save time: reduced levers, operators of the air, states.
+
+    Parameters
+    ----------
+    clear
+        Remove all that is kept.
+    """
+    from hotlever.cache import CACHE_VARIABLE, cache_folder, kept_files, largest_size
+
+    folder = cache_folder()
+    if folder is None:
+        reporter.give(f"the cache is switched off: {CACHE_VARIABLE} is empty\n")
+        return
+    if clear:
+        for _, path in kept_files(folder):
+            with suppress(OSError):
+                path.unlink()
+    files = kept_files(folder)
+    sizes: dict[str, list[int]] = defaultdict(list)
+    for status, path in files:
+        sizes[path.parent.name].append(status.st_size)
+    sizes["in all"] = [status.st_size for status, _ in files]
+    lines = [f"{folder} (at most {largest_size() / 1e9:g} GB)"]
+    for kind, bytes_of in sizes.items():
+        lines.append(f"{kind:<10} {len(bytes_of):>6} files {sum(bytes_of) / 1e6:>10.1f} MB")
+    reporter.give("\n".join([*lines, ""]))

@@ -11,9 +11,8 @@ from hotlever.errors import InputError
 from hotlever.files import write_text
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
 from hotlever.tasks.arguments import Physics, Plot, ProbeFile, Written, at_most_one, refuse
-from hotlever.tasks.common_steps import draw, read_probe
+from hotlever.tasks.common_steps import Reporter, draw, read_probe
 from hotlever.tasks.parsing import check_number, parse_bounds, parse_setting, parse_varied
-from hotlever.tasks.reporter import Reporter
 
 if TYPE_CHECKING:
     from hotlever.probe import Probe
@@ -140,8 +139,7 @@ def _optimise(
     plot: Path | None,
 ) -> None:
     """Find the design within bounds whose quantity is least or greatest."""
-    from hotlever.studies.optimisation import optimise, optimum_text
-    from hotlever.studies.working_point import WorkingPoint
+    from hotlever.studies.optimisation import WorkingPoint, optimise, optimum_text
 
     point = WorkingPoint(*parse_setting(at, tip=True))
     quantity, bounds = minimise or maximise or "", parse_bounds(within)

@@ -20,7 +20,7 @@ from hotlever.tasks.arguments import (
     check_medium,
     refuse,
 )
-from hotlever.tasks.common_steps import draw, read_probe
+from hotlever.tasks.common_steps import Reporter, draw, read_probe
 from hotlever.tasks.parsing import (
     check_number,
     parse_bias,
@@ -33,7 +33,6 @@ from hotlever.tasks.parsing import (
     parse_temperature,
     parse_timing,
 )
-from hotlever.tasks.reporter import Reporter
 from hotlever.units import setting
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from hotlever.files import FOLDER, check_outputs, write_text
 from hotlever.tasks.arguments import Written, refuse
-from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.common_steps import Reporter
 
 
 def reproduce(

@@ -13,9 +13,8 @@ from typer import Option
 from hotlever.errors import ComputationError, InputError, counted, excerpt, quoted
 from hotlever.files import write_text
 from hotlever.tasks.arguments import PriorOptions, Written, check_medium
-from hotlever.tasks.common_steps import read_probe
+from hotlever.tasks.common_steps import Reporter, read_probe
 from hotlever.tasks.parsing import check_number, parse_bias, parse_temperature
-from hotlever.tasks.reporter import Reporter
 from hotlever.units import setting
 
 if TYPE_CHECKING:

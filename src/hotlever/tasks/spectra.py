@@ -15,8 +15,7 @@ from hotlever.tasks.arguments import (
     at_most_one,
     refuse,
 )
-from hotlever.tasks.common_steps import draw
-from hotlever.tasks.reporter import Reporter
+from hotlever.tasks.common_steps import Reporter, draw
 
 if TYPE_CHECKING:
     import xarray as xr

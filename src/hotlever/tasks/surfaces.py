@@ -10,9 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
 from hotlever.tasks.arguments import HistoryOptions, LeverArguments, Plot, Table, refuse
-from hotlever.tasks.common_steps import give_table, make_lever, notes_of, read_surrounded_probe
+from hotlever.tasks.common_steps import (
+    Reporter,
+    give_table,
+    make_lever,
+    notes_of,
+    read_surrounded_probe,
+)
 from hotlever.tasks.parsing import parse_bias, parse_distances, parse_pressures, parse_times
-from hotlever.tasks.reporter import Reporter
 from hotlever.units import setting
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ import numpy as np
 from nicegui import ui
 
 from hotlever.app import touching
-from hotlever.app.jobs import Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import caption, flat_button
 from hotlever.app.pages.live_page import LivePage, slider
 from hotlever.app.pages.task_page import MEDIA
+from hotlever.app.session import Task
 from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 from hotlever.errors import InputError

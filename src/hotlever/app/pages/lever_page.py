@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 from nicegui import ui
 
 from hotlever.app import probe_fields
-from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
     ErrorBanner,
     caption,
@@ -36,7 +35,7 @@ from hotlever.app.probe_fields import (
     with_value,
 )
 from hotlever.app.project import DATA, DRAWINGS, safe_name
-from hotlever.app.session import Session
+from hotlever.app.session import Job, Session, Task
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import FIGURE_TYPES
 

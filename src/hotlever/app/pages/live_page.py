@@ -12,11 +12,10 @@ from typing import Any, ClassVar
 
 from nicegui import background_tasks, ui
 
-from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import ErrorBanner, caption, number_shown, two_columns
 from hotlever.app.pages.plots import redraw
 from hotlever.app.pages.task_page import JobView, TaskPage
-from hotlever.app.session import Session
+from hotlever.app.session import Session, Task
 from hotlever.errors import HotleverError
 
 

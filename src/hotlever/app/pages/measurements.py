@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 from nicegui import ui
 
 from hotlever.app import showing
-from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
     ErrorBanner,
     caption,
@@ -28,7 +27,7 @@ from hotlever.app.pages.plots import MeasuredPlots, RampPlots
 from hotlever.app.pages.results import show_result
 from hotlever.app.pages.task_page import MEDIA, JobView, TaskPage, several
 from hotlever.app.project import DATA, EXAMPLES, FIT
-from hotlever.app.session import Session
+from hotlever.app.session import Job, Session, Task
 from hotlever.errors import HotleverError, InputError
 from hotlever.files import CALIBRATION, TABLE
 from hotlever.measurement import FileColumn

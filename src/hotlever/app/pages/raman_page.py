@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 from nicegui import ui
 
 from hotlever.app import showing
-from hotlever.app.jobs import Job, Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import (
     ErrorBanner,
@@ -28,7 +27,7 @@ from hotlever.app.pages.frame import (
 )
 from hotlever.app.pages.task_page import DrawnPage
 from hotlever.app.project import CORRECTIONS
-from hotlever.app.session import Session
+from hotlever.app.session import Job, Session, Task
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
 from hotlever.raman import Correction, read_corrections

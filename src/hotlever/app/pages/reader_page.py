@@ -10,10 +10,10 @@ import numpy as np
 from nicegui import ui
 
 from hotlever.app import approaching
-from hotlever.app.jobs import Task
 from hotlever.app.pages import plots
 from hotlever.app.pages.frame import caption
 from hotlever.app.pages.live_page import LivePage
+from hotlever.app.session import Task
 from hotlever.colours import BLUE, VERMILION
 
 

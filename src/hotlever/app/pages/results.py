@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 from nicegui import ui
 
 from hotlever.app import showing
-from hotlever.app.jobs import Task
 from hotlever.app.pages.frame import (
     ErrorBanner,
     caption,
@@ -23,7 +22,7 @@ from hotlever.app.pages.frame import (
     text_shown,
 )
 from hotlever.app.pages.task_page import DrawnPage
-from hotlever.app.session import Session
+from hotlever.app.session import Session, Task
 from hotlever.errors import HotleverError
 from hotlever.files import FIGURE_TYPES
 from hotlever.materials.parameters import sentence

@@ -12,12 +12,11 @@ from typing import Any, ClassVar
 from nicegui import ui
 
 from hotlever.app import live
-from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import ErrorBanner, caption, figure, flat_button
 from hotlever.app.pages.live_page import LivePage, texts_of
 from hotlever.app.pages.plots import LivePlots, compare_histories, redraw
 from hotlever.app.pages.task_page import KINDS, DrawnPage, JobView
-from hotlever.app.session import Session
+from hotlever.app.session import Job, Session, Task
 from hotlever.errors import HotleverError, InputError
 from hotlever.lever.set_points import HELD
 from hotlever.materials.parameters import label

@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 from nicegui import ui
 
 from hotlever.app import showing
-from hotlever.app.jobs import Job, Task
 from hotlever.app.pages.frame import (
     ErrorBanner,
     figure,
@@ -22,7 +21,7 @@ from hotlever.app.pages.frame import (
     small_button,
     text_shown,
 )
-from hotlever.app.session import Session
+from hotlever.app.session import Job, Session, Task
 from hotlever.errors import InputError
 
 MEDIA = {

@@ -28,10 +28,9 @@ from hotlever.studies.knee_study import (
     steps_to_the_knee,
 )
 from hotlever.studies.linear_branch import SPAN_K, BranchLine
-from hotlever.studies.published_lever.branch_readings import Readings
 from hotlever.studies.published_lever.layout_search import Solver
 from hotlever.studies.published_lever.layouts import Layout
-from hotlever.studies.published_lever.statements import LAST_V, MAIN, OPTIONS, SEARCHED
+from hotlever.studies.published_lever.statements import LAST_V, MAIN, OPTIONS, SEARCHED, Readings
 from hotlever.studies.radiation import radiated_heat
 from hotlever.studies.thermoelectric_shift import shift_by_heat
 

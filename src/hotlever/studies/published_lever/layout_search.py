@@ -27,9 +27,8 @@ from hotlever.lever.observables import Linearised
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials.departures import DEPARTURES
 from hotlever.probe import MeshOptions
-from hotlever.studies.published_lever.branch_readings import Readings
 from hotlever.studies.published_lever.layouts import probe_of
-from hotlever.studies.published_lever.statements import LAST_V, OPTIONS, SEARCHED
+from hotlever.studies.published_lever.statements import LAST_V, OPTIONS, SEARCHED, Readings
 from hotlever.types import Array
 
 
