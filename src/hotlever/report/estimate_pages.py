@@ -72,16 +72,15 @@ def add_fit(page: Page, fit: Estimate) -> None:
     """Add tables and figures of a fit to a page."""
     if not fit.describes_data:
         page.sentences(fit.doubt, NEAREST)
-    page.table(
-        ("parameter", "value", "unit", ""),
-        parameter_rows(fit),
-        "Material parameters; standard errors in units of the last digits."
-        if fit.describes_data
-        else "Material parameters of the nearest lever.",
-    )
+    page.tabulate(_of(fit, "fit"), ("parameter", "value", "unit", ""), parameter_rows(fit))
     page.sentences(*fit.notes)
     page.text(f"{'; '.join(conclusions(fit))}.")
     (_draw_in_time if fit.in_time else _draw_at_rest)(page, fit)
+
+
+def _of(estimate: Estimate, name: str) -> str:
+    """Return the name of a text, that of the nearest lever where an estimate is no more."""
+    return name if estimate.describes_data else f"nearest_{name}"
 
 
 def _draw_at_rest(page: Page, fit: Estimate) -> None:
@@ -90,62 +89,31 @@ def _draw_at_rest(page: Page, fit: Estimate) -> None:
     lever = Lever(fit.probe)
     touches = fit.probe.contact is not None
     model = fit.model().sortby("bias") if touches else lever.sweep(measured.bias.values)
-    page.figure(
-        "fit_data_and_model",
-        figures.data_and_model(measured, model, fit.observables),
-        "Measured and modelled observables against bias, and their difference. "
-        "Grey: the stated error of the measured temperature.",
-    )
+    page.draw("fit_data_and_model", figures.data_and_model(measured, model, fit.observables))
     _add_correlation(page, fit)
-    page.figure(
-        "fit_tip_band",
-        figures.tip_band(fit.band, measured),
-        "The tip temperature that the fit predicts, with the band that follows from the "
-        "covariance of the parameters (model errors not included)."
-        if fit.describes_data
-        else "The tip temperature of the nearest lever, which is no estimate.",
-    )
+    band = figures.tip_band(fit.band, measured)
+    page.draw(_of(fit, "fit_tip_band"), band, "fit_tip_band")
     low, high = measured.bias.values[[0, -1]].tolist()
     # points of a curve without visible corners
     curve = lever.sweep(np.linspace(low, high, 110))
-    page.figure(
-        "fit_iv",
-        figures.iv_curves({"model": curve}, measured=measured),
-        "Heater current against lever voltage.",
-    )
+    page.draw("fit_iv", figures.iv_curves({"model": curve}, measured=measured))
     if not fit.probe.circuit.starts_cold:
         return
     base = fit.probe.circuit.base_temperature_K
-    page.figure(
-        "fit_temperature_power",
-        figures.temperature_power(curve, measured=measured, base_temperature_K=base),
-        "Tip temperature against the power dissipated in the lever, beside the published law.",
-    )
+    by_power = figures.temperature_power(curve, measured=measured, base_temperature_K=base)
+    page.draw("fit_temperature_power", by_power)
 
 
 def _add_correlation(page: Page, fit: Estimate) -> None:
-    if len(fit.names) < 2 or not fit.describes_data:
-        return
-    page.figure(
-        "fit_correlation",
-        figures.correlation_matrix(fit.names, fit.correlation, fit.probe.title),
-        "Correlation of the fitted parameters.",
-    )
+    if len(fit.names) > 1 and fit.describes_data:
+        matrix = figures.correlation_matrix(fit.names, fit.correlation, fit.probe.title)
+        page.draw("fit_correlation", matrix)
 
 
 def _draw_in_time(page: Page, fit: Estimate) -> None:
     measured = fit.measurement.dataset(fit.probe.circuit)
-    page.figure(
-        "fit_in_time",
-        figures.data_and_model(measured, fit.model(), fit.observables, fit.band),
-        "Measured and modelled observables against time, and their difference; and the tip "
-        + (
-            "temperature that the fit predicts, with the 95 % band that follows from the "
-            "covariance of the parameters (model errors not included)."
-            if fit.describes_data
-            else "temperature of the nearest lever, which is no estimate."
-        ),
-    )
+    figure = figures.data_and_model(measured, fit.model(), fit.observables, fit.band)
+    page.draw(_of(fit, "fit_in_time"), figure, "fit_in_time")
     _add_correlation(page, fit)
 
 
@@ -156,30 +124,14 @@ def _add_uncertainty(page: Page, uncertainty: Uncertainty) -> None:
         page.table(columns, rows, caption)
     fit = uncertainty.fit
     if uncertainty.profiles:
-        page.figure(
-            "profiles",
-            figures.profile_curves(list(uncertainty.profiles.values())),
-            "Profile likelihoods: how much worse the fit gets with one parameter held and the "
-            "others fitted again, beside the parabola of the standard error.",
-        )
+        page.draw("profiles", figures.profile_curves(list(uncertainty.profiles.values())))
     if uncertainty.posterior is not None:
         optimum = {name: fit.parameters[name].value for name in fit.names}
-        page.figure(
-            "posterior",
-            figures.posterior_corner(
-                uncertainty.posterior,
-                {**optimum, "inversion_temperature": fit.inversion_temperature_K},
-            ),
-            "Posterior of each quantity and pair. Above each histogram: its median and half of "
-            "its 68 % interval.",
-        )
+        optimum["inversion_temperature"] = fit.inversion_temperature_K
+        page.draw("posterior", figures.posterior_corner(uncertainty.posterior, optimum))
     if uncertainty.band is not None:
-        page.figure(
-            "tip_band_posterior",
-            figures.tip_band(uncertainty.band, fit.measurement.dataset(fit.probe.circuit)),
-            "Tip temperature that follows from the posterior, against bias and power (model "
-            "errors not included).",
-        )
+        measured = fit.measurement.dataset(fit.probe.circuit)
+        page.draw("tip_band_posterior", figures.tip_band(uncertainty.band, measured))
 
 
 # --- of a calibration ---------------------------------------------------------------------------
@@ -190,33 +142,23 @@ def calibration_page(calibration: Estimate, added: Callable[[Block], None] | Non
 
     ``added`` is called with each block as soon as it is there.
     """
-    described = calibration.describes_data
     page = Page(f"Calibration of {calibration.measurement.path}", added=added)
     parts = calibration_parts(calibration)
     page.sentences("; ".join(parts.before), *parts.after)
     for caption, (head, *rows) in parts.tables:
         page.table(head, rows, caption or "The standard error of the tip temperature, by source.")
-    page.figure(
-        "calibration",
-        figures.calibration_curves(calibration),
-        "Tip temperature against power and bias with its 95 % band, the I-V curve with its knee, "
-        "and the standard error by source."
-        if described
-        else "The nearest lever, which is no estimate: tip temperature against power and bias, the "
-        "I-V curve, and what the data differ by.",
-    )
+    curves = figures.calibration_curves(calibration)
+    page.draw(_of(calibration, "calibration"), curves, "calibration")
     names = [
         name
         for name in (*TABLE_COLUMNS, *OF_THE_CONTACT)
-        if name in calibration.table and (described or not (name in STATED or "stderr" in name))
+        if name in calibration.table
+        and (calibration.describes_data or not (name in STATED or "stderr" in name))
     ]
     columns = even_rows(calibration.heating, names, "tip_K", fewest=15)
-    page.table(
-        [f"{QUANTITIES[name].meaning} ({QUANTITIES[name].unit})" for name in names],
-        [[f"{value:.4g}" for value in row] for row in zip(*columns.values(), strict=True)],
-        "Some rows of the table "
-        + ("for the instrument." if described else "of the nearest lever, not for an instrument."),
-    )
+    head = [f"{QUANTITIES[name].meaning} ({QUANTITIES[name].unit})" for name in names]
+    rows = [[f"{value:.4g}" for value in row] for row in zip(*columns.values(), strict=True)]
+    page.tabulate(_of(calibration, "calibration"), head, rows)
     if calibration.gum is not None:
         _add_largest(page, calibration.gum)
     page.sentences(*calibration.notes)
@@ -256,13 +198,7 @@ def budget_page(calibration: Estimate) -> Page:
     _add_rows(page, budget)
     if budget.correlation is not None:
         _add_row_correlation(page, budget, budget.correlation)
-    page.text(
-        "Evaluated after the GUM (JCGM 100:2008), linearised, and checked after JCGM 101:2008. "
-        "Prior is what was known beforehand of a quantity, with the standard uncertainty u, and "
-        "estimate what was found. Sensitivities are in K per unit of the quantity; u of an "
-        "infinite number of degrees of freedom is taken as exact. No traceability to standards and "
-        "no accreditation is claimed."
-    )
+    page.say("budget")
     return page
 
 
@@ -331,7 +267,8 @@ def _add_row_correlation(page: Page, budget: Budget, correlation: Array) -> None
     """Add the correlation of those rows that are not independent of all others."""
     numbers = np.flatnonzero(np.count_nonzero(correlation, axis=0) > 1)
     among = correlation[np.ix_(numbers, numbers)]
-    page.table(
+    page.tabulate(
+        "correlated_rows",
         ["", *(str(number) for number in range(1, numbers.size + 1))],
         [
             [
@@ -340,7 +277,6 @@ def _add_row_correlation(page: Page, budget: Budget, correlation: Array) -> None
             ]
             for number, (row, values) in enumerate(zip(numbers, among, strict=True), start=1)
         ],
-        "Correlation in hundredths; all other rows are independent of each other and of these.",
     )
 
 
@@ -371,20 +307,11 @@ def levers_page(batch: Batch, levers: xr.Dataset) -> Page:
         )
     page.sentences(*statements(levers))
     if by_tip:
-        page.figure(
-            "calibrated_levers",
-            figures.calibrated_levers(batch.results, levers),
-            "Tip temperatures of the levers, how far each is from their mean, and what they are "
-            "compared by, with standard errors.",
-        )
+        page.draw("calibrated_levers", figures.calibrated_levers(batch.results, levers))
     else:
-        page.figure(
-            "lever_parameters",
-            figures.lever_parameters(levers),
-            "Each fitted parameter by lever, and the inversion temperature that follows.",
-        )
+        page.draw("lever_parameters", figures.lever_parameters(levers))
     head, *rows = lever_rows(levers)
-    page.table(head, rows, "Standard errors in units of the last digits.")
+    page.tabulate("levers", head, rows)
     if by_tip:
         head, *rows = law_rows(levers)
         page.table(head, rows, "Power laws in vacuum.")

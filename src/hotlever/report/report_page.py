@@ -1,4 +1,9 @@
-"""A report page: text, tables and figures in one self-contained HTML file."""
+"""A report page: text, tables and figures in one self-contained HTML file.
+
+Paragraphs and captions stand by their names in ``texts.toml``. Braces of a text name what is found
+as the page is made, or numbers of `hotlever.spieser2017`, as ``{paper.SHIFT_NM:.0f}``; these may be
+parts of an object, as ``{factor.best_k:.2f}``.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +11,11 @@ import base64
 import io
 import os
 import re
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +24,7 @@ from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from hotlever import __version__
+from hotlever import spieser2017 as paper
 from hotlever.figures import save_figure
 from hotlever.files import output_folder, write_text
 from hotlever.materials.parameters import sentence
@@ -29,6 +38,18 @@ def _with_links(text: str) -> Markup:
     link = r'<a href="https://doi.org/\1">doi:\1</a>'
     linked = re.sub(r"doi:(10\.\d{4,9}/[^\s,;]*[^\s,;.])", link, str(escape(text)))
     return Markup(re.sub(r"\b(\w+\.html)\b", r'<a href="\1">\1</a>', linked))
+
+
+@cache
+def texts() -> dict[str, Any]:
+    """Return the words of pages by name: captions of figures and tables, paragraphs, claims."""
+    path = files("hotlever") / "report" / "texts.toml"
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def filled(text: str, /, **numbers: Any) -> str:
+    """Return a text with what was found, and what the paper has, in its braces."""
+    return text.format(paper=paper, **numbers)
 
 
 @dataclass
@@ -70,6 +91,10 @@ class Page:
         """Add a paragraph."""
         self._add("text", text=text)
 
+    def say(self, name: str, /, **numbers: Any) -> None:
+        """Add the paragraph of a name."""
+        self.text(filled(texts()["paragraphs"][name], **numbers))
+
     def sentences(self, *texts: str) -> None:
         """Add paragraphs of words, each made a sentence."""
         for text in texts:
@@ -86,9 +111,26 @@ class Page:
         """Add a table of strings; one of sentences is set flush left."""
         self._add("table", columns=columns, rows=rows, caption=caption, prose=prose)
 
+    def tabulate(
+        self,
+        name: str,
+        columns: Sequence[str],
+        rows: Sequence[Sequence[str]],
+        /,
+        *,
+        prose: bool = False,
+        **numbers: Any,
+    ) -> None:
+        """Add a table with the caption of its name."""
+        self.table(columns, rows, filled(texts()["tables"][name], **numbers), prose=prose)
+
     def figure(self, name: str, figure: Figure, caption: str) -> None:
         """Add a figure; `name` is its file name without suffix."""
         self._add("figure", name=name, figure=figure, caption=caption)
+
+    def draw(self, name: str, figure: Figure, /, file: str = "", **numbers: Any) -> None:
+        """Add a figure with the caption of its name, which is that of its file by default."""
+        self.figure(file or name, figure, filled(texts()["figures"][name], **numbers))
 
     def write(self, folder: str | os.PathLike[str], name: str = "index") -> Path:
         """Write the page, and each figure as PDF beside it; return the page's path.

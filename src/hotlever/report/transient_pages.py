@@ -75,14 +75,14 @@ def transient_page(
 def _step(page: Page, lever: Lever, biases: list[float]) -> None:
     bias = biases[-1]
     history = simulate(lever, step(bias), per_step=8)
-    page.figure("step", figures.history_overview(history), f"The bias is switched to {bias:g} V.")
+    page.draw("step", figures.history_overview(history), bias=bias)
     times = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
     rows = []
     for bias in biases:
         tip = simulate(lever, step(bias), at=times).tip_K.values
         rows.append([f"{bias:g}", *(f"{value:.0f}" for value in tip)])
     heads = ["bias (V)", *(f"{time:g} µs" for time in times)]
-    page.table(heads, rows, "Tip temperature (K) so long after the bias was switched on.")
+    page.tabulate("step", heads, rows)
     page.sentences(*filter(None, history.attrs["notes"].split("\n")))
 
 
@@ -92,7 +92,7 @@ def _train(page: Page, lever: Lever, biases: list[float], count: int) -> None:
     page.figure("train", figures.history_overview(history), f"{sentence(wave.text)}")
     accounted_nJ = history.stored_nJ + history.air_stored_nJ + history.lost_nJ
     off = float(np.abs(history.supplied_nJ - accounted_nJ).max() / history.supplied_nJ.max())
-    page.text(f"Of the heat supplied all but {off:.0e} is stored or lost.")
+    page.say("train", off=off)
 
 
 def _time_constants(page: Page, lever: Lever, biases: list[float]) -> None:
@@ -107,29 +107,19 @@ def _time_constants(page: Page, lever: Lever, biases: list[float]) -> None:
         tip = times.tip_K.values[index]
         rows.append([f"{bias:g}", f"{tip:.0f}", *(f"{time:.1f}" for time in (*slowest, *around))])
     held = [f"{source} held" for source in columns]
-    page.table(
-        ["bias (V)", "tip (K)", *held, "heating", "cooling"],
-        rows,
-        "The slowest time constant (µs) by what the source holds, negative for what grows; "
-        "and times from 10 to 90 %.",
-    )
+    heads = ["bias (V)", "tip (K)", *held, "heating", "cooling"]
+    page.tabulate("time_constants", heads, rows)
 
 
 def _small_signals(page: Page, lever: Lever, biases: list[float], frequencies_Hz: Array) -> None:
     for bias in (biases[1], biases[-1]):
         (state,) = lever.solve([bias])
         figure = figures.small_signals(spectrum(state, frequencies_Hz))
-        page.figure(
-            f"spectrum_{bias:g}V", figure, f"At {bias:g} V, with the tip at {state.tip_K:.0f} K."
-        )
+        page.draw("spectrum", figure, f"spectrum_{bias:g}V", bias=bias, tip_K=state.tip_K)
 
 
 def _harmonics(page: Page, lever: Lever, biases: list[float], frequencies_Hz: Array) -> None:
     bias = biases[1]
     drive = 0.05 * bias
-    harmonic_voltages = harmonics(lever, bias, drive, frequencies_Hz)
-    page.figure(
-        "harmonics",
-        figures.harmonics(harmonic_voltages),
-        f"Harmonics of the lever voltage under a sine of {drive:.2g} V about {bias:g} V.",
-    )
+    figure = figures.harmonics(harmonics(lever, bias, drive, frequencies_Hz))
+    page.draw("harmonics", figure, drive=drive, bias=bias)

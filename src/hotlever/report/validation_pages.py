@@ -16,7 +16,7 @@ from hotlever.estimate.summary import calibration_parts
 from hotlever.estimate.tip_table import rms
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes
-from hotlever.report.report_page import Page
+from hotlever.report.report_page import Page, filled, texts
 from hotlever.studies.validation.case import Case, cases, sought
 from hotlever.studies.validation.prediction import (
     DRAWS,
@@ -59,19 +59,11 @@ def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]
     now, calibrations = results[: len(every)], results[len(every) :]
     compared = comparison(every)
     page = Page("Published numbers, predicted and compared", _summary(compared))
-    page.figure(
-        "predicted_and_published",
-        figures.predicted_and_published(compared),
-        "What was predicted and what is published, over the predicted median. A wide band says "
-        "that little was known of the lever: to be inside one says little for the model.",
-    )
+    page.draw("predicted_and_published", figures.predicted_and_published(compared))
     page.heading("What came out")
-    page.table(
-        ("case", "quantity", "unit", "predicted (95 %)", "published", "verdict"),
-        [_row(case, compared.sel(case=case.name)) for case in every],
-        "The prediction is the one that was written down before the published value; which of the "
-        "two came first is in the history of the project's files.",
-    )
+    columns = ("case", "quantity", "unit", "predicted (95 %)", "published", "verdict")
+    rows = [_row(case, compared.sel(case=case.name)) for case in every]
+    page.tabulate("predicted_and_published", columns, rows)
     _lost_draws_and_changes(page, every, now)
     _outside(page, every, compared)
     _bases(page, every)
@@ -89,17 +81,16 @@ def _summary(compared: xr.Dataset) -> str:
     narrow = (compared.high_95 <= narrow_factor * compared.predicted) & (
         narrow_factor * compared.low_95 >= compared.predicted
     )
-    return (
-        f"{count} published numbers of {groups} groups. Of each is known what its source states; "
-        "what it does not state is assumed, with a spread, and a band follows by drawing "
-        f"{DRAWS} times from these priors. {verdicts.count('inside 68 %')} of the published values "
-        "are within 68 % of what prediction and published error leave, "
-        f"{count - outside} within 95 %, {outside} outside; where bands are right "
-        f"{0.68 * count:.0f} and {0.95 * count:.0f} would be within. {narrow.sum().item()} of the "
-        f"bands are narrow, within a factor of {narrow_factor:g} of the median: these test the "
-        "model, the others that it is not far off. "
-        "Those who wrote the inputs had read the abstracts and so were no strangers to the "
-        "published values; the bands follow from the inputs alone."
+    return filled(
+        texts()["paragraphs"]["validation"],
+        count=count,
+        groups=groups,
+        draws=DRAWS,
+        inside=(verdicts.count("inside 68 %"), count - outside),
+        outside=outside,
+        expected=(0.68 * count, 0.95 * count),
+        narrow=narrow.sum(),
+        factor=narrow_factor,
     )
 
 
@@ -144,11 +135,10 @@ def _lost_draws_and_changes(
             changes.append(
                 f"{case.name}: {_number(before.median)} then, {_number(today.median)} now"
             )
-    page.text(
-        f"Predicted anew, some are others by now: {'; '.join(changes)}."
-        if changes
-        else "Predicted anew today, all are the same within a fifth of their standard deviations."
-    )
+    if changes:
+        page.say("predicted_others", changes="; ".join(changes))
+    else:
+        page.say("predicted_the_same")
 
 
 def _outside(page: Page, every: Sequence[Case], compared: xr.Dataset) -> None:
@@ -202,60 +192,26 @@ def _real_curve(page: Page, calibrations: Mapping[str, Estimate]) -> None:
     tips = [other.table.tip_K[-1].item() for other in calibrations.values()]
     # reading error of the curve
     read_uA = 4.0
-    page.text(
-        "The I-V curve of a silicon lever of the University of Illinois, digitised from a "
-        f"published picture, {off.size} points. Lever, surroundings and temperatures are not "
-        "stated with it. Calibrated with what is usual of such levers, the model follows the "
-        f"current to {rms(off):.1f} µA (rms), at worst {np.abs(off).max():.1f} µA; reading it off "
-        f"was good to {read_uA:g} µA. At the last point, {last.power_mW.item():.2f} mW, the tip "
-        f"is at {last.tip_K.item():.0f} K, with 95 % from {last.tip_low_K.item():.0f} to "
-        f"{last.tip_high_K.item():.0f} K."
-    )
-    page.figure(
-        "real_curve",
-        figures.calibration_curves(calibration),
-        "Tip temperature of the real lever with its 95 % band, its I-V curve, and the standard "
-        "error by source.",
-    )
-    page.figure(
-        "real_curve_residuals",
-        figures.residuals_of_current(calibration.measurement.bias_V, off, read_uA),
-        "Measured less calibrated currents, and the error of reading them off (grey).",
-    )
+    worst = np.abs(off).max()
+    page.say("real_curve", points=off.size, rms=rms(off), worst=worst, read_uA=read_uA, last=last)
+    page.draw("real_curve", figures.calibration_curves(calibration))
+    bias = calibration.measurement.bias_V
+    page.draw("real_curve_residuals", figures.residuals_of_current(bias, off, read_uA))
     page.sentences(*calibration_parts(calibration).before)
-    page.table(
-        ("parameter", "assumed", "by the curve"),
-        [
-            [name, use.stated, value_with_error(use.posterior_value, use.posterior_spread)]
-            for name, use in calibration.priors.items()
-            if use.spread_ratio < 0.8
-        ],
-        "What the curve tells of the lever: parameters whose spread it lessens by a fifth or more. "
-        "All others stay what was assumed.",
-    )
-    page.table(
-        ("lever", "rms of the current (µA)", "tip at the last point (K)", "95 % (K)"),
-        [
-            [
-                name,
-                f"{rms(_differences(other)):.1f}",
-                f"{row.tip_K.item():.0f}",
-                f"{row.tip_low_K.item():.0f} to {row.tip_high_K.item():.0f}",
-            ]
-            for name, other in calibrations.items()
-            for row in [other.table.isel(bias=-1)]
-        ],
-        "The same curve, calibrated as that of other levers.",
-    )
-    page.text(
-        "What to believe: the laws of silicon, with a doping that the data find, follow this curve "
-        "as closely as it could be read. All of these levers do, so that it does not tell them "
-        "apart: neither length nor surroundings can be had from it. The temperature is nearly the "
-        f"same in all, {min(tips):.0f} to {max(tips):.0f} K, since it follows from how far the "
-        "resistance rose. What not to believe without more: that it is right to fewer kelvin than "
-        "the band is wide. Nothing in the picture is a thermometer, and the laws are common to all "
-        "rows. The knee lies beyond the measured range, and is an extrapolation."
-    )
+    told = [
+        [name, use.stated, value_with_error(use.posterior_value, use.posterior_spread)]
+        for name, use in calibration.priors.items()
+        if use.spread_ratio < 0.8
+    ]
+    page.tabulate("real_curve", ("parameter", "assumed", "by the curve"), told)
+    rows = []
+    for name, other in calibrations.items():
+        end = other.table.isel(bias=-1)
+        band = f"{end.tip_low_K:.0f} to {end.tip_high_K:.0f}"
+        rows.append([name, f"{rms(_differences(other)):.1f}", f"{end.tip_K:.0f}", band])
+    columns = ("lever", "rms of the current (µA)", "tip at the last point (K)", "95 % (K)")
+    page.tabulate("other_levers", columns, rows)
+    page.say("believed", least=min(tips), most=max(tips))
 
 
 def _differences(calibration: Estimate) -> Array:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import as_file, files
@@ -11,12 +10,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from hotlever import spieser2017 as paper
 from hotlever.estimate import Estimate, Measurement, fit, read_measurement
 from hotlever.lever import Lever
-from hotlever.report.report_page import Page
+from hotlever.report.report_page import Page, filled, texts
 from hotlever.studies.air_scaling import GAPS_UM
 from hotlever.studies.parameter_consistency import ERRORS, GEOMETRIES
 from hotlever.studies.published_lever.ensemble import CRITERIA, verdict_on
@@ -70,11 +68,6 @@ class Findings(Page):
     claims : list of tuple of str
         Where the paper says what, the verdict, what was found in this run, and the range of that
         over the layouts of the paper's lever, if it depends on the layout.
-
-    Notes
-    -----
-    Braces of a text name what its section found, or numbers of `hotlever.spieser2017`, as
-    ``{paper.SHIFT_NM:.0f}``; these may be parts of an object, as ``{factor.best_k:.2f}``.
     """
 
     def __init__(self, lever: Lever, *, quick: bool = False) -> None:
@@ -90,9 +83,6 @@ class Findings(Page):
         self.claims: list[Claim] = []
         # a curve through so many biases (V) has no visible corners
         self.curve_V = np.linspace(0.1, paper.RAMP[-1], 110)
-        text = files("hotlever") / "report" / "reproduce" / "texts.toml"
-        # captions, paragraphs and claims by name
-        self._texts = tomllib.loads(text.read_text(encoding="utf-8"))
 
     @cached_property
     def air(self) -> Lever:
@@ -103,24 +93,6 @@ class Findings(Page):
     def fitted_example(self) -> Estimate:
         """Option III on the virtual lab's first lever."""
         return fit(example("lever-a.csv"), self.lever.probe)
-
-    def say(self, name: str, /, **numbers: Any) -> None:
-        """Add the paragraph of a name."""
-        self.text(_filled(self._texts["paragraphs"][name], numbers))
-
-    def draw(self, name: str, figure: Figure, /, file: str = "", **numbers: Any) -> None:
-        """Add a figure with the caption of its name, which is that of its file by default."""
-        self.figure(file or name, figure, _filled(self._texts["figures"][name], numbers))
-
-    def tabulate(
-        self, name: str, columns: Sequence[str], rows: Sequence[Sequence[str]], /, **numbers: Any
-    ) -> None:
-        """Add a table with the caption of its name."""
-        self.table(columns, rows, self.caption(name, **numbers))
-
-    def caption(self, name: str, /, **numbers: Any) -> str:
-        """Return the caption of a table of a name."""
-        return _filled(self._texts["tables"][name], numbers)
 
     def columns(
         self, name: str, columns: Mapping[str, tuple[xr.DataArray, str]], /, **numbers: Any
@@ -159,13 +131,8 @@ class Findings(Page):
         self.claims.append((self.linked(text["where"]), *row))
 
     def _claim(self, name: str, numbers: Mapping[str, Any]) -> dict[str, str]:
-        claim = {"holds": "holds", "layouts": "no layout enters", **self._texts["claims"][name]}
-        return {key: _filled(words, numbers) for key, words in claim.items()}
-
-
-def _filled(words: str, numbers: Mapping[str, Any]) -> str:
-    """Return a text with what was found, and what the paper has, in its braces."""
-    return words.format(paper=paper, **numbers)
+        claim = {"holds": "holds", "layouts": "no layout enters", **texts()["claims"][name]}
+        return {key: filled(words, **numbers) for key, words in claim.items()}
 
 
 def example(name: str) -> Measurement:

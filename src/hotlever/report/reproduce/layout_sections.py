@@ -115,7 +115,7 @@ def _tabulate_statements(page: Findings, found: Ensemble) -> None:
             )
         )
     columns = ("where", "printed", "nearest", REFERENCE, _UNCERTAIN, "all layouts", "met by")
-    page.table(columns, rows, page.caption("printed_statements"), prose=True)
+    page.tabulate("printed_statements", columns, rows, prose=True)
 
 
 def _best_like(found: Ensemble, layout: xr.Dataset) -> float:
