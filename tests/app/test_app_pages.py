@@ -6,9 +6,11 @@ import asyncio
 import base64
 import contextlib
 import csv
+import inspect
 import io
 import sys
 from collections.abc import Awaitable, Callable
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +28,6 @@ from hotlever.app.session import Jobs, Session, Task
 from hotlever.app.workers import Report
 from hotlever.errors import BranchEndError, HotleverError
 from hotlever.lever import Lever
-from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.probe import Probe
 
 #: What is asked here is so on any mesh.
@@ -76,6 +77,18 @@ def visit(folder: Path, story: Callable[[User, Session], Awaitable[None]]) -> No
         sys.modules.update(modules)
 
 
+def visited(story: Callable[..., Awaitable[None]]) -> Callable[..., None]:
+    """Make a test of what a user does in the app, who visits it in the folder of the test."""
+
+    @wraps(story)
+    def test(tmp_path: Path, **fixtures: Any) -> None:
+        visit(tmp_path, partial(story, tmp_path=tmp_path, **fixtures))
+
+    _user, _session, *asked = inspect.signature(story).parameters.values()
+    test.__signature__ = inspect.Signature(asked)  # type: ignore[attr-defined]
+    return test
+
+
 async def drop(user: User, name: str, content: bytes, zone: int = 0) -> None:
     """Drop a file in a page."""
     zones = [one for one in user.client.elements.values() if isinstance(one, ui.upload)]
@@ -96,59 +109,55 @@ def drawn(user: User) -> str:
     return base64.b64decode(images[-1].props["src"].partition(",")[2]).decode()
 
 
-def test_every_page_opens_in_an_empty_folder(tmp_path: Path) -> None:
-    async def story(user: User, session: Session) -> None:
-        for address, words in {
-            "/": "Try it",
-            "/lever": "heater (low-doped)",
-            "/raman": "Measure",
-            "/measurements": "Try the example",
-        }.items():
-            await user.open(address)
-            if address != "/lever":
-                await user.should_see(words)
-            assert text_of(user, "role=alert").strip() == ""
-
-    visit(tmp_path, story)
+@visited
+async def test_every_page_opens_in_an_empty_folder(user, session, tmp_path):
+    for address, words in {
+        "/": "Try it",
+        "/lever": "heater (low-doped)",
+        "/raman": "Measure",
+        "/measurements": "Try the example",
+    }.items():
+        await user.open(address)
+        if address != "/lever":
+            await user.should_see(words)
+        assert text_of(user, "role=alert").strip() == ""
 
 
-def test_simulate_shows_the_numbers_of_the_sweep(tmp_path: Path, run: Run) -> None:
+@visited
+async def test_simulate_shows_the_numbers_of_the_sweep(user, session, tmp_path, run):
     _, out, _ = run("sweep", "--bias", "8:8:1", "--set", "n_d=5e17")
     row = next(csv.DictReader(out.splitlines()))
 
-    async def story(user: User, session: Session) -> None:
-        session.chosen["simulate"] = {
-            "probe": "",
-            "changes": {"n_d": 5e17},
-            "bias": 8.0,
-            "most": 12.0,
-        }
-        session.reduced["", ()] = False  # it is not what is tested, and takes long
-        await user.open("/simulate")
-        await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
-        for key, form in (("tip_K", "{:.1f} K"), ("current_mA", "{:.4f} mA")):
-            assert text_of(user, f"data-number={key}") == form.format(float(row[key]))
-        answer = await session.ask(
-            "full",
-            live.answer,
-            Task("sweep", (), {"set": ["n_d=5e17"]}),
-            *(8.0, 12.0, False),
-        )
-        for key in ("tip_K", "current_mA", "lever_V", "reader_V", "power_mW"):
-            assert f"{answer['now'][key]:.10g}" == row[key]
-        line = "hotlever sweep --bias 0:12:49 --set n_d=5e+17 -o reference.sweep.csv"
-        await user.should_see(line)
-        fields = {one.props.get("label"): one for one in user.client.elements.values()}
-        fields["A table of states"].set_value("resistance")
-        fields["Set points"].set_value("2.9kohm")
-        line = "hotlever sweep --hold-resistance 2.9kohm --set n_d=5e+17 -o reference.sweep.csv"
-        await user.should_see(line)
-        await user.should_see('hold(lever, "resistance", [2900.0]).data  # ohm')
-
-    visit(tmp_path, story)
+    session.chosen["simulate"] = {
+        "probe": "",
+        "changes": {"n_d": 5e17},
+        "bias": 8.0,
+        "most": 12.0,
+    }
+    session.reduced["", ()] = False  # it is not what is tested, and takes long
+    await user.open("/simulate")
+    await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
+    for key, form in (("tip_K", "{:.1f} K"), ("current_mA", "{:.4f} mA")):
+        assert text_of(user, f"data-number={key}") == form.format(float(row[key]))
+    answer = await session.ask(
+        "full",
+        live.answer,
+        Task("sweep", (), {"set": ["n_d=5e17"]}),
+        *(8.0, 12.0, False),
+    )
+    for key in ("tip_K", "current_mA", "lever_V", "reader_V", "power_mW"):
+        assert f"{answer['now'][key]:.10g}" == row[key]
+    line = "hotlever sweep --bias 0:12:49 --set n_d=5e+17 -o reference.sweep.csv"
+    await user.should_see(line)
+    fields = {one.props.get("label"): one for one in user.client.elements.values()}
+    fields["A table of states"].set_value("resistance")
+    fields["Set points"].set_value("2.9kohm")
+    line = "hotlever sweep --hold-resistance 2.9kohm --set n_d=5e+17 -o reference.sweep.csv"
+    await user.should_see(line)
+    await user.should_see('hold(lever, "resistance", [2900.0]).data  # ohm')
 
 
-def test_simulate_goes_as_far_as_the_lever(tmp_path: Path) -> None:
+def test_simulate_goes_as_far_as_the_lever(tmp_path):
     """Beyond the slider's end too, where only the curves shown at first ended."""
     resistance, here = 8000.0, Here()
     task = Task("sweep", (), {"set": [f"series_resistance_ohm={resistance}"]})
@@ -160,9 +169,7 @@ def test_simulate_goes_as_far_as_the_lever(tmp_path: Path) -> None:
         live.answer(here, REFERENCE, 14.0, 12.0, quick=False)
 
 
-def test_where_the_reduced_lever_ends_another_answers(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse: Lever, reduced: ReducedLever
-) -> None:
+def test_where_the_reduced_lever_ends_another_answers(tmp_path, monkeypatch, coarse, reduced):
     monkeypatch.setattr(live, "_reduced", lambda probe: (coarse, reduced))
     live._quick.cache_clear()
     for bias, model in ((8.0, "reduced lever"), (13.0, "coarse lever")):
@@ -172,27 +179,25 @@ def test_where_the_reduced_lever_ends_another_answers(
     live._quick.cache_clear()
 
 
-def test_numbers_of_another_bias_are_not_shown(tmp_path: Path) -> None:
-    async def story(user: User, session: Session) -> None:
-        session.chosen["simulate"] = {"probe": "", "changes": {}, "bias": 8.0, "most": 12.0}
-        session.reduced["", ()] = False
-        await user.open("/simulate")
-        await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
-        assert "K" in text_of(user, "data-number=tip_K")
-        number = named(user, "Bias V_b", ui.number)
-        number.set_value(14.0)
-        await until(lambda: "silicon melts" in text_of(user, "role=alert"))
-        for key in ("tip_K", "current_mA", "lever_V", "power_mW", "reader_V", "knee"):
-            assert text_of(user, f"data-number={key}") == "–"
-        assert "full lever" not in text_of(user, "aria-live=polite")
-        number.set_value(13.0)
-        await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
-        assert "silicon melts" not in text_of(user, "role=alert")
-
-    visit(tmp_path, story)
+@visited
+async def test_numbers_of_another_bias_are_not_shown(user, session, tmp_path):
+    session.chosen["simulate"] = {"probe": "", "changes": {}, "bias": 8.0, "most": 12.0}
+    session.reduced["", ()] = False
+    await user.open("/simulate")
+    await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
+    assert "K" in text_of(user, "data-number=tip_K")
+    number = named(user, "Bias V_b", ui.number)
+    number.set_value(14.0)
+    await until(lambda: "silicon melts" in text_of(user, "role=alert"))
+    for key in ("tip_K", "current_mA", "lever_V", "power_mW", "reader_V", "knee"):
+        assert text_of(user, f"data-number={key}") == "–"
+    assert "full lever" not in text_of(user, "aria-live=polite")
+    number.set_value(13.0)
+    await until(lambda: "full lever" in text_of(user, "aria-live=polite"))
+    assert "silicon melts" not in text_of(user, "role=alert")
 
 
-def test_a_lever_that_moves_shows_nearly_what_it_shows_at_rest(tmp_path: Path) -> None:
+def test_a_lever_that_moves_shows_nearly_what_it_shows_at_rest(tmp_path):
     task = Task("sweep", (), {"set": ["n_d=5e17"]})
     coarse, full = (live.answer(Here(), task, 8.0, 12.0, quick) for quick in (True, False))
     assert coarse["model"] == "coarse lever"
@@ -213,7 +218,7 @@ def test_a_lever_that_moves_shows_nearly_what_it_shows_at_rest(tmp_path: Path) -
     assert full["now"]["line"].max() == pytest.approx(full["now"]["hottest_K"], abs=2.0)
 
 
-def test_commands_run_in_processes_that_can_be_ended(tmp_path: Path) -> None:
+def test_commands_run_in_processes_that_can_be_ended(tmp_path):
     (tmp_path / "lever-a.csv").write_bytes((EXAMPLES / "lever-a.csv").read_bytes())
 
     async def story() -> None:
@@ -253,5 +258,5 @@ def test_commands_run_in_processes_that_can_be_ended(tmp_path: Path) -> None:
     asyncio.run(story())
 
 
-def test_a_command_is_shown_as_a_shell_takes_it() -> None:
+def test_a_command_is_shown_as_a_shell_takes_it():
     assert Task("fit", ("my data.csv",)).line == "hotlever fit 'my data.csv'"

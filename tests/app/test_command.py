@@ -20,7 +20,7 @@ Run = Callable[..., tuple[int, str, str]]
         (["--no-brwser"], "No such option"),
     ],
 )
-def test_it_says_why_it_does_not_start(run: Run, arguments: list[str], message: str) -> None:
+def test_it_says_why_it_does_not_start(run, arguments, message):
     with open("file", "w"):
         pass
     status, out, err = run("app", *arguments)
@@ -29,7 +29,7 @@ def test_it_says_why_it_does_not_start(run: Run, arguments: list[str], message: 
     assert len(err.splitlines()) == 1
 
 
-def test_a_port_that_is_taken_is_a_line(run: Run) -> None:
+def test_a_port_that_is_taken_is_a_line(run):
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         listener.listen()

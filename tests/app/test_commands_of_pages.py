@@ -53,7 +53,7 @@ TASKS: list[tuple[Task, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize(("task", "expected"), TASKS, ids=lambda one: getattr(one, "line", ""))
-def test_a_command_is_called_with_what_a_page_chose(task: Task, expected: dict[str, Any]) -> None:
+def test_a_command_is_called_with_what_a_page_chose(task, expected):
     assert shlex.split(task.line) == ["hotlever", *task.words]
     arguments = arguments_of(task.words)
     left_out = {"probe show": (), "fit": ("a.csv",), "raman": ("a",), "spectrum": ("--bias", "0")}
@@ -62,7 +62,7 @@ def test_a_command_is_called_with_what_a_page_chose(task: Task, expected: dict[s
     assert {**told, **{name: arguments[name] for name in expected}} == expected
 
 
-def test_a_value_that_is_none_of_its_option_is_refused_as_on_the_command_line() -> None:
+def test_a_value_that_is_none_of_its_option_is_refused_as_on_the_command_line():
     task = Task("pulse", (), {"pulse": "10V,5us", "period": "20us", "count": "5.5"})
     with pytest.raises(InputError, match="'--count': Input should be a valid integer"):
         arguments_of(task.words)

@@ -89,9 +89,7 @@ def button(page: Page, name: str) -> Any:
     return page.get_by_role("button", name=name, exact=True).last
 
 
-def test_from_the_shipped_measurement_to_a_table_in_five_clicks(
-    app: App, page: Page, folder: Path
-) -> None:
+def test_from_the_shipped_measurement_to_a_table_in_five_clicks(app, page, folder):
     picture(page, "start")
     drop(page, EXAMPLES / "lever-a.csv")  # 1: press +, and choose
     page.wait_for_url("**/measurements")
@@ -147,9 +145,7 @@ def test_from_the_shipped_measurement_to_a_table_in_five_clicks(
         assert ours["parameters"][name]["value"] == near_to
 
 
-def test_work_survives_a_reload_is_cancelled_and_may_die(
-    app: App, page: Page, folder: Path
-) -> None:
+def test_work_survives_a_reload_is_cancelled_and_may_die(app, page, folder):
     go(page, app, "measurements")
     stand_still(page, 1000.0)
     page.get_by_role("button", name="Fit", exact=True).first.click()
@@ -196,9 +192,7 @@ def _is_worker(pid: int) -> bool:
     return b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
 
 
-def test_a_drawing_becomes_a_lever_that_sliders_and_pulses_move(
-    app: App, page: Page, folder: Path
-) -> None:
+def test_a_drawing_becomes_a_lever_that_sliders_and_pulses_move(app, page, folder):
     go(page, app, "lever")
     drop(page, EXAMPLES / "reference-probe.gds")
     expect(page.get_by_text("What the drawing holds")).to_be_visible(timeout=_WORK)
@@ -237,7 +231,7 @@ def test_a_drawing_becomes_a_lever_that_sliders_and_pulses_move(
     expect(page.locator("img[alt^='Impedance']")).to_be_visible(timeout=_WORK)
 
 
-def test_raman_spectra_become_temperatures(app: App, page: Page, folder: Path) -> None:
+def test_raman_spectra_become_temperatures(app, page, folder):
     go(page, app, "raman")
     page.get_by_text("Try the example").click()
     expect(page.get_by_text("hot-plate: 7 files")).to_be_visible()
@@ -259,7 +253,7 @@ def test_raman_spectra_become_temperatures(app: App, page: Page, folder: Path) -
     picture(page, "raman")
 
 
-def test_many_levers_fill_a_table(app: App, page: Page) -> None:
+def test_many_levers_fill_a_table(app, page):
     go(page, app, "measurements")
     drop(page, EXAMPLES / "lever-b.csv")
     expect(page.get_by_text("lever-b.csv").first).to_be_visible()
@@ -272,7 +266,7 @@ def test_many_levers_fill_a_table(app: App, page: Page) -> None:
     picture(page, "many-levers")
 
 
-def test_bad_files_in_every_page_are_a_line(app: App, page: Page, folder: Path) -> None:
+def test_bad_files_in_every_page_are_a_line(app, page, folder):
     # others are tried without a browser; negative currents are a measurement, which is refused
     # when it is fitted
     files = [

@@ -34,9 +34,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[App, Page
 
 
 @pytest.mark.parametrize("address", PAGES, ids=lambda address: address or "start")
-def test_nothing_is_hidden_faint_nameless_or_out_of_reach(
-    opened: tuple[App, Page], address: str
-) -> None:
+def test_nothing_is_hidden_faint_nameless_or_out_of_reach(opened, address):
     app, page = opened
     seen = look(page, app, address, SCREENSHOTS)
     assert seen.faults == []
@@ -44,7 +42,7 @@ def test_nothing_is_hidden_faint_nameless_or_out_of_reach(
     assert seen.lowest("text") >= 4.5
 
 
-def test_what_is_wrong_is_noticed(opened: tuple[App, Page]) -> None:
+def test_what_is_wrong_is_noticed(opened):
     """A text that is faint, one that is cut off, a box without a name, one beyond the window."""
     app, page = opened
     bad = """() => document.body.insertAdjacentHTML('beforeend',
@@ -64,9 +62,7 @@ def test_what_is_wrong_is_noticed(opened: tuple[App, Page]) -> None:
         assert fault in faults
 
 
-def test_on_a_phone_what_is_measured_is_drawn_before_what_is_asked(
-    opened: tuple[App, Page],
-) -> None:
+def test_on_a_phone_what_is_measured_is_drawn_before_what_is_asked(opened):
     app, page = opened
     page.set_viewport_size({"width": 390, "height": 844})
     go(page, app, "measurements")

@@ -14,7 +14,7 @@ import pytest
 from elements import all_of, named, of, press, tell_columns, texts
 from nicegui import ui
 from nicegui.testing import User
-from test_app_pages import Here, drop, text_of, until, visit
+from test_app_pages import Here, drop, text_of, until, visit, visited
 from test_pages_at_work import at_once, understood
 
 from hotlever.app import showing
@@ -40,38 +40,38 @@ def in_time() -> str:
     return "t (us),I_h (mA)\n" + "".join(f"{0.1 * n},{1.28 - 0.01 * n:.3f}\n" for n in range(20))
 
 
-def test_a_dropped_measurement_is_understood_and_what_is_asked_follows(tmp_path: Path) -> None:
-    async def story(user: User, session: Session) -> None:
-        session.chosen["measurements"] = dict(FIT)
-        await user.open("/measurements")
-        await drop(user, "mine.csv", LEVER_A)
-        await user.should_see("What was understood", retries=50)
-        await user.should_see("hotlever fit mine.csv -o mine.fit.json")
-        user.find("tip T_tip").click()
-        await user.should_see("hotlever fit mine.csv --observables current,reader -o mine.fit.json")
-        reader = next(one for one in all_of(user, ui.select) if one.value == "V_r")
-        reader.set_value("")
-        await user.should_see("--column 'unused=V_r", retries=50)
-        # both that are dropped are asked together, into a folder of their own
-        (tmp_path / "fits").mkdir()
-        await drop(user, "b.csv", (EXAMPLES / "lever-b.csv").read_bytes())
-        await until(lambda: of(user, ui.select, "Measurements").value == ["b.csv"])
-        of(user, ui.select, "Measurements").set_value(["mine.csv", "b.csv"])
-        await until(lambda: "Fit all" in [one.text for one in all_of(user, ui.button)])
-        await user.should_see("fits-2-report -o fits-2", retries=50)
-
-    visit(tmp_path, story)
+@visited
+async def test_a_dropped_measurement_is_understood_and_what_is_asked_follows(
+    user, session, tmp_path
+):
+    session.chosen["measurements"] = dict(FIT)
+    await user.open("/measurements")
+    await drop(user, "mine.csv", LEVER_A)
+    await user.should_see("What was understood", retries=50)
+    await user.should_see("hotlever fit mine.csv -o mine.fit.json")
+    user.find("tip T_tip").click()
+    await user.should_see("hotlever fit mine.csv --observables current,reader -o mine.fit.json")
+    reader = next(one for one in all_of(user, ui.select) if one.value == "V_r")
+    reader.set_value("")
+    await user.should_see("--column 'unused=V_r", retries=50)
+    # both that are dropped are asked together, into a folder of their own
+    (tmp_path / "fits").mkdir()
+    await drop(user, "b.csv", (EXAMPLES / "lever-b.csv").read_bytes())
+    await until(lambda: of(user, ui.select, "Measurements").value == ["b.csv"])
+    of(user, ui.select, "Measurements").set_value(["mine.csv", "b.csv"])
+    await until(lambda: "Fit all" in [one.text for one in all_of(user, ui.button)])
+    await user.should_see("fits-2-report -o fits-2", retries=50)
 
 
 @pytest.mark.parametrize("medium", MEDIA)
-def test_every_medium_of_the_page_can_be_asked(tmp_path: Path, medium: str) -> None:
+def test_every_medium_of_the_page_can_be_asked(tmp_path, medium):
     (tmp_path / "mine.csv").write_bytes(LEVER_A)
     with contextlib.chdir(tmp_path):
         found = showing.understood(Here(), "mine.csv", {"medium": medium})
     assert found["observables"] == ["current", "reader", "tip"]
 
 
-def test_the_circuit_that_a_file_states_counts_in_what_was_understood(tmp_path: Path) -> None:
+def test_the_circuit_that_a_file_states_counts_in_what_was_understood(tmp_path):
     """Its lever voltage was drawn from -9 to -0.5 V, with the series resistance of the probe."""
     text = LEVER_A.decode().replace("R_s (kOhm): 5.6", "R_s (kOhm): 0.82")
     (tmp_path / "mine.csv").write_text(text)
@@ -87,35 +87,36 @@ def test_the_circuit_that_a_file_states_counts_in_what_was_understood(tmp_path: 
     )
 
 
-def test_columns_and_pulses_belong_to_the_file_that_they_were_told_for(tmp_path: Path) -> None:
+@visited
+async def test_columns_and_pulses_belong_to_the_file_that_they_were_told_for(
+    user, session, tmp_path
+):
     (tmp_path / "timed.csv").write_text(in_time())
 
-    async def story(user: User, session: Session) -> None:
-        session.chosen["measurements"] = {**FIT, "free": "n_d, a0"}
-        await user.open("/measurements")
-        await drop(user, "odd.csv", rows("a", "b").encode())
-        await until(lambda: bool(text_of(user, "role=alert").strip()))
-        await tell_columns(user)
-        words = "odd.csv --column 'V_b (V)=a' --column 'I_h (mA)=b' --free n_d,a0 -o odd.fit.json"
-        await user.should_see(f"hotlever fit {words}", retries=50)
-        # the next file is another, and of another pulse
-        await drop(user, "plain.csv", rows("V_b (V)", "I_h (mA)").encode())
-        await user.should_see("hotlever fit plain.csv --free n_d,a0 -o plain.fit.json", retries=50)
-        assert not text_of(user, "role=alert").strip()
-        assert named(user, "Column a is") is None
-        of(user, ui.select, "Measurements").set_value(["timed.csv"])
-        await user.should_see("--pulse 10V,5us", retries=50)  # what is missing, and how to say it
-        user.find("Pulse of a file in time (10V,20us)").type("9V, 5us")
-        words = "fit timed.csv --free n_d,a0 --pulse 9V,5us -o timed.fit.json"
-        await user.should_see(f"hotlever {words}", retries=50)
-        of(user, ui.select, "Measurements").set_value(["odd.csv"])
-        await user.should_see("odd.csv --column 'V_b (V)=a'", retries=50)
-        await until(lambda: named(user, "Column a is").value == "V_b")
-
-    visit(tmp_path, story)
+    session.chosen["measurements"] = {**FIT, "free": "n_d, a0"}
+    await user.open("/measurements")
+    await drop(user, "odd.csv", rows("a", "b").encode())
+    await until(lambda: bool(text_of(user, "role=alert").strip()))
+    await tell_columns(user)
+    words = "odd.csv --column 'V_b (V)=a' --column 'I_h (mA)=b' --free n_d,a0 -o odd.fit.json"
+    await user.should_see(f"hotlever fit {words}", retries=50)
+    # the next file is another, and of another pulse
+    await drop(user, "plain.csv", rows("V_b (V)", "I_h (mA)").encode())
+    await user.should_see("hotlever fit plain.csv --free n_d,a0 -o plain.fit.json", retries=50)
+    assert not text_of(user, "role=alert").strip()
+    assert named(user, "Column a is") is None
+    of(user, ui.select, "Measurements").set_value(["timed.csv"])
+    await user.should_see("--pulse 10V,5us", retries=50)  # what is missing, and how to say it
+    user.find("Pulse of a file in time (10V,20us)").type("9V, 5us")
+    words = "fit timed.csv --free n_d,a0 --pulse 9V,5us -o timed.fit.json"
+    await user.should_see(f"hotlever {words}", retries=50)
+    of(user, ui.select, "Measurements").set_value(["odd.csv"])
+    await user.should_see("odd.csv --column 'V_b (V)=a'", retries=50)
+    await until(lambda: named(user, "Column a is").value == "V_b")
 
 
-def test_the_group_of_a_tdms_file_is_asked_for_and_kept(tmp_path: Path) -> None:
+@visited
+async def test_the_group_of_a_tdms_file_is_asked_for_and_kept(user, session, tmp_path):
     nptdms = pytest.importorskip("nptdms")
     bias = np.linspace(0.5, 4.0, 8)
     with nptdms.TdmsWriter(tmp_path / "two.tdms") as writer:
@@ -127,25 +128,22 @@ def test_the_group_of_a_tdms_file_is_asked_for_and_kept(tmp_path: Path) -> None:
             ]
         )
 
-    async def story(user: User, session: Session) -> None:
-        session.chosen["measurements"] = dict(FIT)
-        await user.open("/measurements")
-        of(user, ui.select, "Measurements").set_value(["two.tdms"])
-        await user.should_see("2 groups, each a measurement of its own", retries=50)
-        group = of(user, ui.select, "Group of the file")
-        assert group.visible
-        assert group.options == ["lever 1", "lever 2"]
-        group.set_value("lever 2")
-        words = "hotlever fit two.tdms --column 'group=lever 2' -o two.fit.json"
-        await user.should_see(words, retries=50)
-        await user.open("/measurements")
-        await until(lambda: of(user, ui.select, "Group of the file").value == "lever 2")
-        # what is told of a column is told beside it
-        await until(lambda: named(user, "Column I_h (mA) is") is not None)
-        named(user, "Column I_h (mA) is").set_value("")
-        await user.should_see("--column 'group=lever 2' --column 'unused=I_h (mA)'", retries=50)
-
-    visit(tmp_path, story)
+    session.chosen["measurements"] = dict(FIT)
+    await user.open("/measurements")
+    of(user, ui.select, "Measurements").set_value(["two.tdms"])
+    await user.should_see("2 groups, each a measurement of its own", retries=50)
+    group = of(user, ui.select, "Group of the file")
+    assert group.visible
+    assert group.options == ["lever 1", "lever 2"]
+    group.set_value("lever 2")
+    words = "hotlever fit two.tdms --column 'group=lever 2' -o two.fit.json"
+    await user.should_see(words, retries=50)
+    await user.open("/measurements")
+    await until(lambda: of(user, ui.select, "Group of the file").value == "lever 2")
+    # what is told of a column is told beside it
+    await until(lambda: named(user, "Column I_h (mA) is") is not None)
+    named(user, "Column I_h (mA) is").set_value("")
+    await user.should_see("--column 'group=lever 2' --column 'unused=I_h (mA)'", retries=50)
 
 
 def calibrated(folder: Path, stem: str, probe: str = "", reason: str = "") -> Job:
@@ -160,9 +158,10 @@ def calibrated(folder: Path, stem: str, probe: str = "", reason: str = "") -> Jo
     return job
 
 
-def test_a_result_keeps_its_command_line_and_is_marked_when_something_else_is_chosen(
-    tmp_path: Path,
-) -> None:
+@visited
+async def test_a_result_keeps_its_command_line_and_is_marked_when_something_else_is_chosen(
+    user, session, tmp_path
+):
     """The numbers of one lever stood above the command line of another."""
     (tmp_path / "mine.csv").write_bytes(LEVER_A)
     (tmp_path / "other.toml").write_text(Probe.u_shape().to_toml())
@@ -170,73 +169,68 @@ def test_a_result_keeps_its_command_line_and_is_marked_when_something_else_is_ch
     own = "hotlever calibrate mine.csv --table mine.table.csv -o mine.calibration.json"
     job.began = (tmp_path / "mine.csv").stat().st_mtime
 
-    async def story(user: User, session: Session) -> None:
-        session.jobs.add("measurements", job)
-        session.chosen["measurements"] = {"data": ["mine.csv"]}
-        await user.open("/measurements")
-        await until(lambda: "set a bias of" in text_of(user, "data-answer=tip_K"))
-        answer = text_of(user, "data-answer=tip_K")
+    session.jobs.add("measurements", job)
+    session.chosen["measurements"] = {"data": ["mine.csv"]}
+    await user.open("/measurements")
+    await until(lambda: "set a bias of" in text_of(user, "data-answer=tip_K"))
+    answer = text_of(user, "data-answer=tip_K")
 
-        def is_marked() -> bool:
-            return OTHER in texts(user)
+    def is_marked() -> bool:
+        return OTHER in texts(user)
 
-        def origin() -> str:
-            return text_of(user, "data-origin=1")
+    def origin() -> str:
+        return text_of(user, "data-origin=1")
 
-        assert (origin(), is_marked()) == (own, False)
-        for label, value in (("Lever", "other.toml"), ("Medium", "air")):
-            before = of(user, ui.select, label).value
-            of(user, ui.select, label).set_value(value)
-            await until(is_marked)
-            assert (origin(), text_of(user, "data-answer=tip_K")) == (own, answer)
-            await until(lambda: session.jobs.of("measurements") == [job])
-            of(user, ui.select, label).set_value(before)
-            await until(lambda: not is_marked())
-        field = of(user, ui.input, "Known beforehand (n_d=3.3e17±15%)")
-        field.set_value("n_d=±5%")
+    assert (origin(), is_marked()) == (own, False)
+    for label, value in (("Lever", "other.toml"), ("Medium", "air")):
+        before = of(user, ui.select, label).value
+        of(user, ui.select, label).set_value(value)
         await until(is_marked)
-        field.set_value("")
+        assert (origin(), text_of(user, "data-answer=tip_K")) == (own, answer)
+        await until(lambda: session.jobs.of("measurements") == [job])
+        of(user, ui.select, label).set_value(before)
         await until(lambda: not is_marked())
-        # another lever from another page or tab
-        session.choose_lever("other.toml")
-        await until(is_marked)
-        session.choose_lever("")
-        await until(lambda: not is_marked())
-        # what it was made of has changed since
-        (tmp_path / "mine.csv").write_bytes(LEVER_A)
-        job.began -= 60.0
-        of(user, ui.select, "Medium").set_value("air")
-        of(user, ui.select, "Medium").set_value("")
-        await asyncio.sleep(0.3)
-        assert is_marked()
+    field = of(user, ui.input, "Known beforehand (n_d=3.3e17±15%)")
+    field.set_value("n_d=±5%")
+    await until(is_marked)
+    field.set_value("")
+    await until(lambda: not is_marked())
+    # another lever from another page or tab
+    session.choose_lever("other.toml")
+    await until(is_marked)
+    session.choose_lever("")
+    await until(lambda: not is_marked())
+    # what it was made of has changed since
+    (tmp_path / "mine.csv").write_bytes(LEVER_A)
+    job.began -= 60.0
+    of(user, ui.select, "Medium").set_value("air")
+    of(user, ui.select, "Medium").set_value("")
+    await asyncio.sleep(0.3)
+    assert is_marked()
 
-    visit(tmp_path, story)
 
-
-def test_a_result_that_comes_late_goes_to_what_it_was_asked_for(tmp_path: Path) -> None:
+@visited
+async def test_a_result_that_comes_late_goes_to_what_it_was_asked_for(user, session, tmp_path):
     for name in ("mine.csv", "next.csv"):
         (tmp_path / name).write_bytes(LEVER_A)
     job = calibrated(tmp_path, "mine")
     job.standing = "running"
 
-    async def story(user: User, session: Session) -> None:
-        session.jobs.add("measurements", job)
-        session.chosen["measurements"] = {"data": ["mine.csv"]}
-        await user.open("/measurements")
-        of(user, ui.select, "Measurements").set_value(["next.csv"])
-        await user.should_see("hotlever calibrate next.csv", retries=50)
-        job.end("done")
-        await user.should_see("mine.calibration.json is written, of mine.csv", retries=50)
-        await asyncio.sleep(0.3)
-        assert text_of(user, "data-answer=tip_K") == text_of(user, "data-origin=1") == ""
-        of(user, ui.select, "Measurements").set_value(["mine.csv"])
-        await until(lambda: "set a bias of" in text_of(user, "data-answer=tip_K"))
-        assert "mine.csv" in text_of(user, "data-origin=1")
-
-    visit(tmp_path, story)
+    session.jobs.add("measurements", job)
+    session.chosen["measurements"] = {"data": ["mine.csv"]}
+    await user.open("/measurements")
+    of(user, ui.select, "Measurements").set_value(["next.csv"])
+    await user.should_see("hotlever calibrate next.csv", retries=50)
+    job.end("done")
+    await user.should_see("mine.calibration.json is written, of mine.csv", retries=50)
+    await asyncio.sleep(0.3)
+    assert text_of(user, "data-answer=tip_K") == text_of(user, "data-origin=1") == ""
+    of(user, ui.select, "Measurements").set_value(["mine.csv"])
+    await until(lambda: "set a bias of" in text_of(user, "data-answer=tip_K"))
+    assert "mine.csv" in text_of(user, "data-origin=1")
 
 
-def test_a_refused_calibration_of_the_folder_says_nothing_of_what_to_set(tmp_path: Path) -> None:
+def test_a_refused_calibration_of_the_folder_says_nothing_of_what_to_set(tmp_path):
     """It showed 600 K ± 5 K below the line that no such lever shows the data."""
     (tmp_path / "mine.csv").write_bytes(LEVER_A)
     answered: dict[str, str] = {}
@@ -268,21 +262,20 @@ def test_a_refused_calibration_of_the_folder_says_nothing_of_what_to_set(tmp_pat
     assert "±" not in refusal
 
 
-def test_a_chosen_file_that_is_gone_gives_no_other_numbers(tmp_path: Path) -> None:
+@visited
+async def test_a_chosen_file_that_is_gone_gives_no_other_numbers(user, session, tmp_path):
     (tmp_path / "mine.csv").write_bytes(LEVER_A)
 
-    async def story(user: User, session: Session) -> None:
-        session.probe = "gone.toml"
-        session.chosen["measurements"] = {"rests": "fit:gone.json", "data": ["mine.csv"]}
-        await user.open("/measurements")
-        await until(lambda: "gone.toml: no such file" in text_of(user, "role=alert"))
-        assert of(user, ui.select, "Lever").value == "gone.toml"
-        await user.should_see("hotlever calibrate mine.csv --fit gone.json", retries=50)
-
-    visit(tmp_path, story)
+    session.probe = "gone.toml"
+    session.chosen["measurements"] = {"rests": "fit:gone.json", "data": ["mine.csv"]}
+    await user.open("/measurements")
+    await until(lambda: "gone.toml: no such file" in text_of(user, "role=alert"))
+    assert of(user, ui.select, "Lever").value == "gone.toml"
+    await user.should_see("hotlever calibrate mine.csv --fit gone.json", retries=50)
 
 
-def test_the_lever_that_is_chosen_on_one_page_is_that_of_all(tmp_path: Path) -> None:
+@visited
+async def test_the_lever_that_is_chosen_on_one_page_is_that_of_all(user, session, tmp_path):
     (tmp_path / "mine.csv").write_bytes(LEVER_A)
     (tmp_path / "own.toml").write_text(Probe.reference().to_toml())
     lines = {
@@ -292,18 +285,15 @@ def test_the_lever_that_is_chosen_on_one_page_is_that_of_all(tmp_path: Path) -> 
         "/lever": "hotlever probe show own.toml",
     }
 
-    async def story(user: User, session: Session) -> None:
-        session.workers["quick"] = session.workers["full"] = Resting()  # type: ignore[assignment]
-        await user.open("/measurements")
-        await until(lambda: of(user, ui.select, "Measurements").value == ["mine.csv"])
-        of(user, ui.select, "Lever").set_value("own.toml")
-        await user.should_see("hotlever calibrate mine.csv --probe own.toml", retries=50)
-        for address, line in lines.items():
-            await user.open(address)
-            await user.should_see(line, retries=50)
-            assert of(user, ui.select, "Lever").value == "own.toml"
-
-    visit(tmp_path, story)
+    session.workers["quick"] = session.workers["full"] = Resting()  # type: ignore[assignment]
+    await user.open("/measurements")
+    await until(lambda: of(user, ui.select, "Measurements").value == ["mine.csv"])
+    of(user, ui.select, "Lever").set_value("own.toml")
+    await user.should_see("hotlever calibrate mine.csv --probe own.toml", retries=50)
+    for address, line in lines.items():
+        await user.open(address)
+        await user.should_see(line, retries=50)
+        assert of(user, ui.select, "Lever").value == "own.toml"
 
 
 class Resting(Here):
@@ -318,57 +308,55 @@ class Resting(Here):
 # --- measured with a source meter ---------------------------------------------------------------
 
 
-def test_a_lever_is_drawn_while_it_is_measured_and_its_rows_are_taken(tmp_path: Path) -> None:
+@visited
+async def test_a_lever_is_drawn_while_it_is_measured_and_its_rows_are_taken(
+    user, session, tmp_path
+):
     pytest.importorskip("pyvisa")
 
-    async def story(user: User, session: Session) -> None:
-        at_once(session)
-        session.chosen["measure"] = {
-            "source": "twin:3", "bias": "1.5:5.5:4", "settle": "0s", "stay_below": "500K",
-            "reader": "", "compliance": "2mA", "propose": False,
-        }  # fmt: skip
-        await user.open("/measurements")
-        line = (
-            "hotlever measure --source twin:3 --bias 1.5:5.5:4 --settle 0s --stay-below 500K "
-            "--compliance 2mA -o reference-iv.csv"
-        )
-        await user.should_see(line)
-        press(user, "Measure")
-        await until(lambda: of(user, ui.select, "Measurements").value == ["reference-iv.csv"])
-        await user.should_see("Dashed: the limit, 500 K.", retries=50)
-        await user.should_see("4 rows in reference-iv.csv")
-        current, tip = all_of(user, ui.plotly)[:2]
-        (measured,) = current.figure["data"]
-        band, estimate, before, limit = tip.figure["data"]
-        assert len(measured["x"]) == len(before["y"]) == 4
-        assert limit["y"] == [500.0, 500.0]
-        # what was foretold of the last row, and the band by what is known now
-        assert estimate["y"][-1] < before["y"][-1] < 500.0
-        low, high = np.reshape([*band["y"]], (2, -1))
-        assert (low < estimate["y"]).all()
-        assert (high[::-1] > estimate["y"]).all()
-
-    visit(tmp_path, story)
+    at_once(session)
+    session.chosen["measure"] = {
+        "source": "twin:3", "bias": "1.5:5.5:4", "settle": "0s", "stay_below": "500K",
+        "reader": "", "compliance": "2mA", "propose": False,
+    }  # fmt: skip
+    await user.open("/measurements")
+    line = (
+        "hotlever measure --source twin:3 --bias 1.5:5.5:4 --settle 0s --stay-below 500K "
+        "--compliance 2mA -o reference-iv.csv"
+    )
+    await user.should_see(line)
+    press(user, "Measure")
+    await until(lambda: of(user, ui.select, "Measurements").value == ["reference-iv.csv"])
+    await user.should_see("Dashed: the limit, 500 K.", retries=50)
+    await user.should_see("4 rows in reference-iv.csv")
+    current, tip = all_of(user, ui.plotly)[:2]
+    (measured,) = current.figure["data"]
+    band, estimate, before, limit = tip.figure["data"]
+    assert len(measured["x"]) == len(before["y"]) == 4
+    assert limit["y"] == [500.0, 500.0]
+    # what was foretold of the last row, and the band by what is known now
+    assert estimate["y"][-1] < before["y"][-1] < 500.0
+    low, high = np.reshape([*band["y"]], (2, -1))
+    assert (low < estimate["y"]).all()
+    assert (high[::-1] > estimate["y"]).all()
 
 
-def test_a_measurement_is_stopped_and_says_that_its_output_is_off(tmp_path: Path) -> None:
+@visited
+async def test_a_measurement_is_stopped_and_says_that_its_output_is_off(user, session, tmp_path):
     pytest.importorskip("pyvisa")
 
-    async def story(user: User, session: Session) -> None:
-        options = {"source": "twin:3", "bias": "1:4:7", "settle": "600s", "output": "iv.csv"}
-        job = session.jobs.start("measure", Task("measure", (), options))
-        await user.open("/measurements")
-        await until_file(tmp_path / "iv.csv", "source: KEITHLEY")
-        press(user, "Stop")
-        for _ in range(600):
-            if job.standing != "running":
-                break
-            await asyncio.sleep(0.1)
-        assert job.standing == "failed"
-        assert job.message == "iv.csv: 0 rows; stopped by the user, the output is off"
-        await user.should_see(job.message, retries=50)
-
-    visit(tmp_path, story)
+    options = {"source": "twin:3", "bias": "1:4:7", "settle": "600s", "output": "iv.csv"}
+    job = session.jobs.start("measure", Task("measure", (), options))
+    await user.open("/measurements")
+    await until_file(tmp_path / "iv.csv", "source: KEITHLEY")
+    press(user, "Stop")
+    for _ in range(600):
+        if job.standing != "running":
+            break
+        await asyncio.sleep(0.1)
+    assert job.standing == "failed"
+    assert job.message == "iv.csv: 0 rows; stopped by the user, the output is off"
+    await user.should_see(job.message, retries=50)
 
 
 async def until_file(path: Path, text: str) -> None:

@@ -64,7 +64,7 @@ def alert(page: Page, text: str) -> Locator:
     return page.locator(".q-field [role=alert]").filter(has_text=text)
 
 
-def test_own_drawing_of_two_own_materials_to_a_calibrated_curve(tmp_path: Path) -> None:
+def test_own_drawing_of_two_own_materials_to_a_calibrated_curve(tmp_path):
     project, mine = tmp_path / "project", tmp_path / "mine"
     mine.mkdir()
     table = mine / "film.csv"

@@ -13,7 +13,7 @@ from hotlever.errors import InputError
 
 
 @given(st.text(max_size=300))
-def test_names_of_dropped_files_stay_in_the_folder_and_are_no_options(name: str) -> None:
+def test_names_of_dropped_files_stay_in_the_folder_and_are_no_options(name):
     file_name = safe_name(name)
     assert Path(file_name).name == file_name
     assert file_name[0] not in "-. "
@@ -22,7 +22,7 @@ def test_names_of_dropped_files_stay_in_the_folder_and_are_no_options(name: str)
     assert len(file_name) <= 100
 
 
-def test_a_dropped_file_replaces_none_of_the_same_name(tmp_path: Path) -> None:
+def test_a_dropped_file_replaces_none_of_the_same_name(tmp_path):
     project = Project(tmp_path)
     assert project.take("a.csv", b"1") == "a.csv"
     assert project.take("a.csv", b"2") == "a-2.csv"
@@ -32,7 +32,7 @@ def test_a_dropped_file_replaces_none_of_the_same_name(tmp_path: Path) -> None:
     assert project.spectra("tip") == ["b.txt"]
 
 
-def test_what_is_written_has_a_new_name(tmp_path: Path) -> None:
+def test_what_is_written_has_a_new_name(tmp_path):
     project = Project(tmp_path)
     assert project.free("a", ".toml", ".svg") == "a"
     project.write("a.toml", "1")
@@ -43,7 +43,7 @@ def test_what_is_written_has_a_new_name(tmp_path: Path) -> None:
     assert (tmp_path / "a.toml").read_text() == "1"
 
 
-def test_nothing_outside_of_the_folder_is_read_or_written(tmp_path: Path) -> None:
+def test_nothing_outside_of_the_folder_is_read_or_written(tmp_path):
     project = Project(tmp_path / "inner")
     (tmp_path / "secret.csv").write_text("")
     (tmp_path / "inner" / "link.csv").symlink_to(tmp_path / "secret.csv")
@@ -52,12 +52,12 @@ def test_nothing_outside_of_the_folder_is_read_or_written(tmp_path: Path) -> Non
             project.path(name)
 
 
-def test_a_file_that_is_too_large_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_too_large_is_refused(tmp_path):
     with pytest.raises(InputError, match="64 MB"):
         Project(tmp_path).take("a.csv", bytes(LARGEST_FILE + 1))
 
 
-def test_files_are_told_apart_by_what_they_hold(tmp_path: Path) -> None:
+def test_files_are_told_apart_by_what_they_hold(tmp_path):
     (tmp_path / "one.fit.json").write_text('{"correlation": 1}')
     (tmp_path / "fits-2").mkdir()
     (tmp_path / "fits-2" / "b.json").write_text("{}")
@@ -78,7 +78,7 @@ def test_files_are_told_apart_by_what_they_hold(tmp_path: Path) -> None:
     assert project.drawings == ["l.GDS"]
 
 
-def test_a_file_is_no_folder(tmp_path: Path) -> None:
+def test_a_file_is_no_folder(tmp_path):
     (tmp_path / "a").write_text("")
     with pytest.raises(InputError, match="expected a folder"):
         Project(tmp_path / "a")

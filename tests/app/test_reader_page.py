@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 from elements import texts
-from nicegui.testing import User
-from test_app_pages import text_of, until, visit
+from test_app_pages import text_of, until, visited
 
 from hotlever.app import approaching
 from hotlever.app.pages import reader_page as reader
-from hotlever.app.session import Session
 from hotlever.probe import Probe
 
 Run = Callable[..., tuple[int, str, str]]
@@ -23,9 +20,10 @@ pytestmark = pytest.mark.usefixtures("coarse_meshes")
 LONG, BIAS, DISTANCE = "length_um = 120.0", 12.0, 0.9
 
 
-def test_reader_shows_the_numbers_and_notes_of_the_command(
-    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@visited
+async def test_reader_shows_the_numbers_and_notes_of_the_command(
+    user, session, tmp_path, run, monkeypatch
+):
     """They were 1.6 % off in voltage and 2.9 % in resistance, without the note on an extremum."""
     text = Probe.reference().to_toml()
     (tmp_path / "long.toml").write_text(text.replace("length_um = 54.4", LONG, 1))
@@ -40,28 +38,25 @@ def test_reader_shows_the_numbers_and_notes_of_the_command(
     assert f"at a bias of {BIAS:g} V the voltage has an extremum between " in err
     monkeypatch.setattr(reader.ReaderPage, "distances", 4)
 
-    async def story(user: User, session: Session) -> None:
-        session.probe = "long.toml"
-        session.chosen["reader"] = {"distance_um": DISTANCE, "bias": BIAS}
-        await user.open("/reader")
-        await until(lambda: "coarse lever, while" in text_of(user, "aria-live=polite"))
-        coarse = float(text_of(user, "data-number=reader_V").split()[0])
-        await until(lambda: "full lever: the numbers" in text_of(user, "aria-live=polite"))
-        assert text_of(user, "data-number=reader_V") == f"{float(row['reader_V']):.4f} V"
-        assert text_of(user, "data-number=reader_ohm") == f"{float(row['reader_ohm']):.1f} Ω"
-        slope = f"{10.0 * float(row['dlnR_dz_per_um']):.3g}·10⁻⁴/nm"
-        assert text_of(user, "data-number=dlnR_dz_per_um") == slope
-        said = " ".join(texts(user))
-        assert f"at a bias of {BIAS:g} V the voltage has an extremum between " in said
-        assert "it is taken as 1" in said
-        off = f"{100 * (coarse / float(row['reader_V']) - 1):+.1f}"
-        stated = said.partition("coarse lever, here ")[2].partition(" % in voltage")[0]
-        assert float(stated) == pytest.approx(float(off), abs=0.1)
-
-    visit(tmp_path, story)
+    session.probe = "long.toml"
+    session.chosen["reader"] = {"distance_um": DISTANCE, "bias": BIAS}
+    await user.open("/reader")
+    await until(lambda: "coarse lever, while" in text_of(user, "aria-live=polite"))
+    coarse = float(text_of(user, "data-number=reader_V").split()[0])
+    await until(lambda: "full lever: the numbers" in text_of(user, "aria-live=polite"))
+    assert text_of(user, "data-number=reader_V") == f"{float(row['reader_V']):.4f} V"
+    assert text_of(user, "data-number=reader_ohm") == f"{float(row['reader_ohm']):.1f} Ω"
+    slope = f"{10.0 * float(row['dlnR_dz_per_um']):.3g}·10⁻⁴/nm"
+    assert text_of(user, "data-number=dlnR_dz_per_um") == slope
+    said = " ".join(texts(user))
+    assert f"at a bias of {BIAS:g} V the voltage has an extremum between " in said
+    assert "it is taken as 1" in said
+    off = f"{100 * (coarse / float(row['reader_V']) - 1):+.1f}"
+    stated = said.partition("coarse lever, here ")[2].partition(" % in voltage")[0]
+    assert float(stated) == pytest.approx(float(off), abs=0.1)
 
 
-def test_a_tilted_surface_is_asked_for_only_where_it_is_below_the_lever() -> None:
+def test_a_tilted_surface_is_asked_for_only_where_it_is_below_the_lever():
     described = [
         approaching.described(None, "", tilt)["nearest_um"]  # type: ignore[arg-type]
         for tilt in (0.0, 2.0, -2.0)

@@ -1,16 +1,21 @@
-"""Sections on other levers and surroundings: verdicts follow what was computed."""
+"""Sections of the page of the paper: texts say what was found, and verdicts follow from it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from hotlever import figures
 from hotlever.datasets import labelled
 from hotlever.materials import PARAMETERS
+from hotlever.report.reproduce import SECTIONS
 from hotlever.report.reproduce import air_sections as air
 from hotlever.report.reproduce import claim_sections as claims
+from hotlever.report.reproduce import layout_sections as layouts
+from hotlever.report.reproduce import paper_sections as vacuum
 from hotlever.report.reproduce.findings import Extent, Findings
 from hotlever.studies.parameter_consistency import FREE, HELD
+from hotlever.studies.thermoelectric_shift import HEATS, POLARITIES, SIDES
 
 
 @pytest.fixture
@@ -81,3 +86,113 @@ def test_radiation_is_judged_by_all_of_the_lever(page):
     claims.radiation_section(page)
     [claim] = page.claims
     assert claim[2].startswith("does not hold, because 1.1 µW is what the heater's faces")
+
+
+@pytest.mark.parametrize(
+    ("section", "claims"),
+    [
+        (vacuum.parameter_section, 1),
+        (vacuum.operating_points_section, 2),
+        (vacuum.characteristics_section, 3),
+        (vacuum.heater_section, 1),
+        (vacuum.knee_section, 3),
+        (vacuum.balance_section, 0),
+        (air.disc_section, 2),
+    ],
+)
+def test_texts_say_what_their_section_found(coarse, section, claims):
+    page = Findings(coarse)
+    page.heading("Here it is")
+    section(page)
+    assert len(page.claims) == claims
+    captions = [block.get("caption", block.get("text")) for block in page.blocks]
+    texts = [*captions, *(text for claim in page.claims for text in claim)]
+    assert all(texts)
+    assert not any("{" in text for text in texts)
+    assert all(where.startswith('<a href="#here-it-is">') for where, *_ in page.claims)
+
+
+def test_stored_layouts_and_suspects_are_told_without_solving_a_lever(coarse):
+    page = Findings(coarse, quick=True)
+    page.heading("here")
+    layouts.layouts_section(page)
+    layouts.discrepancy_section(page)
+    [claim] = page.claims
+    assert claim[2].startswith("does not hold, because that is less than the 2%")
+    captions = [block.get("caption", block.get("text")) for block in page.blocks]
+    assert all(captions)
+    assert not any("{" in text for text in captions)
+    statements = next(block for block in page.blocks if block.get("prose"))
+    assert {row[2].partition(",")[0] for row in statements["rows"]} == {"met", "off"}
+
+
+def made_up_shift(bias, moved_nm=-100.0):
+    """A shift that is the same at all biases, a tenth of it by Thomson heat."""
+    size = len(bias)
+    shares = moved_nm * np.array([[0.05, 0.05], [0.45, 0.45]])
+    along = np.full((2, size), moved_nm)
+    parts = ("polarity", "bias", "heat", "side")
+    return labelled(
+        {
+            "plain_um": ("bias", np.full(size, 0.1)),
+            "moved_nm": (parts[:2], along),
+            "at_um": (parts[:2], 0.1 + 1e-3 * along * np.array([[1.0], [-1.0]])),
+            "centre_rise_K": (parts[:2], np.full((2, size), 300.0)),
+            "share_nm": (parts, np.broadcast_to(shares, (2, size, 2, 2))),
+            "heat_mW": (parts, np.broadcast_to(0.01 * shares, (2, size, 2, 2))),
+        },
+        (),
+        {"bias": bias, "polarity": list(POLARITIES), "heat": list(HEATS), "side": list(SIDES)},
+    )
+
+
+@pytest.fixture
+def verdicts(coarse, monkeypatch):
+    """Give the verdicts on a lever whose hot spot moves so far."""
+
+    def judge(moved_nm):
+        monkeypatch.setattr(
+            *(claims, "shift_by_heat"),
+            lambda lever, bias: made_up_shift(bias, moved_nm),
+        )
+        strip = labelled({"moved_nm": [-10.0, -5.0, 15.0]}, "tip_K", {"tip_K": [500.0, 800, 900]})
+        monkeypatch.setattr(claims, "self_heated", lambda silicon, tip: strip)
+        page = Findings(coarse)
+        page.heading("here")
+        claims.shift_section(page)
+        return page.claims
+
+    return judge
+
+
+def test_shift_and_direction_are_judged_apart(verdicts):
+    (_, _, size, found, layouts), (_, _, direction, *_) = verdicts(-100.0)
+    assert size == "holds"
+    assert found.startswith("by up to 100 nm")
+    assert layouts.endswith(" nm")
+    assert "along the electrons" in direction
+    # where the strip turns
+    assert "hotter than 825 K" in direction
+    (_, _, size, *_), (_, _, direction, found, _) = verdicts(600.0)
+    assert size.startswith("holds; not for the reference probe, because")
+    assert direction == "does not hold; for the reference probe it holds"
+    assert found == "+600 to +600 nm, of which Thomson heat is +60 nm at most"
+
+
+def test_the_figure_has_both_polarities_and_both_heats():
+    figure = figures.thermoelectric_shift(made_up_shift([4.0, 8.0]), made_up_shift([4.0], 50.0))
+    place, displacement = figure.axes
+    assert len(place.lines) == 4
+    assert [line.get_ydata()[0] for line in displacement.lines][:4] == [-100.0, -90.0, -10.0, 50.0]
+
+
+@pytest.mark.slow
+def test_of_the_reference_probe(coarse):
+    page = Findings(coarse)
+    for heading, section in SECTIONS.items():
+        if heading.startswith("Thermoelectricity"):
+            page.heading(heading)
+            section(page)
+    size, direction, prediction = (verdict for _, _, verdict, *_ in page.claims)
+    assert size == prediction == "holds"
+    assert "along the electrons" in direction

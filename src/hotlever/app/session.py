@@ -326,11 +326,7 @@ class Session:
         return self.workers[name]
 
     async def ask(
-        self,
-        worker: str,
-        function: Callable[..., Any],
-        *arguments: Any,
-        heard: Heard | None = None,
+        self, worker: str, function: Callable[..., Any], *arguments: Any, heard: Heard | None = None
     ) -> Any:
         """Call a function of a `Report` and some arguments in a process.
 

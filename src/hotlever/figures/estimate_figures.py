@@ -47,10 +47,7 @@ if TYPE_CHECKING:
 
 
 def data_and_model(
-    measured: xr.Dataset,
-    model: xr.Dataset,
-    fitted: Sequence[str],
-    band: xr.Dataset | None = None,
+    measured: xr.Dataset, model: xr.Dataset, fitted: Sequence[str], band: xr.Dataset | None = None
 ) -> Figure:
     """Draw measured and modelled observables, and their difference (paper's Figs. 3 and 4).
 

@@ -52,13 +52,7 @@ DISTANCES = {"knee_distance_K": "knee_K", "knee_distance_V": "knee_bias_V"}
 #: Of a lever in air over a surface, see `hotlever.lever.reader`.
 OF_THE_READER = ("dV_dz_V_per_um", "dlnR_dz_per_um", "resolution_nm_per_rtHz")
 #: All that may be made least or greatest, or bounded.
-QUANTITIES = (
-    *OF_THE_KNEE.values(),
-    "time_constant_us",
-    *OF_THE_READER,
-    *OF_THE_KNEE,
-    *DISTANCES,
-)
+QUANTITIES = (*OF_THE_KNEE.values(), "time_constant_us", *OF_THE_READER, *OF_THE_KNEE, *DISTANCES)
 
 
 @dataclass(frozen=True)

@@ -117,8 +117,5 @@ def sheet_emissivities(probe: Probe, temperature_K: ArrayLike) -> xr.Dataset:
             "emissivity": _stated(both, sheet_emissivity(ohm), "1", "emissivity of a sheet"),
         },
         both,
-        {
-            "material": list(sheets),
-            "temperature": _stated("temperature", T, "K", "temperature"),
-        },
+        {"material": list(sheets), "temperature": _stated("temperature", T, "K", "temperature")},
     )

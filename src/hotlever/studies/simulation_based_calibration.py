@@ -38,11 +38,7 @@ from hotlever.materials.silicon import (
     minimos_mobility,
 )
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.priors import (
-    default_priors,
-    draw_values,
-    updated,
-)
+from hotlever.probe.priors import default_priors, draw_values, updated
 from hotlever.probe.tip import Tip
 from hotlever.text import BAND
 from hotlever.types import Array
@@ -112,10 +108,7 @@ class MinimosMaterial(Material):
 
 
 def draw(
-    rng: np.random.Generator,
-    number: int,
-    medium: str,
-    departures: Collection[str] = DEPARTURES,
+    rng: np.random.Generator, number: int, medium: str, departures: Collection[str] = DEPARTURES
 ) -> tuple[Probe, Probe]:
     """Draw a lever from the priors; return its probe, and the one that is known beforehand.
 

@@ -44,11 +44,7 @@ def new_probe(
 
 
 def show_probe(
-    reporter: Reporter,
-    probe: ProbeFile = None,
-    *,
-    plot: Plot = None,
-    mesh: bool = False,
+    reporter: Reporter, probe: ProbeFile = None, *, plot: Plot = None, mesh: bool = False
 ) -> None:
     """Draw and describe a probe.
 
@@ -216,12 +212,7 @@ def propose_probe(
         reporter.note(f"the probe file needs an edit before it can be solved: {fault}")
 
 
-def list_materials(
-    reporter: Reporter,
-    probe: Path | None = None,
-    *,
-    plot: Plot = None,
-) -> None:
+def list_materials(reporter: Reporter, probe: Path | None = None, *, plot: Plot = None) -> None:
     """List kinds of material, or those of a probe: parameters, units, bounds, laws, sources.
 
     Parameters
@@ -239,11 +230,7 @@ def list_materials(
     reporter.give("\n".join([*listing(*chosen[:1]), ""]))
 
 
-def show_cache(
-    reporter: Reporter,
-    *,
-    clear: bool = False,
-) -> None:
+def show_cache(reporter: Reporter, *, clear: bool = False) -> None:
     """Show what is kept on disk to save time: reduced levers, operators of the air, states.
 
     Parameters

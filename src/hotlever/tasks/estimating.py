@@ -183,11 +183,7 @@ def _show_curve(reporter: Reporter, prediction: Prediction) -> None:
 
 
 def _examine(
-    reporter: Reporter,
-    result: Estimate,
-    samples: int | None,
-    profiles: bool,
-    processes: int | None,
+    reporter: Reporter, result: Estimate, samples: int | None, profiles: bool, processes: int | None
 ) -> Uncertainty:
     """Sample the posterior of a fit, and profile its parameters, as is asked."""
     from hotlever.estimate.uncertainty import examine  # brings scipy's statistics along

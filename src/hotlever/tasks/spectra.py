@@ -10,11 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import FIGURE_TYPES, write_text
-from hotlever.tasks.arguments import (
-    Written,
-    at_most_one,
-    refuse,
-)
+from hotlever.tasks.arguments import Written, at_most_one, refuse
 from hotlever.tasks.common_steps import Reporter, draw
 
 if TYPE_CHECKING:
@@ -324,10 +320,7 @@ def set_up(reporter: Reporter, asked: ThermometerOptions) -> Thermometry:
 
 
 def _peak_options(
-    reporter: Reporter,
-    calibration: RamanCalibration | None,
-    shape: Any,
-    resolution: float | None,
+    reporter: Reporter, calibration: RamanCalibration | None, shape: Any, resolution: float | None
 ) -> PeakOptions:
     """As is asked for, else as the calibration was made: both sides must be fitted alike."""
     from hotlever.raman.lineshape import PeakOptions

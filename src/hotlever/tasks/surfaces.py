@@ -55,11 +55,7 @@ def touch(
     bias : START:STOP:COUNT
         In volts, ends included, or a single one; 1:11:25 if neither this nor a wave form is given.
     """
-    from hotlever.lever.contact import (
-        CONTACT_COLUMNS,
-        history_in_contact,
-        sweep_in_contact,
-    )
+    from hotlever.lever.contact import CONTACT_COLUMNS, history_in_contact, sweep_in_contact
 
     drive = history.read()
     if drive is None:
@@ -95,11 +91,7 @@ def touch(
 
 
 def in_contact(
-    reporter: Reporter,
-    probe: Probe,
-    sample: str | None,
-    radius: str | None,
-    interface: str | None,
+    reporter: Reporter, probe: Probe, sample: str | None, radius: str | None, interface: str | None
 ) -> Probe:
     """Return a probe whose tip touches a sample, where told in other ways than its file says.
 

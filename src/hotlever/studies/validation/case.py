@@ -188,11 +188,7 @@ def spreading_resistance(*, radius_um: float, kappa: float) -> float:
 
 
 def surface_share(
-    *,
-    radius_um: float,
-    kappa: float,
-    interface_K_per_W: float,
-    tip_K_per_W: float | None = None,
+    *, radius_um: float, kappa: float, interface_K_per_W: float, tip_K_per_W: float | None = None
 ) -> float:
     """Rise of a sample's surface under a tip over that of the heater.
 

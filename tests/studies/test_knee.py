@@ -1,4 +1,4 @@
-"""What remains of the 50 K at the knee: the suspects one by one."""
+"""The knee of a lever: why it is where it is, what a tip changes, and what remains of the 50 K."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hotlever import Lever, Probe, fit
+from hotlever.errors import ComputationError
 from hotlever.lever.lever import COARSE
 from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.silicon import intrinsic_density
@@ -18,9 +19,12 @@ from hotlever.studies.knee_study import (
     carried_by,
     measured_carriers,
     read_by_the_line,
+    reasons_of_the_knee,
     scattered_at_surfaces,
     steps_at_the_knee,
+    steps_to_the_knee,
     suspect_lever,
+    tip_effects,
 )
 from hotlever.studies.raman_check import paper_check
 from hotlever.studies.simulation_based_calibration import MinimosMaterial
@@ -138,3 +142,39 @@ def test_a_knee_is_read_off_another_row_if_a_current_is_off(coarse):
         current[other] *= 1.0 - steps[f"{way}_current"]
         lever_V = ramp.bias_V.values - coarse.circuit.series_kohm * current
         assert lever_V[other] == pytest.approx(lever_V[row])
+
+
+def test_reasons_for_the_knee_add_up(coarse):
+    reasons = reasons_of_the_knee(coarse)
+    steps = dict(steps_to_the_knee(reasons))
+    assert reasons.inversion_K + sum(steps.values()) == pytest.approx(
+        reasons.knee_K.sel(lever="as it is").item()
+    )
+    assert all(kelvins > 0 for kelvins in steps.values())
+    # the paper: approximately 15 K
+    assert steps["the legs have a resistance"] == pytest.approx(15, abs=3)
+    cold = coarse.with_material(coarse.probe.material.with_(n_d=5e18))
+    with pytest.raises(ComputationError, match=r"as it is.*no knee"):
+        reasons_of_the_knee(cold)
+
+
+ONE = ((0.7, 20.0),)
+
+
+@pytest.mark.usefixtures("coarse_meshes")
+def test_in_vacuum_a_tip_only_conducts_and_a_tipless_fit_takes_it_in():
+    effects = tip_effects(Probe.reference(), ONE)
+    assert effects.moved_K.item() == pytest.approx(0.9, abs=0.2)
+    assert effects.knee_V.item() == pytest.approx(effects.without_V + effects.moved_V.item())
+    for name in ("surface_moved_K", "surface_moved_V", "surface_at_power_K"):
+        assert effects[name].item() == 0.0
+    assert abs(effects.missed_K.item()) < 0.1
+
+
+@pytest.mark.slow
+def test_in_air_its_surface_moves_the_knee_by_less_than_a_kelvin():
+    effects = tip_effects(Probe.reference().in_medium("air"), ONE)
+    assert effects.surface_moved_K.item() == pytest.approx(-0.2, abs=0.1)
+    assert effects.surface_moved_V.item() == pytest.approx(0.7e-3, abs=0.3e-3)
+    assert effects.surface_at_power_K.item() == pytest.approx(-0.6, abs=0.2)
+    assert abs(effects.missed_K.item()) < 0.2
