@@ -10,20 +10,20 @@ from hotlever.datasets import labelled
 from hotlever.lever.lever import COARSE
 from hotlever.probe.priors import THERMOMETER
 from hotlever.studies.knee_study import Suspect, knee_K
-from hotlever.studies.published_lever import layout_numbers
 from hotlever.studies.published_lever.ensemble import (
     ANY,
     CRITERIA,
+    REFERENCE,
     SIZES,
     WEIGHED,
     Ensemble,
     stored_ensemble,
+    stored_layouts,
     verdict_on,
 )
 from hotlever.studies.published_lever.knee_suspects import carried, what_to_measure
-from hotlever.studies.published_lever.layout_search import DRAWN, SearchOptions, Solver, search
-from hotlever.studies.published_lever.layouts import REFERENCE, stored_layouts
 from hotlever.studies.published_lever.statements import MAIN, OPTIONS, SEARCHED
+from published_lever import DRAWN, SearchOptions, Solver, numbers_of, search
 
 #: Dimensions of which derivatives are compared with differences, and the resistor.
 SOME = ("heater_width_um", "gap_um", "thickness_um", "series_resistance_ohm")
@@ -92,7 +92,7 @@ def test_a_search_from_far_away_finds_what_was_stored():
 @pytest.mark.slow
 def test_what_is_stored_of_a_layout_is_what_is_computed():
     name = stored_ensemble().nearest
-    found = layout_numbers.numbers_of(stored_layouts()[name])
+    found = numbers_of(stored_layouts()[name])
     stored = stored_ensemble().numbers.sel(layout=name)
     for key, value in found.items():
         if key in stored:

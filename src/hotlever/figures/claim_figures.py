@@ -15,8 +15,7 @@ from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION
 from hotlever.figures.style import COLOURS, LINES, axis_label, beside, figure, parameter_label
 from hotlever.studies.linear_branch import Regression
 from hotlever.studies.parameter_consistency import largest_deviation
-from hotlever.studies.published_lever.ensemble import ANY, Ensemble
-from hotlever.studies.published_lever.layouts import REFERENCE
+from hotlever.studies.published_lever.ensemble import ANY, REFERENCE, Ensemble
 from hotlever.types import Array
 
 if TYPE_CHECKING:

@@ -15,9 +15,15 @@ from hotlever.probe.priors import THERMOMETER
 from hotlever.probe.probe_parameters import parameter_named
 from hotlever.report.reproduce.findings import Findings
 from hotlever.studies.knee_study import Suspect, compare_suspects
-from hotlever.studies.published_lever.ensemble import SIZES, WEIGHED, Ensemble, stored_ensemble
+from hotlever.studies.published_lever.ensemble import (
+    REFERENCE,
+    SIZES,
+    WEIGHED,
+    Ensemble,
+    stored_ensemble,
+    stored_layouts,
+)
 from hotlever.studies.published_lever.knee_suspects import carried, what_to_measure
-from hotlever.studies.published_lever.layouts import REFERENCE, stored_layouts
 from hotlever.studies.published_lever.statements import SEARCHED
 from hotlever.text import listed
 

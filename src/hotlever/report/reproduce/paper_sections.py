@@ -24,9 +24,8 @@ from hotlever.report.estimate_pages import add_fit
 from hotlever.report.reproduce.findings import Findings, example
 from hotlever.spieser2017 import NOMINAL_DOPING
 from hotlever.studies.knee_study import reasons_of_the_knee, steps_to_the_knee
-from hotlever.studies.published_lever.ensemble import stored_ensemble
-from hotlever.studies.published_lever.layout_numbers import GROUPS, WELL_COVERED_MW
-from hotlever.studies.published_lever.layouts import REFERENCE
+from hotlever.studies.published_lever.ensemble import REFERENCE, stored_ensemble
+from hotlever.studies.published_lever.statements import GROUPS, WELL_COVERED_MW
 from hotlever.studies.raman_check import conclusion, paper_check
 from hotlever.studies.simulation_based_calibration import (
     DEPARTURES,

@@ -23,7 +23,7 @@ from hotlever.materials import PARAMETERS
 from hotlever.materials.departures import DEPARTURES
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import parameter_named
-from hotlever.studies.published_lever.layouts import stored_table
+from hotlever.studies.published_lever.ensemble import stored_table
 from hotlever.studies.published_lever.statements import raman_error
 from hotlever.types import Array
 

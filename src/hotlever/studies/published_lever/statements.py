@@ -173,6 +173,10 @@ HALF_DIGIT = 0.005
 KNEE_READ_K = 25.0
 #: The bias at which the tip is hottest (V).
 LAST_V = float(paper.RAMP[-1])
+#: Power (mW) up to which Eq. 12 has data on the hot branch.
+WELL_COVERED_MW = 3.3
+#: Groups of parameters that are said to be decoupled.
+GROUPS = {"c_kappa": 0, "a0": 1, "a1": 1, "delta": 2, "n_d": 2, "p": 2}
 
 # What is off, in units of what it may be off by, (n,), with derivatives by parameters, (n, p).
 Deviation = tuple[Array, Array]
