@@ -2,18 +2,23 @@
 
 The levers are those of `foreign_levers`, all of whose laws depart from what calibrates them, behind
 an instrument with the noise that is there. Each is measured as `hotlever measure` does, with 25
-rows at most and a limit of 900 K, and calibrated; and by 40 even rows up to the same bias. Counted
-are the tips that were hotter, and compared what is said at the bias at which the tip is at 800 K.
+rows at most and a limit of 900 K, and calibrated; and by 40 even rows up to the same bias, and up
+to where the tip is at the limit, of which nobody could know. Counted are the tips that were hotter,
+and compared what is said at the bias at which the tip is at 800 K.
 
 The ends are those of whole commands that measure a twin, at random moments: Ctrl-C, a kill of the
 command and of the process that supervises, a line that is lost, a file that can grow no more.
 
-    python benchmarks/measuring.py levers [COUNT]     10 if left out
-    python benchmarks/measuring.py ends [COUNT]       50 if left out
+    python benchmarks/measuring.py levers [COUNT] [RESULTS.jsonl]     10 if left out
+    python benchmarks/measuring.py ends [COUNT]                       50 if left out
+
+With a file of results a line for each lever is appended to it, and an interrupted run goes on.
 """
 
 from __future__ import annotations
 
+import json
+import os
 import resource
 import signal
 import subprocess
@@ -37,6 +42,7 @@ from hotlever.instruments.source_meter import Reading
 from hotlever.instruments.twin import RampCurve, TwinBench
 from hotlever.probe import Probe
 from problems import table
+from twins import two_at_a_time
 
 LIMIT_K, AT_K, ROWS, EVEN = 900.0, 800.0, 25, 40
 HOTTEST_K, HIGHEST_V = 1300.0, 13.0
@@ -94,13 +100,14 @@ def measure(number: int) -> dict[str, Any]:
     }
     if not measured.complete:
         return record
-    aim = float(np.interp(AT_K, curve.tip_K, curve.bias_V))
+    aim, at_limit = np.interp((AT_K, LIMIT_K), curve.tip_K, curve.bias_V).tolist()
     last = measured.readings[-1].bias_V
-    even = np.linspace(last / EVEN, last, EVEN)
-    noisy = curve.at_each(even)[0] * (1.0 + NOISE * rng.standard_normal(EVEN))
-    nothing = np.full(EVEN, np.nan)
-    rows = Measurement(even, noisy, nothing, nothing, nothing, medium="vacuum")
-    for name, data in (("ramp", ramp.measurement()), ("even", rows)):
+    ways = {"ramp": ramp.measurement()}
+    for way, end in (("even", last), ("limit", at_limit)):
+        even, nothing = np.linspace(end / EVEN, end, EVEN), np.full(EVEN, np.nan)
+        noisy = curve.at_each(even)[0] * (1.0 + NOISE * rng.standard_normal(EVEN))
+        ways[way] = Measurement(even, noisy, nothing, nothing, nothing, medium="vacuum")
+    for name, data in ways.items():
         try:
             tip, stderr = tip_at(data, probe, aim)
         except HotleverError as error:
@@ -109,36 +116,53 @@ def measure(number: int) -> dict[str, Any]:
     return record
 
 
-def levers(count: int) -> None:
+def levers(count: int, file: Path | None = None) -> None:
     """Measure levers, and say what came of it."""
-    records = []
-    for number in range(count):
-        records.append(measure(number))
-        print(records[-1], file=sys.stderr, flush=True)
-    good = [record for record in records if "even_off_K" in record]
+    records: list[dict[str, Any]] = []
+    if file is not None and file.exists():
+        records = [json.loads(line) for line in file.read_text().splitlines()]
+    done = {record["number"] for record in records}
+    for record in two_at_a_time(measure, [n for n in range(count) if n not in done]):
+        records.append(record)
+        if file is not None:
+            with file.open("a") as lines:
+                lines.write(json.dumps(record) + "\n")
+    report(sorted(records, key=lambda record: record["number"]))
+
+
+def report(records: list[dict[str, Any]]) -> None:
+    """Print what came of all levers."""
+    for record in records:
+        if record["reason"]:
+            print(f"{record['number']}: {record['reason'][:150]}")
+    ways = ("ramp", "even", "limit")
+    good = [record for record in records if "limit_off_K" in record]
     column = {
         name: np.array([record[name] for record in good]) for name in good[0] if name != "reason"
     }
-    rms = {way: float(np.sqrt(np.mean(column[f"{way}_off_K"] ** 2))) for way in ("ramp", "even")}
-    stderr = {way: float(np.median(column[f"{way}_stderr_K"])) for way in rms}
+    rms = [float(np.sqrt(np.mean(column[f"{way}_off_K"] ** 2))) for way in ways]
+    stderr = [float(np.median(column[f"{way}_stderr_K"])) for way in ways]
     hot = np.array([record["hottest_K"] for record in records])
+    rows = np.array([record["rows"] for record in records])
+    quartiles = " / ".join(f"{value:.0f}" for value in np.quantile(hot, (0.05, 0.5, 0.95)))
     table(
         ("quantity", "value", "wanted"),
         [
-            ("levers, ended early", f"{count}, {count - len(good)}", ""),
-            (f"hotter than {LIMIT_K:.0f} K", f"{np.sum(hot > LIMIT_K)} of {count}", "2 of 200"),
+            ("levers, ended early", f"{len(records)}, {len(records) - len(good)}", ""),
+            (f"hotter than {LIMIT_K:.0f} K", f"{np.sum(hot > LIMIT_K)} of {hot.size}", "1 %"),
+            ("hottest tip (K), 5, 50 and 95 % of the levers below", quartiles, ""),
+            ("hottest of all (K)", f"{hot.max():.0f}", ""),
+            ("rows, median and most", f"{np.median(rows):.0f}, {rows.max()}", f"{ROWS}"),
             (
-                "hottest tip (K), median and range",
-                f"{np.median(hot):.0f}, {hot.min():.0f} to {hot.max():.0f}",
-                "",
-            ),
-            ("rows, most", f"{max(record['rows'] for record in records)}", "25"),
-            (
-                "rms error at 800 K, ramp / 40 even rows (K)",
-                f"{rms['ramp']:.1f} / {rms['even']:.1f}",
+                "rms error at 800 K (K): ramp / 40 even rows to its end / 40 to 900 K",
+                " / ".join(f"{value:.1f}" for value in rms),
                 "as with 40",
             ),
-            ("stated error, medians (K)", f"{stderr['ramp']:.1f} / {stderr['even']:.1f}", ""),
+            (
+                "stated error there, medians (K)",
+                " / ".join(f"{value:.1f}" for value in stderr),
+                "",
+            ),
             ("processor seconds a row, median", f"{np.median(column['seconds']):.1f}", "10"),
         ],
     )
@@ -154,16 +178,23 @@ def _prepare(small_files: bool) -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (450, 450))
 
 
-def end(kind: str, twin: TwinBench, folder: Path, rng: np.random.Generator) -> tuple[float, str]:
-    """Measure, and end it; return after how many seconds the output was off, or infinity."""
+def end(
+    kind: str, twin: TwinBench, folder: Path, rng: np.random.Generator
+) -> tuple[float, int, str]:
+    """Measure, and end it.
+
+    Return after how many seconds the output was off, or infinity, how many rows were told, and what
+    was said of the end.
+    """
     output = folder / "iv.csv"
     output.unlink(missing_ok=True)
     words = ["measure", "--source", twin.source, "--settle", "50ms", "-o", str(output)]
     with subprocess.Popen(
         [sys.executable, "-m", "hotlever", *words, "--laws", "paper"],
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
         preexec_fn=partial(_prepare, small_files=kind == "disk"),
     ) as process:
         while not twin.output_on and process.poll() is None:
@@ -187,8 +218,10 @@ def end(kind: str, twin: TwinBench, folder: Path, rng: np.random.Generator) -> t
         with suppress(subprocess.TimeoutExpired):
             process.wait(60)
         process.kill()
-        text = process.stderr.read() if process.stderr else ""
-    return after, text
+        assert process.stdout is not None
+        assert process.stderr is not None
+        told = sum(" tip expected at " in line for line in process.stdout)
+        return after, told, process.stderr.read()
 
 
 def ends(count: int) -> None:
@@ -197,12 +230,12 @@ def ends(count: int) -> None:
     kinds = ("ctrl-c", "kill", "supervisor", "line", "disk")
     curve = RampCurve.of_probe(Probe.reference())
     seconds: dict[str, list[float]] = {kind: [] for kind in kinds}
-    aloud = rows = 0
+    aloud = rows = lost = 0
     with tempfile.TemporaryDirectory() as folder:
         for number in range(count):
             kind = kinds[number % len(kinds)]
             with TwinBench(curve, seed=number) as twin:
-                after, text = end(kind, twin, Path(folder), rng)
+                after, told, text = end(kind, twin, Path(folder), rng)
             seconds[kind].append(after)
             aloud += "MAY STILL BE ON" in text
             # an end that comes before the first row leaves no file
@@ -210,6 +243,7 @@ def ends(count: int) -> None:
             lines = output.read_text().splitlines() if output.exists() else []
             whole = [line.count(",") == 1 for line in lines if line[0] not in "#V"]
             rows += sum(whole)
+            lost += max(told - sum(whole), 0)
             print(number, kind, round(after, 2), len(whole), file=sys.stderr, flush=True)
     table(
         ("end", "times", "output off after (s, largest)", "said aloud"),
@@ -223,11 +257,13 @@ def ends(count: int) -> None:
             for kind, each in seconds.items()
         ],
     )
-    print(f"{rows} whole rows on disk")
+    print(f"{rows} whole rows on disk; {lost} that were told are not there")
 
 
 if __name__ == "__main__":
     words = sys.argv[1:]
-    what = {"levers": (levers, 10), "ends": (ends, 50)}
-    do, usual = what[words[0] if words else "levers"]
-    do(int(words[1]) if len(words) > 1 else usual)
+    number = int(words[1]) if len(words) > 1 else None
+    if words[:1] == ["ends"]:
+        ends(number or 50)
+    else:
+        levers(number or 10, Path(words[2]) if len(words) > 2 else None)

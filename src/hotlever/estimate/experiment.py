@@ -33,6 +33,7 @@ from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import FITTED
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.units import MOST_BIAS
 
 #: Where predictions have the tip temperature.
 TIP = list(FITTED).index("tip")
@@ -244,7 +245,7 @@ class ExperimentAtRest:
     probe alone: correcting the model makes another one. Derivatives are by ``names``, and
     are corrected too if ``first_order``. Where it is known what was measured, as ``measured``, each
     bias stands for the state nearest to that (`hotlever.estimate.surrogate`), otherwise for that
-    of a slow ramp.
+    of a slow ramp. Branches reach to the highest bias, or ``until_it_melts``.
     """
 
     fast: SimilarLevers | ReducedLever
@@ -254,6 +255,7 @@ class ExperimentAtRest:
     first_order: bool = True
     correction: Correction | None = None
     measured: Array | None = None
+    until_it_melts: bool = False
 
     def measuring(
         self, bias: Array, measured: Array | None, distance_um: Array | None = None
@@ -280,6 +282,8 @@ class ExperimentAtRest:
         Similar levers have no bias elsewhere.
         """
         lowest, highest = min(float(self.bias.min()), 0.0), max(float(self.bias.max()), 0.0)
+        if self.until_it_melts:
+            highest = MOST_BIAS
         if not probe.circuit.starts_cold:
             lowest -= 0.05 * (highest - lowest)
         return Reach(probe.circuit, highest, lowest or None)

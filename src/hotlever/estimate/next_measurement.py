@@ -21,13 +21,15 @@ from scipy.optimize import nnls
 from scipy.special import ndtri
 
 from hotlever.datasets import frame_text, labelled
-from hotlever.errors import ComputationError, InputError, unknown_name
+from hotlever.errors import InputError, unknown_name
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP
+from hotlever.estimate.likely_levers import Knowledge, LikelyLevers
 from hotlever.estimate.optimiser import SearchOptions
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.posterior import standard_errors
 from hotlever.estimate.prior_density import Coordinates, PriorDensity
+from hotlever.estimate.search import Solution
 from hotlever.estimate.surrogate import CurveSurrogate, Rows
 from hotlever.estimate.tip_table import budgets_of
 from hotlever.estimate.tip_temperature import error_of_model
@@ -41,7 +43,7 @@ from hotlever.probe.priors import METERS, SCALES, THERMOMETER, Prior, as_known, 
 from hotlever.probe.probe_parameters import dimensions_of
 from hotlever.quantities import FITTED
 from hotlever.spieser2017 import RAMAN_ERROR_K
-from hotlever.text import BAND, aligned
+from hotlever.text import aligned
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS
 
@@ -214,9 +216,8 @@ class LinearisedLever:
     measurement : Measurement or None
     weights : dict of str to ndarray
         See `hotlever.estimate.Estimate`; empty without data.
-    stretch : float
-        Standard deviations of the tip upwards as a multiple of the linearised ones, 1 or more: as
-        far as the calibration has found them to be longer.
+    solved : CurveSurrogate, optional
+        Levers like it, until something melts, if they are at hand.
     """
 
     probe: Probe
@@ -224,7 +225,7 @@ class LinearisedLever:
     priors: dict[str, Prior]
     measurement: Measurement | None
     weights: dict[str, Array]
-    stretch: float = 1.0
+    solved: CurveSurrogate | None = None
 
     @classmethod
     def of_calibration(cls, calibration: Estimate) -> LinearisedLever:
@@ -255,11 +256,19 @@ class LinearisedLever:
             else Prior(use.value, use.spread, False)
             for name, use in calibration.priors.items()
         }
-        hottest = calibration.table.isel(bias=int(np.nanargmax(calibration.table.tip_K)))
-        above = float(hottest.tip_high_K - hottest.tip_K) / (BAND * float(hottest.tip_stderr_K))
         names = calibration.names or FitOptions(priors=priors).of(probe).varied
         priors = {**_usual_scales(calibration.weights), **priors}
-        return cls(probe, names, priors, measurement, calibration.weights, max(above, 1.0))
+        return cls(probe, names, priors, measurement, calibration.weights)
+
+    @classmethod
+    def of_solution(cls, solution: Solution) -> LinearisedLever:
+        """Return the lever that a search came to, on branches that go on until something melts."""
+        problem, residuals = solution.problem, solution.residuals
+        weights = dict(zip(residuals.observables, residuals.data_weights, strict=True))
+        priors, names = {**_usual_scales(weights), **problem.known}, problem.options.varied
+        surrogate = solution.prediction.surrogate
+        assert isinstance(surrogate, CurveSurrogate)
+        return cls(solution.probe, names, priors, problem.measurement, weights, surrogate)
 
     @classmethod
     def of_priors(
@@ -282,6 +291,8 @@ class LinearisedLever:
     @cached_property
     def surrogate(self) -> CurveSurrogate:
         """Levers like it, until something melts."""
+        if self.solved is not None:
+            return self.solved
         names, fast = tuple(self.names), SimilarLevers(Lever(self.probe, COARSE))
         reach = Reach(self.probe.circuit, MOST_BIAS)
         solved = fast.linearised(self.probe, reach, names=names)
@@ -365,45 +376,6 @@ class LinearisedLever:
         observable_values = values[list(FITTED).index(observable)]
         return observable_values - self.probe.circuit.base_temperature_K * (observable == "tip")
 
-    def highest_tip(self, bias: Array, covariance: Array, deviations: float) -> Array:
-        """Return how hot (K) the tip may be at some biases (V); infinite if it may melt.
-
-        That is where it is hottest of all levers that lie so many standard deviations away, by the
-        covariance of the unknowns: so far up the gradient that a lever may have a share of
-        probability beyond it (the design point of the first-order reliability method; Hasofer and
-        Lind, J. Eng. Mech. 100, 111 (1974)). Each such lever is read along its whole branch, so
-        that the knee, a fold and the melting of something count. Where parameters make up for each
-        other along a bent valley it may lie off the valley and be too cold; so no tip is said to
-        stay below what the linearised error says.
-        """
-        count, length = len(self.names), deviations * self.stretch
-        covariance = covariance[:count, :count]
-        tip, slopes = self.tip(bias)
-        slopes = slopes[:, :count]
-        linear = tip + length * standard_errors(slopes, covariance)
-        hottest = [
-            self._hottest(float(each), slope, covariance, length)
-            for each, slope in zip(bias, slopes, strict=True)
-        ]
-        return np.maximum(linear, hottest)
-
-    def _hottest(self, bias: float, gradient: Array, covariance: Array, length: float) -> float:
-        surrogate = self.surrogate.reading(Rows(np.array([bias])))
-
-        def up(gradient: Array) -> Array:
-            """Return the parameters that are so far up a gradient."""
-            step = covariance @ gradient
-            return self.parameters(step * (length / max(float(np.sqrt(gradient @ step)), 1e-300)))
-
-        try:
-            first = up(gradient)
-            values, slopes = surrogate.predict(first)
-            rates = self._coordinates.rates(self._coordinates.point(first))
-            refined_values = surrogate.values_at(up(slopes[TIP, 0] * rates))
-        except ComputationError:
-            return np.inf
-        return max(float(values[TIP, 0]), float(refined_values[TIP, 0]))
-
     def dimensions(self, share: float) -> dict[str, Array]:
         """Return derivatives (q,) of the uncertain dimensions over errors that are a share of each.
 
@@ -433,8 +405,8 @@ class LinearisedLever:
         return self._coordinates.point(self.probe.values(self.names))
 
     @cached_property
-    def information(self) -> Information:
-        """That of priors and data."""
+    def _before(self) -> Array:
+        """Derivatives of what was known beforehand by the unknowns, in standard deviations."""
         prior = PriorDensity.of_priors(self.priors)
         numbers, count = [self.names.index(name) for name in prior.names], len(self.names)
         rows = np.zeros((len(numbers), count + len(SCALES)))
@@ -442,8 +414,13 @@ class LinearisedLever:
         rows[:, numbers] = slopes * self._coordinates.rates(self._point)[numbers]
         low, high = self._coordinates.bounds
         # uniform within its bounds where there is no prior
-        uniform = np.where(rows[:, :count].any(axis=0), 0.0, 12.0 / (high - low) ** 2)
-        information = Information(np.diag(np.append(uniform, np.ones(len(SCALES))))).with_rows(rows)
+        uniform = np.where(rows[:, :count].any(axis=0), 0.0, np.sqrt(12.0) / (high - low))
+        return np.concatenate([rows, np.diag(np.append(uniform, np.ones(len(SCALES))))])
+
+    @cached_property
+    def information(self) -> Information:
+        """That of priors and data."""
+        information = Information(self._before.T @ self._before)
         if self.measurement is None:
             return information
         _, slopes = self.predict(Rows(self.measurement.bias_V, self._measured))
@@ -452,6 +429,34 @@ class LinearisedLever:
             of_data = slopes[list(FITTED).index(name), counts]
             information = information.with_rows(weights[counts, None] * of_data)
         return information
+
+    @cached_property
+    def likely(self) -> LikelyLevers:
+        """Levers drawn from what is known."""
+        return self.likely_after(np.empty((0, len(self.names) + len(SCALES))))
+
+    def likely_after(self, more: Array) -> LikelyLevers:
+        """Return levers drawn from what will be known.
+
+        Parameters
+        ----------
+        more : ndarray, shape (n, q)
+            Derivatives over standard errors of rows that are measured as well by then.
+        """
+        prior, shape = PriorDensity.of_priors(self.priors), (len(FITTED), 0)
+        before = np.concatenate([self._before, more])
+        deviations = np.zeros(len(before))
+        deviations[: len(prior.names)] = prior.deviations(self.probe.values(prior.names))
+        bias, measured = np.empty(0), np.empty(shape)
+        weights, scales = np.zeros(shape), np.zeros((*shape, len(SCALES)))
+        if self.measurement is not None:
+            bias, measured = self.measurement.bias_V, self._measured
+            _, slopes = self.predict(Rows(bias, measured))
+            none = np.zeros(bias.size)
+            weights = np.stack([self.weights.get(name, none) for name in FITTED])[: len(slopes)]
+            measured, scales = measured[: len(slopes)], slopes[..., len(self.names) :]
+        known = Knowledge(before, deviations, bias, measured, weights, scales)
+        return LikelyLevers(self.surrogate, self._coordinates, known)
 
     def noise(self, observable: str, values: Array, share: float | None = None) -> Array:
         """Return the standard errors of rows that show values (observables, n) of an observable.
@@ -607,6 +612,7 @@ def check_names(quantity: str, allowed: Iterable[str]) -> None:
 def plan_next(
     calibration: Estimate | None = None,
     *,
+    known: LinearisedLever | None = None,
     probe: Probe | None = None,
     priors: Mapping[str, Prior | str] | None = None,
     allowed: Mapping[str, int | None] | None = None,
@@ -624,8 +630,10 @@ def plan_next(
     ----------
     calibration : Estimate, optional
         Of what was measured so far, by a probe with priors.
+    known : LinearisedLever, optional
+        In its place, of a lever that is being measured.
     probe : Probe, optional
-        In its place, of a lever that was not measured yet; the reference probe by default.
+        In their place, of a lever that was not measured yet; the reference probe by default.
     priors : mapping of str to Prior or str, optional
         Of that lever, in place of some of the usual ones.
     allowed : mapping of str to int or None, optional
@@ -672,11 +680,9 @@ def plan_next(
     8.25
     """
     check_names(quantity, allowed or ())
-    lever = (
-        LinearisedLever.of_priors(probe or Probe.reference(), priors)
-        if calibration is None
-        else LinearisedLever.of_calibration(calibration)
-    )
+    if calibration is not None:
+        known = LinearisedLever.of_calibration(calibration)
+    lever = known or LinearisedLever.of_priors(probe or Probe.reference(), priors)
     most = _allowed(lever, allowed)
     limit = np.inf if stay_below_K is None else stay_below_K
     if quantity == "knee" and at_K is not None:
@@ -726,20 +732,21 @@ def plan_next(
         at_K,
         stay_below_K,
         float(bias[safe - 1]),
-        _safe_then(lever, bias, safe, after[-1], limit),
+        _safe_then(lever, bias, safe, np.concatenate([each.rows for each in proposed]), limit),
         lever.probe.title,
         notes,
     )
 
 
 def _safe_then(
-    lever: LinearisedLever, bias: Array, safe: int, information: Information, limit_K: float
+    lever: LinearisedLever, bias: Array, safe: int, rows: Array, limit_K: float
 ) -> float:
-    """Return the highest bias (V) that will be safe when so much is known, of which some are now.
+    """Return the highest bias (V) that will be safe after some rows, of which so many are now.
 
     A bias beyond one that is not safe is none either.
     """
-    while safe < bias.size and hottest_tips(lever, bias[[safe]], information)[0] < limit_K:
+    highest = hottest_tips(lever, bias, lever.likely_after(rows))
+    while safe < bias.size and highest[safe] < limit_K:
         safe += 1
     return float(bias[safe - 1])
 
@@ -754,14 +761,14 @@ def _safe_biases(
     InputError
         If none is safe.
     """
-    information = lever.information
+    likely = lever.likely
     if stated is None:
         bias = _usual_biases(lever)
     else:
         bias = np.unique(stated[(stated > 0.0) & (stated <= lever.highest_V)])
     if not bias.size:
         raise InputError(f"biases: expected some above 0 and up to {lever.highest_V:.4g} V")
-    highest = hottest_tips(lever, bias, information)
+    highest = hottest_tips(lever, bias, likely)
     safe = int(np.argmin(np.append(highest < limit_K, False)))
     if not safe:
         reached = f"the tip may reach {highest[0]:.0f} K"
@@ -773,7 +780,7 @@ def _safe_biases(
     low, high = bias[safe - 1 : safe + 1]
     for _ in range(4):
         middle = np.array([(low + high) / 2.0])
-        tip = hottest_tips(lever, middle, information)
+        tip = hottest_tips(lever, middle, likely)
         if tip[0] >= limit_K:
             (high,) = middle
             continue
@@ -783,14 +790,22 @@ def _safe_biases(
     return bias, highest, safe
 
 
-def hottest_tips(lever: LinearisedLever, bias: Array, information: Information) -> Array:
+def hottest_tips(lever: LinearisedLever, bias: Array, likely: LikelyLevers) -> Array:
     """Return the tip temperatures (K) that are not exceeded at some biases (V), for all we know.
 
     They are infinite where something may melt.
+
+    Parameters
+    ----------
+    lever : LinearisedLever
+    bias : ndarray, shape (n,)
+        Up to where the most likely lever has states.
+    likely : LikelyLevers
+        Drawn from what is known of it.
     """
-    deviations, (tip_K, _) = float(ndtri(SURE)), lever.tip(bias)
-    away = lever.highest_tip(bias, information.covariance, deviations) - tip_K
-    highest = tip_K + np.hypot(away, deviations * _error_of_model(lever, bias))
+    (highest,), tip_K = likely.quantiles(bias, np.array([SURE])), lever.tip(bias)[0]
+    away = np.maximum(highest - tip_K, 0.0)
+    highest = tip_K + np.hypot(away, float(ndtri(SURE)) * _error_of_model(lever, bias))
     return np.where(highest < lever.hottest_K, highest, np.inf)
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Self
 
@@ -265,8 +265,8 @@ class CurveSurrogate:
         self._origin = probe.values(names)
         every = parameters_of(probe, anywhere=True)
         scale = np.array([every[name].scale for name in names])
-        self._unit = np.maximum(np.abs(self._origin), 0.1 * scale)
-        self._rates = by_parameter * self._unit
+        self.unit = np.maximum(np.abs(self._origin), 0.1 * scale)
+        self._rates = by_parameter * self.unit
         self._straight = not branch.begins_cold
         if not self._straight:
             powers = self._rates[1:] / branch.values[1:, :, None]
@@ -282,17 +282,28 @@ class CurveSurrogate:
 
     def branch_at(self, parameters: Array) -> Branch:
         """Return the branch for some values of the parameters (p,)."""
-        away = (parameters - self._origin) / self._unit
+        away = self.distance(parameters)
         if self._straight:
             return shifted(self.branch, self._rates @ away, self._slopes @ away)
         return multiplied(self.branch, np.exp(self._rates @ away), self._slopes @ away)
+
+    def distance(self, parameters: Array) -> Array:
+        """Return how far parameters (..., p) are from the probe's, in the units of the rates."""
+        return np.asarray((parameters - self._origin) / self.unit)
+
+    def rates_at(self, u: Array) -> Array:
+        """Return how logarithms of V_l, I_h, V_r and the rise change at some u, (n, 4, p).
+
+        By the distance of each parameter, of a lever that only the swept supply heats.
+        """
+        return np.asarray(spline_through(self.branch.u, self._rates)(u))
 
     def powers(self, u: Array) -> Array:
         """Return with which powers of the parameters V_l, I_h and V_r go at some u, (n, 4, p).
 
         Of a lever that only the swept supply heats; the rise of its tip does not change.
         """
-        return np.asarray(spline_through(self.branch.u, self._rates)(u) * self._origin / self._unit)
+        return self.rates_at(u) * self._origin / self.unit
 
     def predict(self, parameters: Array) -> tuple[Array, Array]:
         """Return the observables (m, n), and their derivatives (m, n, k), by parameters (k,).
@@ -307,9 +318,7 @@ class CurveSurrogate:
         if not self._straight:
             by_parameter = branch.values[:, :, None] * self._rates
         circuit = self.circuit(parameters)
-        prediction = self.rows.differentiated(
-            branch, by_parameter / self._unit, circuit, self.names
-        )
+        prediction = self.rows.differentiated(branch, by_parameter / self.unit, circuit, self.names)
         return self.contact.differentiated(*prediction, parameters)
 
     def values_at(self, parameters: Array) -> Array:
@@ -401,4 +410,4 @@ def multiplied(branch: Branch, factor: Array, growth: Array) -> Branch:
     `growth` is the derivative of the factors' logarithms by u.
     """
     slopes = factor * (branch.value_slopes + branch.values * growth)
-    return replace(branch, values=branch.values * factor, value_slopes=slopes)
+    return branch.showing(branch.values * factor, slopes)

@@ -2,9 +2,9 @@
 
 The paper's procedure is a ramp of the bias with a wait at each. Here each next bias is taken only
 if the lever, as far as it is known by then, has its tip below a limit there with a certainty of
-99 %; what is known is brought up to date by a calibration of the rows so far while the lever
-settles. Where the next bias that is wanted is too hot, the highest that is not is taken, until
-that is hardly above the last.
+99 %; what is known is brought up to date by the rows so far while the lever settles. Where the
+next bias that is wanted is too hot, the highest that is not is taken, until that is hardly above
+the last.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimate import Estimate, calibrate
 from hotlever.estimate.next_measurement import LinearisedLever, hottest_tips, plan_next
+from hotlever.estimate.row_by_row import RowByRow
 from hotlever.instruments.source_meter import Reading
 from hotlever.instruments.supervisor import Supervisor
 from hotlever.measurement import Measurement
@@ -39,15 +39,17 @@ class RampOptions:
     settle_s : float
         Between setting a bias and the reading that counts.
     first_reading_s : float
-        Between setting a bias and a reading by which what is known is brought up to date meanwhile.
+        Between setting a bias and a reading by which what is known is brought up to date meanwhile,
+        if there is more time than that.
     changed : float
-        A reading that differs from that one by a larger share is one to calibrate by anew.
+        A row that differs from that reading by a larger share is one to bring it up to date by
+        anew.
     unknown_rows : int
-        Rows before there is a calibration.
+        Rows from which on they tell something.
     finest : float
         Share of the distance between wanted biases below which a step is not worth a row.
-    halvings : int
-        By which the highest bias that is safe is found between two.
+    between : int
+        Biases among which the highest that is safe is looked for, between the last and the next.
     propose : bool
         Whether biases are those that tell most (`hotlever.estimate.plan_next`) of many.
     proposed_of : int
@@ -60,7 +62,7 @@ class RampOptions:
     changed: float = 2e-3
     unknown_rows: int = 3
     finest: float = 0.05
-    halvings: int = 5
+    between: int = 40
     propose: bool = False
     proposed_of: int = 4
 
@@ -83,8 +85,6 @@ class MeasuredRamp:
     readings : list of Reading
     steps : list of Step
         What was known of each before it was taken.
-    calibration : Estimate or None
-        Of all readings; None where there are too few.
     reason : str
         Why no other bias was taken.
     complete : bool
@@ -93,7 +93,6 @@ class MeasuredRamp:
 
     readings: list[Reading] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
-    calibration: Estimate | None = None
     reason: str = ""
     complete: bool = True
 
@@ -127,9 +126,9 @@ class Ramp:
         self.options = options or RampOptions()
         if not (bias.size and bias[0] > 0.0 and (np.diff(bias) > 0.0).all()):
             raise InputError("measure: expected biases that rise, the first above 0 V")
-        self._probe, self._priors, self._bias = probe, priors, bias
+        self._probe, self._bias = probe, bias
         self._spacing = float(np.diff(bias).mean()) if bias.size > 1 else float(bias[0])
-        self._known = LinearisedLever.of_priors(probe, priors)
+        self._lever = RowByRow(probe, priors)
         self.measured = MeasuredRamp()
 
     def measure(
@@ -156,14 +155,15 @@ class Ramp:
         options, measured = self.options, self.measured
         while (step := self._next_step()) is not None:
             instrument.set_bias(step.bias_V)
-            begin = time.monotonic()
-            wait(min(options.first_reading_s, options.settle_s))
-            first = instrument.read()
-            if not first.at_compliance:
-                self._update(first)
+            begin, first = time.monotonic(), None
+            if options.settle_s > options.first_reading_s:
+                wait(options.first_reading_s)
+                first = instrument.read()
+                if not first.at_compliance:
+                    self._update(first)
             wait(max(options.settle_s - (time.monotonic() - begin), 0.0))
             reading = instrument.read()
-            if first.at_compliance or reading.at_compliance:
+            if reading.at_compliance or (first is not None and first.at_compliance):
                 return self._stopped(
                     f"the source limits the current at {step.bias_V:.4g} V (compliance)",
                     complete=True,
@@ -171,7 +171,7 @@ class Ramp:
             measured.readings.append(reading)
             measured.steps.append(step)
             record(reading, step)
-            if abs(reading.current_mA / first.current_mA - 1.0) > options.changed:
+            if first is None or abs(reading.current_mA / first.current_mA - 1.0) > options.changed:
                 self._update()
             if measured.reason:
                 return measured
@@ -192,26 +192,25 @@ class Ramp:
         )
 
     def _update(self, *more: Reading) -> None:
-        """Calibrate by the rows so far, and more."""
+        """Bring what is known up to date by the rows so far, and more."""
         if len(self.measured.readings) + len(more) < self.options.unknown_rows:
             return
         try:
-            calibration = calibrate(self.measurement(*more), probe=self._probe, priors=self._priors)
+            self._lever.update(self.measurement(*more))
         except (InputError, ComputationError) as error:
-            self._stopped(f"the lever is not one like the probe: {error}")
-            return
-        if not calibration.describes_data:
-            self._stopped(f"the rows are of no lever like the probe: {calibration.reason}")
-            return
-        self.measured.calibration = calibration
-        self._known = LinearisedLever.of_calibration(calibration)
+            self._stopped(f"the rows are of no lever like the probe: {error}")
+
+    @property
+    def known(self) -> LinearisedLever:
+        """What is known of the lever."""
+        return self._lever.known
 
     # --- where to go ------------------------------------------------------------------------------
 
     @property
     def limit_K(self) -> float:
         """What the tip stays below: as stated, and below the lever's first fold."""
-        branch, circuit = self._known.surrogate.branch, self._known.probe.circuit
+        branch, circuit = self.known.surrogate.branch, self.known.probe.circuit
         stated = self.options.stay_below_K
         if stated == "knee":
             stated = branch.knee.tip_K if branch.knee is not None else None
@@ -221,15 +220,13 @@ class Ramp:
         first_K = whole.jumps[0][1] if whole.jumps else whole.last_K
         return min(limit, float(first_K))
 
-    def _tip_limit(self, bias_V: float) -> float:
-        """Return what the tip (K) does not exceed at a bias; infinity where it has no states."""
-        known = self._known
-        if bias_V > known.highest_V:
-            return np.inf
-        return float(hottest_tips(known, np.array([bias_V]), known.information)[0])
-
-    def _is_safe(self, bias_V: float) -> bool:
-        return self._tip_limit(bias_V) < self.limit_K
+    def _tip_limits(self, bias_V: Array) -> Array:
+        """Return the tips (K) that are not exceeded at biases, infinite where nothing is."""
+        known, limits = self.known, np.full(bias_V.size, np.inf)
+        there = bias_V <= known.highest_V
+        if there.any():
+            limits[there] = hottest_tips(known, bias_V[there], known.likely)
+        return limits
 
     def _next_step(self) -> Step | None:
         """Return what to take next; None, with the reason, if nothing."""
@@ -239,15 +236,18 @@ class Ramp:
         if len(self.measured.readings) == self._bias.size:
             self._stopped(f"all {self._bias.size} rows are taken", complete=True)
             return None
-        bias = self._proposed(last_V) if self._proposes else self._wanted(last_V)
+        bias = (
+            self._proposed(last_V) if self.options.propose and self.tells else self._wanted(last_V)
+        )
         if bias is None:
             return None
-        tip, _ = self._known.tip(np.array([bias]))
-        return Step(bias, float(tip[0]), self._tip_limit(bias))
+        at = np.array([bias])
+        return Step(bias, self.known.tip(at)[0].item(), self._tip_limits(at).item())
 
     @property
-    def _proposes(self) -> bool:
-        return self.options.propose and self.measured.calibration is not None
+    def tells(self) -> bool:
+        """Whether there are rows enough to tell something of the lever."""
+        return len(self.measured.readings) >= self.options.unknown_rows
 
     def _wanted(self, last_V: float) -> float | None:
         """Return the next wanted bias (V), or the highest that is safe before it."""
@@ -256,15 +256,11 @@ class Ramp:
         if not above.size:
             self._stopped(f"{last_V:.4g} V is the highest bias that was wanted", complete=True)
             return None
-        wanted = float(above[0])
-        if self._is_safe(wanted):
-            return wanted
-        safe, hot = last_V, wanted
-        for _ in range(self.options.halvings):
-            middle = 0.5 * (safe + hot)
-            safe, hot = (middle, hot) if self._is_safe(middle) else (safe, middle)
-        if safe - last_V >= finest:
-            return safe
+        biases = np.linspace(last_V, float(above[0]), self.options.between + 1)[1:]
+        # a bias beyond one that is not safe is none either
+        safe = np.logical_and.accumulate(self._tip_limits(biases) < self.limit_K)
+        if safe.any() and biases[safe][-1] - last_V >= finest:
+            return float(biases[safe][-1])
         self._stopped(
             f"the tip might be above {self.limit_K:.0f} K beyond {last_V:.4g} V with more than 1 %",
             complete=True,
@@ -273,14 +269,13 @@ class Ramp:
 
     def _proposed(self, last_V: float) -> float | None:
         """Return the bias (V) that tells most of those that are safe."""
-        assert self.measured.calibration is not None
         count = self.options.proposed_of * self._bias.size
         many = np.linspace(self._bias[0], self._bias[-1], count)
         # no step goes farther than to the next wanted bias
         many = many[many <= last_V + self._spacing]
         try:
             plan = plan_next(
-                self.measured.calibration,
+                known=self.known,
                 bias=many,
                 count=1,
                 stay_below_K=self.limit_K,

@@ -137,6 +137,16 @@ def open_line(resource: str, timeout_s: float) -> Line:
     raise InstrumentError(f"{resource}: no instrument answers ({_reason(failure)})")
 
 
+def load_lines() -> None:
+    """Load what opens lines, which takes a second: for who may have to open one at once."""
+    with suppress(Exception):
+        import pyvisa
+
+        for library in ("", "@py"):
+            with suppress(Exception):
+                pyvisa.ResourceManager(library)
+
+
 def _reason(error: Exception | None) -> str:
     return excerpt(" ".join(str(error).split()), 100)
 

@@ -22,7 +22,7 @@ from types import TracebackType
 from typing import Any
 
 from hotlever.errors import HotleverError, InstrumentError, unforeseen_error
-from hotlever.instruments.source_meter import Reading, SourceMeter
+from hotlever.instruments.source_meter import Reading, SourceMeter, load_lines
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,7 @@ class Supervisor:
 
         The measurement may be computing for seconds before it asks it for something again.
         """
+        load_lines()
         wait([self._process.sentinel])
         if not self._is_ending:
             self._is_off = _turned_off(None, self._supply)

@@ -122,6 +122,13 @@ class Branch:
             highest_rise=self.highest_rise[which],
         )
 
+    def showing(self, values: Array, value_slopes: Array) -> Branch:
+        """Return the same states, which show other values, with other derivatives by u."""
+        other = replace(self, values=values, value_slopes=value_slopes)
+        # where something melts follows from the states alone, and is asked of thousands like it
+        other.__dict__["end_u"] = self.end_u
+        return other
+
     def followed_by(self, after: Branch) -> Branch:
         """Return the same with others after them."""
         return Branch(
@@ -561,9 +568,7 @@ def shifted(branch: Branch, changes: Array, slopes: Array) -> Branch:
 
     The slopes are derivatives of the changes by u.
     """
-    return replace(
-        branch, values=branch.values + changes, value_slopes=branch.value_slopes + slopes
-    )
+    return branch.showing(branch.values + changes, branch.value_slopes + slopes)
 
 
 def branch_end(branch: Branch, reading: Reading) -> BranchEndError:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from typer import Option
 
 from hotlever.errors import ComputationError, InputError, counted, excerpt, quoted
@@ -18,7 +19,7 @@ from hotlever.tasks.parsing import check_number, parse_bias, parse_temperature
 from hotlever.units import setting
 
 if TYPE_CHECKING:
-    from hotlever.instruments.ramp import MeasuredRamp, Ramp, Step
+    from hotlever.instruments.ramp import Ramp, Step
     from hotlever.instruments.source_meter import Reading
     from hotlever.probe import Probe
 
@@ -114,7 +115,7 @@ def measure_lever(
                 f"{output}: {rows}; stopped by the user, the output is off"
             ) from None
         file.comment(f"ended: {measured.reason}")
-    reporter.give(_result(output, measured))
+    reporter.give(_result(output, ramp))
     if not measured.complete:
         raise ComputationError(f"{output}: {len(measured.readings)} rows; {measured.reason}")
     if calibration is not None:
@@ -141,8 +142,6 @@ def _instruments(
         raise InputError(f"--source: found {quoted(source)}, expected {TWIN} or {TWIN}:NUMBER")
     if reader not in (None, TWIN):
         raise InputError(f"--reader: found {quoted(reader)} at a twin, expected {TWIN}")
-    import numpy as np
-
     from hotlever.instruments.twin import RampCurve, TwinBench, drawn_from_priors
 
     seed = int(number) if number else secrets.randbelow(10_000)
@@ -170,21 +169,25 @@ def _rows(ramp: Ramp) -> dict[str, Any]:
         "foretold_K": [step.tip_limit_K for step in measured.steps],
         "limit_K": ramp.limit_K,
     }
-    columns = {"band_V": "bias_V", "tip_K": "tip_K", "low_K": "tip_low_K", "high_K": "tip_high_K"}
-    calibration = measured.calibration
+    biases = np.linspace(0.0, max(shown["bias_V"]), 101)[1:]
+    low, tip, high = ramp.known.likely.band(biases)
     return shown | {
-        name: [] if calibration is None else calibration.table[column].values.tolist()
-        for name, column in columns.items()
+        "band_V": biases.tolist(),
+        "tip_K": tip.tolist(),
+        "low_K": low.tolist(),
+        "high_K": high.tolist(),
     }
 
 
-def _result(output: Path, measured: MeasuredRamp) -> str:
+def _result(output: Path, ramp: Ramp) -> str:
     """Return what was measured, in words."""
-    text = f"{len(measured.readings)} rows in {output}: {measured.reason}.\n"
-    if measured.calibration is not None:
-        last = measured.calibration.table.isel(bias=-1)
+    readings = ramp.measured.readings
+    text = f"{len(readings)} rows in {output}: {ramp.measured.reason}.\n"
+    if ramp.tells:
+        last_V = max(reading.bias_V for reading in readings)
+        low, tip, high = ramp.known.likely.band(np.array([last_V]))[:, 0].tolist()
         text += (
-            f"At {float(last.bias_V):.4g} V the tip is at {float(last.tip_K):.0f} K, with 95 % "
-            f"between {float(last.tip_low_K):.0f} and {float(last.tip_high_K):.0f} K.\n"
+            f"At {last_V:.4g} V the tip is at {tip:.0f} K, with 95 % between {low:.0f} and "
+            f"{high:.0f} K.\n"
         )
     return text
