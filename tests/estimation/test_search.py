@@ -232,6 +232,20 @@ def test_a_fold_that_moves_past_a_row_is_no_obstacle():
     assert calibrate(unknown.measurement, probe=unknown.nominal).describes_data
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("coarse_meshes")
+def test_a_lever_that_melts_before_the_last_rows_is_none_of_these_data():
+    """It had their resistance where it ended, and was refused after the search."""
+    unknown = little_known_lever(123, obey=True)
+    found = calibrate(unknown.measurement, probe=unknown.nominal)
+    assert found.describes_data
+    bias = unknown.measurement.bias_V
+    tip, stated = (
+        np.interp(bias, found.table.bias_V, found.table[name]) for name in ("tip_K", "tip_stderr_K")
+    )
+    assert np.all(np.abs(tip - unknown.tip_K(bias)) < 3.0 * stated)
+
+
 def test_a_lever_that_cannot_be_drawn_is_none_to_try(reference_curve):
     """Its heater is longer than the bridge, though as long as heaters may be."""
     residuals, names = Residuals(reference_curve, ("current",)), ["heater_length_um"]

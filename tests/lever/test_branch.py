@@ -123,6 +123,18 @@ def test_a_branch_goes_on_where_it_was(coarse):
     np.testing.assert_allclose(longer.curve(u), whole.curve(u), rtol=1e-4, atol=1e-6)
 
 
+def test_a_branch_goes_on_from_just_before_a_step_of_a_law(coarse):
+    """So that of a lever ends whose base has become a little warmer than that of the one before."""
+    whole = coarse.branch(800.0)
+    step = float(next(u for u in whole.steps if u > 0))
+    before = np.append(whole.u[whole.u < step], np.sqrt(step**2 - 5e-5))
+    roots = solve_at(coarse.equations, before[1:], whole.states(before[1:]), NewtonOptions(1e-5))
+    start = Branch.whole(coarse.equations, before[1:], roots)
+    longer = continued(coarse.equations, lambda branch: branch.u[-1] >= whole.u[-1], start)
+    u = np.linspace(0.0, whole.u[-1], 50)
+    np.testing.assert_allclose(longer.curve(u), whole.curve(u), rtol=1e-4, atol=1e-6)
+
+
 # --- the knee -------------------------------------------------------------------------------------
 
 

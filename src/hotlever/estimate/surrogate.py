@@ -6,8 +6,8 @@ What a lever shows is what is read off its branch at the rows of a measurement, 
 line: a row says that V_l + R_s I_h was the bias. A branch that folds has several such states, or
 none; a slow ramp takes the first. A search must not jump with its candidates from one part of a
 branch to another, so it compares each row with the state nearest to what was measured, and where a
-candidate ends before the bias of a row, with that end as if it went on with the resistance it has
-there. Of a tip in contact, temperatures of the contact follow from that of the tip.
+candidate ends before the bias of a row, with that end, less a percent for each of the bias that is
+beyond it. Of a tip in contact, temperatures of the contact follow from that of the tip.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Rows:
     def states(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return u of the states that the rows are compared with, and how far these fall short.
 
-        By so much, at least one, the values of a state are to be multiplied to reach the bias.
+        That is the bias of a row over that of its state: one, or more where a branch ends before.
 
         Raises
         ------
@@ -75,7 +75,7 @@ class Rows:
     def values(self, branch: Branch, circuit: Circuit) -> Array:
         """Return the observables of the states, (observables, n); see `states`."""
         u, short = self.states(branch, circuit)
-        return observed(circuit, _reaching(branch, u, short))
+        return observed(circuit, _shown(branch, u, short))
 
     def differentiated(
         self, branch: Branch, by_parameter: Array, circuit: Circuit, names: Sequence[str]
@@ -92,9 +92,9 @@ class Rows:
             The parameters.
         """
         u, short = self.states(branch, circuit)
-        outputs = _reaching(branch, u, short)
+        outputs = branch.curve(u).T
         by_state = spline_through(branch.u, by_parameter)(u)
-        of_circuit = np.stack([circuit.bias_by(name, outputs[1] / short) for name in names], axis=1)
+        of_circuit = np.stack([circuit.bias_by(name, outputs[1]) for name in names], axis=1)
         along = branch.curve(u, 1)
         if self.measured is not None:
             self._steepen(along, circuit, u)
@@ -103,10 +103,11 @@ class Rows:
         if ends.size:
             # the end of a branch stays where it is, to first order; what it lacks in bias changes
             bias_by = circuit.bias(by_state[ends, 0], by_state[ends, 1]) + of_circuit[ends]
-            more = (short[ends] / self.bias_V[ends])[:, None] * bias_by
+            less = (short[ends] ** 2 / self.bias_V[ends])[:, None] * bias_by
             slopes[:, ends] = np.moveaxis(by_state[ends], 1, 0)
-            slopes[:TIP_RISE, ends] *= short[ends, None]
-            slopes[:TIP_RISE, ends] -= outputs[:TIP_RISE, ends, None] * more
+            slopes[:TIP_RISE, ends] *= (2.0 - short[ends])[:, None]
+            slopes[:TIP_RISE, ends] += outputs[:TIP_RISE, ends, None] * less
+        outputs = _shown(branch, u, short)
         return observed(circuit, outputs), observed_by(circuit, outputs, slopes, names)
 
     def _nearest(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
@@ -160,10 +161,13 @@ class Rows:
         along[flat, 0] += (np.where(slope < 0, -least, least) - slope)[flat]
 
 
-def _reaching(branch: Branch, u: Array, short: Array) -> Array:
-    """Return V_l, I_h, V_r and the rise of the tip at some u, (4, n), as far as the bias goes."""
+def _shown(branch: Branch, u: Array, short: Array) -> Array:
+    """Return V_l, I_h, V_r and the rise of the tip at some u, (4, n), less where they fall short.
+
+    Each percent of the bias that is beyond an end takes one away.
+    """
     outputs = branch.curve(u).T.copy()
-    outputs[:TIP_RISE] *= short
+    outputs[:TIP_RISE] *= 2.0 - short
     return outputs
 
 

@@ -205,9 +205,20 @@ class NaturalContinuation(Continuation):
         self, equations: LeverEquations, start: Branch | None, options: ContinuationOptions
     ) -> None:
         self._bends = steps_of(equations)
+        if start is not None and self._is_next_to_step(start.u):
+            # two states so close do not tell how it goes on: that at the step takes its place
+            start = start.among(np.arange(start.u.size - 1))
         super().__init__(equations, start, options, options.step_K)
         if self._branch.u[-1] == 0.0:
             self._branch = self._from_cold(self._branch)
+
+    def _is_next_to_step(self, u: Array) -> bool:
+        """Return whether the last state is just before a step of a law.
+
+        So it is where that of a similar lever was at the step, whose base is a little colder.
+        """
+        away = self._bends**2 - u[-1] ** 2
+        return bool(u.size > 1 and np.any((away > 0.0) & (away < self.smallest)))
 
     def _beginning(self) -> Branch:
         return Branch.cold(self._equations, self._equations.cold()[0])
