@@ -207,10 +207,10 @@ class AirSolver:
             return np.asarray(air.spreading @ lost + (more @ t[sites:]) @ modes)
 
         def lost(t: Array) -> Array:
-            return spread(air.rest @ (kappa * t[:sites]), t)
+            return spread(air.rest @ (kappa * t[:sites]).astype(air.rest.dtype), t)
 
         def lost_transposed(t: Array) -> Array:
-            return spread(kappa * (air.rest @ t[:sites]), t)
+            return spread(kappa * (air.rest @ t[:sites].astype(air.rest.dtype)), t)
 
         self._ways = {
             False: _Directions(lambda b: factors.solve(b), lost, sampled),

@@ -78,18 +78,23 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
     if not np.any(row):
         raise ComputationError("without power nothing is held where the source holds the power")
     factors = InCircuit(equations.factorised(x, LEVER), row)
-    constants, changes = _modes(equations, x, factors, count)
+    begin = np.where(equations.space.is_temperature, 1.0, 0.0)
+    times, modes = _modes(equations, x, factors, count, begin)
     if not (air := equations.heat_in_air).size:
-        return constants, changes
+        return times, modes
+    constants, changes = np.empty_like(times), np.empty_like(modes)
     for mode in range(count):
         # what goes along with the lever depends on how fast it goes
         for _ in range(6):  # until the time constant changes by less than 1e-4
-            rate, last = 1.0 / abs(constants[mode]), constants[mode]
+            last = times[mode]
+            rate = 1.0 / abs(last)
             bound = air.bound(rate) if last > 0.0 else air.taken_up(rate) / rate
-            times, modes = _modes(equations, x, factors, count, air.coordinates, bound)
-            constants[mode], changes[:, mode] = times[mode], modes[:, mode]
-            if abs(constants[mode] / last - 1.0) < 1e-4:
+            # those with other air are nearly the same
+            begin = (modes / np.linalg.norm(modes, axis=0)).sum(axis=1)
+            times, modes = _modes(equations, x, factors, count, begin, air.coordinates, bound)
+            if abs(times[mode] / last - 1.0) < 1e-4:
                 break
+        constants[mode], changes[:, mode] = times[mode], modes[:, mode]
     return constants, changes
 
 
@@ -98,10 +103,14 @@ def _modes(
     x: Array,
     factors: InCircuit,
     count: int,
+    begin: Array,
     coordinates: Array | None = None,
     bound: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Return the slowest modes of a lever with a heat capacity (nJ/K) that goes along."""
+    """Return the slowest modes of a lever with a heat capacity (nJ/K) that goes along.
+
+    Their search begins with a change (size + 1,).
+    """
 
     def relaxed(change: Array) -> Array:
         stored = equations.storage_change(x, change.reshape(-1, 1))
@@ -111,9 +120,9 @@ def _modes(
 
     size = len(x)
     operator: Any = LinearOperator((size, size), matvec=relaxed, dtype=float)
-    begin = np.where(equations.space.is_temperature, 1.0, 0.0)
     try:
-        constants, changes = eigs(operator, count, v0=begin, tol=1e-9)
+        # with few directions, since most searches begin next to what they find
+        constants, changes = eigs(operator, count, v0=begin, ncv=2 * count + 1, tol=1e-6)
     except RuntimeError as error:
         raise ComputationError(f"no time constants were found: {error}") from error
     order = np.argsort(-np.abs(constants))
