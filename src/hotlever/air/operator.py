@@ -16,7 +16,9 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
 from scipy.sparse import csr_matrix
 
 from hotlever.air.bodies import BaseLine, chip_panels
@@ -67,7 +69,7 @@ class AirOperator:
         """Return what was stored under the names of the attributes."""
         return cls(**{each.name: arrays[each.name][()] for each in fields(cls)})
 
-    def less(self, diagonal: Array) -> Array:
+    def less(self, diagonal: Array) -> NDArray[np.float32]:
         """Return the matrix less a diagonal one, to seven digits: it is read many times."""
         less = self.matrix.astype(np.float32)
         less[np.diag_indices_from(less)] -= diagonal
@@ -190,86 +192,81 @@ class PanelledAir:
             layer += bodies.layer
         else:
             layer = single_layer_matrix(self.panels, Laplace(), self.mirrors, progress)
-        self._layer = self._outside(layer)
-        self._resistances = jump * self.panels.areas
-        self._layer[np.diag_indices_from(self._layer)] += self._resistances
-        through_tip = self.surface.through_tip
-        on_tip = own[len(own) - len(through_tip) :]
-        areas = self.panels.areas[on_tip]
-        self._layer[np.ix_(on_tip, on_tip)] += through_tip * np.outer(areas, areas)
-        self._moments = csr_matrix(
-            (self.surface.panels.areas, (own, self.surface.site)),
-            shape=(len(self.panels), len(self.surface.sites)),
+        areas, on_tip = self.panels.areas, own[len(own) - len(self.surface.through_tip) :]
+        self._resistances = jump * areas
+        layer[np.diag_indices_from(layer)] += self._resistances
+        at_tip = np.outer(areas[on_tip], areas[on_tip])
+        layer[np.ix_(on_tip, on_tip)] += self.surface.through_tip * at_tip
+        self._layer = layer
+        self._basis = _by_sites(self.surface, areas)
+        self._site_areas = np.bincount(self.surface.site, areas[own])
+
+    def _condensed(self, layer: Numbers) -> tuple[Numbers, Numbers]:
+        """Return the layer between the densities of sites, and the other unknowns by these.
+
+        Of a jump only what flows outside the plate is let through. Where the jumps at both faces
+        differ, the air that fills the plate would conduct from one to the other, by its thickness:
+        so much is left out where one face is compared with the other. That is positive definite
+        still, since a layer between the faces holds at most half the thickness.
+        """
+        own = self._basis.T @ (self._basis.T @ layer).T
+        sites, rest = len(self._site_areas), len(own) - len(self.surface.across)
+        upper = self.surface.across[:, 0]
+        outside = 1.0 - 2.0 * self._over_thickness
+        between_faces = outside * own[rest:, rest:]
+        resistances = 2.0 * (self._resistances / self.panels.areas**2)[upper]
+        between_faces[np.diag_indices_from(between_faces)] += (1.0 - outside) * resistances
+        of_faces = -outside * _solved(between_faces, own[rest:, :rest])
+        own = own[:rest, :rest] + own[:rest, rest:] @ of_faces
+        others = -_solved(own[sites:, sites:], own[sites:, :sites])
+        between_sites = own[:sites, :sites] + own[:sites, sites:] @ others
+        return between_sites, np.vstack(
+            [others, of_faces[:, :sites] + of_faces[:, sites:] @ others]
         )
 
-    def _outside(self, layer: Numbers) -> Numbers:
-        """Return a single layer of which a jump lets through only what flows outside the plate.
-
-        Where the jumps at both faces differ, the air that fills the plate would conduct from one to
-        the other, by its thickness.
-        """
-        if not self._over_thickness:
-            return layer
-        upper, lower = self.surface.across.T
-        between = self._over_thickness * (layer[upper] - layer[lower])
-        outside = layer.copy()
-        outside[upper] -= between
-        outside[lower] += between
-        return outside
-
     @cached_property
-    def _factors(self) -> tuple[Any, Any]:
-        factors: tuple[Any, Any]
-        if self._over_thickness and self.surface.across.size:
-            factors = lu_factor(self._layer)
-            return factors
-        try:
-            factors = cho_factor(self._layer)
-        except LinAlgError as error:
-            raise ComputationError("the air operator of this geometry is not positive") from error
-        return factors
-
-    def _solve(self, right: Array) -> Array:
-        """Return the densities whose layer has some moments."""
-        if self._over_thickness and self.surface.across.size:
-            return np.asarray(lu_solve(self._factors, right))
-        return np.asarray(cho_solve(self._factors, right))
+    def _by_theta(self) -> tuple[Array, Array]:
+        """Densities of sites by θ there, (sites, sites), and the other unknowns by densities."""
+        between_sites, others = self._condensed(self._layer)
+        return _inverse(between_sites) * self._site_areas, others
 
     def densities(self, theta: Array) -> Array:
         """Return the densities (mW/µm²) of the single layer, for θ (mW/µm) at the sites.
 
         Those of both faces together are the heat flux into air.
         """
-        return self._solve(self._moments @ theta)
+        by_theta, others = self._by_theta
+        of_sites = by_theta @ theta
+        return np.asarray(self._basis @ np.concatenate([of_sites, others @ of_sites]))
 
     def operator(self) -> AirOperator:
         """Return the matrix from θ at the sites to heat, and how full of air the lever seems."""
-        flux = self._solve(self._moments.toarray())
-        heat = self._halves * (self._moments.T @ flux)
+        by_theta, others = self._by_theta
+        heat = self._halves * self._site_areas[:, None] * by_theta
+        heat = 0.5 * (heat + heat.T)
         # of a lever of one temperature: θ of the air at the surface as a share of the lever's; the
         # energy of the air inside goes with its square
         own = len(self.surface.panels)
-        shares = self._resistances[:own] / self.panels.areas[:own].sum()
-        whole = flux.sum(axis=1)
-        jumped = shares @ whole[:own]
-        operator = AirOperator(
-            self.surface.sites, 0.5 * (heat + heat.T), float((1.0 - jumped) ** 2), self._gap
-        )
+        per_heat = self._resistances[0] / self.panels.areas[0] / self.panels.areas[:own].sum()
+        per_heat /= self._halves
+        jumped = per_heat * heat.sum()
+        operator = AirOperator(self.surface.sites, heat, float((1.0 - jumped) ** 2), self._gap)
         if math.isnan(self._gap):
             return operator
-        # What tells faces apart acts on the rows alone, those of the moments are the same for both
-        # faces: so the derivative of the layer itself stands between two solutions of one kind.
-        change = self._layer_by_gap()
-        # the largest product of matrices here, of which no more than six digits are asked
-        single = flux.astype(np.float32)
-        more = -self._halves * (single.T @ (change.astype(np.float32) @ single)).astype(float)
-        by_face = np.zeros(len(self.panels))
-        by_face[:own] = shares
-        jumped_more = -self._solve(by_face) @ (change @ whole)
+        # the largest products of matrices here, of which no more than six digits are asked
+        change = self._basis.T @ (self._basis.T @ self._layer_by_gap()).T
+        sites, change = len(heat), change.astype(np.float32)
+        by_theta, others = by_theta.astype(np.float32), others.astype(np.float32)
+        # the change is symmetric: half of what is between the other unknowns on either side
+        half = others.T @ (
+            change[sites:, :sites] + np.float32(0.5) * (change[sites:, sites:] @ others)
+        )
+        between_sites = change[:sites, :sites] + half + half.T
+        more = -self._halves * (by_theta.T @ (between_sites @ by_theta)).astype(float)
         return replace(
             operator,
             matrix_by_gap=0.5 * (more + more.T),
-            filling_by_gap=float(-2.0 * (1.0 - jumped) * jumped_more),
+            filling_by_gap=float(-2.0 * (1.0 - jumped) * per_heat * more.sum()),
         )
 
     def _layer_by_gap(self) -> Array:
@@ -294,12 +291,11 @@ class PanelledAir:
         ndarray, shape (k, m, m)
             µm, symmetric; with what the air would take up that fills the plate.
         """
-        moments = self._moments @ shapes
+        moments = self._site_areas[:, None] * shapes
         heat = []
         for screened in single_layer_matrix(self.panels, Screened(q), self.mirrors):
-            layer = self._layer + self._outside(screened)
-            flux = np.linalg.solve(layer, moments.astype(screened.dtype))
-            heat.append(self._halves * (moments.T @ flux))
+            between_sites, _ = self._condensed(self._layer + screened)
+            heat.append(self._halves * (moments.T @ _solved(between_sites, moments)))
         heats = np.array(heat)
         return np.asarray(0.5 * (heats + heats.swapaxes(1, 2)))
 
@@ -309,6 +305,54 @@ class PanelledAir:
         for mirror in self.mirrors:
             total += mirror.sign * layer_potential(points, self.panels.reflected(mirror), flux)
         return total
+
+
+def _by_sites(surface: LeverSurface, areas: Array) -> csr_matrix:
+    """Return the densities of all panels by other unknowns, of which the first alone heat sites.
+
+    These are a density for each site; then heat that goes from the first panels of a site to
+    another one, and heat of the chip's panels; and last heat from the upper face to the lower one.
+    What gives no heat is eliminated, so that a solution for each site costs what sites do, not what
+    panels do.
+    """
+    panels, site = np.arange(len(areas)), surface.site
+    order = np.argsort(site, kind="stable")
+    first = np.searchsorted(site[order], site[order])
+    place, sum_before = np.arange(len(site)) - first, np.cumsum(areas[order]) - areas[order]
+    sum_before -= sum_before[first]
+    lower = surface.across[:, 1]
+    others = np.setdiff1d(panels, np.append(order[place == 0], lower))
+    unknown = np.empty_like(panels)
+    heated = np.append(others, lower)
+    unknown[heated] = panels[len(panels) - len(heated) :]
+    entries = [(panels[: len(site)], site, np.ones(len(site)))]
+    entries += [(heated, unknown[heated], 1.0 / areas[heated])]
+    for back in range(1, place.max() + 1):
+        here = np.flatnonzero(place >= back)
+        entries += [(order[here - back], unknown[order[here]], -1.0 / sum_before[here])]
+    rows, columns, values = (np.concatenate(each) for each in zip(*entries, strict=True))
+    return csr_matrix((values, (rows, columns)), shape=(len(panels), len(panels)))
+
+
+def _solved(matrix: Numbers, right: Numbers) -> Numbers:
+    """Solve with a symmetric matrix, which is positive definite where it is real."""
+    if np.iscomplexobj(matrix):
+        return np.linalg.solve(matrix, right)
+    return np.asarray(cho_solve(_factors(matrix), right))
+
+
+def _inverse(matrix: Array) -> Array:
+    """Return the inverse of a symmetric positive definite matrix."""
+    inverse, _ = dpotri(*_factors(matrix))
+    return np.asarray(np.tril(inverse) + np.tril(inverse, -1).T)
+
+
+def _factors(matrix: Array) -> tuple[Array, bool]:
+    try:
+        factors: tuple[Array, bool] = cho_factor(matrix, lower=True)
+    except LinAlgError as error:
+        raise ComputationError("the air operator of this geometry is not positive") from error
+    return factors
 
 
 @dataclass(frozen=True)

@@ -256,7 +256,7 @@ def screened_potential(points: Array, corners: Array, q: Numbers) -> Numbers:
 
 
 def _decay(q: Numbers, distance: Array) -> Numbers:
-    """Return exp(−qR) − 1, (k, ...); of twice a q by the square, which takes a tenth of the time."""
+    """Return exp(−qR) − 1, (k, ...); of twice the last q as its square, in a tenth of the time."""
     decay = np.empty((*q.shape, *distance.shape), dtype=q.dtype)
     for number, rate in enumerate(q):
         if number and rate == 2.0 * q[number - 1]:
