@@ -36,7 +36,8 @@ def test_power_leaves_by_the_leg_ends_and_into_the_air(in_air):
 def test_a_lever_can_be_sent_to_another_process(coarse, medium):
     lever = coarse.in_medium(medium)
     sent = pickle.loads(pickle.dumps(lever))
-    assert (sent.sweep(BIAS).tip_K == lever.sweep(BIAS).tip_K).all()
+    # where matrices are factorised with pivots of earlier ones, these are not sent
+    np.testing.assert_allclose(sent.sweep(BIAS).tip_K, lever.sweep(BIAS).tip_K, rtol=1e-12)
     assert sent.space.air.stores.size == lever.space.air.stores.size
 
 
