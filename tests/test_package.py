@@ -157,6 +157,12 @@ def test_what_is_estimated_or_in_time_imports_no_dask(tmp_path, words):
     assert "dask.base" not in imported_by(words, tmp_path)
 
 
+def test_a_fit_waits_for_no_xarray_nor_pandas(tmp_path):
+    """Only who asks for a dataset does, for as long as a fifth of a fit."""
+    modules = imported_by(f"fit {EXAMPLES}/lever-a.csv -o out.json", tmp_path)
+    assert not {"xarray", "pandas"} & set(modules)
+
+
 def test_datasets_offer_figures_before_matplotlib_is_loaded():
     script = (
         "import sys; from hotlever.datasets import labelled; data = labelled({'tip_K': [1.0]});"

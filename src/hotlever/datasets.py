@@ -140,11 +140,13 @@ def csv_text(data: xr.Dataset, columns: Sequence[str]) -> str:
 
 
 def frame_text(frame: Any, **options: Any) -> str:
-    """Return a pandas DataFrame as CSV text; empty where there is no finite number.
+    """Return a pandas DataFrame, or columns, as CSV text; empty where there is no finite number.
 
     The options are those of its ``to_csv``.
     """
-    finite = frame.replace([math.inf, -math.inf], math.nan)
+    import pandas as pd
+
+    finite = pd.DataFrame(frame).replace([math.inf, -math.inf], math.nan)
     return str(finite.to_csv(lineterminator="\n", **options))
 
 

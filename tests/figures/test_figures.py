@@ -174,7 +174,7 @@ def test_every_source_of_an_error_is_drawn_however_many_there_are():
     table = calibration.table
     others = table.assign_coords(source=[f"other {name}" for name in table.source.values])
     many = xr.concat([table, others], "source", data_vars="minimal", coords="minimal")
-    figure = figures.calibration_curves(replace(calibration, table=many))
+    figure = figures.calibration_curves(replace(calibration, tabulated=many))
     lines = figure.axes[-1].get_lines()
     assert [line.get_label() for line in lines] == [*many.source.values, "together"]
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == len(lines) > 10

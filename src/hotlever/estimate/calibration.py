@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Container
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hotlever.errors import counted
 from hotlever.estimate.diagnosis import outlier_notes
@@ -34,6 +34,9 @@ from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def calibrated(
@@ -100,7 +103,7 @@ def calibrated(
         estimate,
         measurement=measured,
         notes=notes,
-        table=table,
+        tabulated=table,
         gum=budget_of_estimate(solution, at_row, options.budget_of),
         route=route,
         power_law=law,

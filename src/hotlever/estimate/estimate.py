@@ -10,18 +10,16 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-import xarray as xr
 from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.estimate.experiment import experiment_of
-from hotlever.estimate.file import EstimateFile, FittedParameter, band_dataset
+from hotlever.estimate.file import EstimateFile, FittedParameter, rising_band
 from hotlever.estimate.knee import Knee
 from hotlever.estimate.noise import errors_of_scales
 from hotlever.estimate.objective import Objective
@@ -54,6 +52,9 @@ from hotlever.probe.probe_parameters import parameters_of, usual_parameters
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.text import value_with_error
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,11 +97,11 @@ class Estimate:
         Of the weighted differences.
     residual_rms : dict of str to float
         Per column of a sweep (mA, V, K), for every observable with data, fitted or not.
-    band : xarray.Dataset
+    band_columns : dict of str to ndarray, shape (rows,)
         What is predicted at the measured biases, and the standard error of the predicted tip
         temperature that follows from the covariance of the parameters: ``bias_V``, ``power_mW``,
         ``tip_K``, ``tip_stderr_K``, rising in bias; or, of what was measured in time, rising in
-        ``time_us``. Empty by the paper's rule.
+        ``time_us``. None by the paper's rule.
     evaluations, steps : int
         Solved sweeps, and steps of the search among them.
     seconds : float
@@ -117,12 +118,12 @@ class Estimate:
         Power of the knee over the threshold of the power law; NaN without a knee or a law.
     knee : Knee
         Of the estimated lever, or as measured; NaN where there is none, or all but its power.
-    table : xarray.Dataset
-        ``TABLE_COLUMNS`` on the dimension ``bias``, evenly spaced over the measured range, with
-        more rows where the tip rises by more than 10 K from one to the next; and ``budget_K``, the
-        standard error by ``source``. With held supplies, what is shown is of the swept one, and
-        ``total_power_mW`` that of all. Of a tip in contact it has `OF_THE_CONTACT` too, and
-        ``apex_budget_K``.
+    tabulated : xarray.Dataset, optional
+        What `table` returns: ``TABLE_COLUMNS`` on the dimension ``bias``, evenly spaced over the
+        measured range, with more rows where the tip rises by more than 10 K from one to the next;
+        and ``budget_K``, the standard error by ``source``. With held supplies, what is shown is of
+        the swept one, and ``total_power_mW`` that of all. Of a tip in contact it has
+        `OF_THE_CONTACT` too, and ``apex_budget_K``.
     measured_rms_K : float
         Rms of the measurement's own tip temperatures about the table; NaN if it has none.
     pulse : PulseCalibration, optional
@@ -146,7 +147,7 @@ class Estimate:
     weights: dict[str, Array] | None = None
     sum_of_squares: float = np.nan
     residual_rms: dict[str, float] = field(default_factory=dict)
-    band: xr.Dataset = field(default_factory=xr.Dataset)
+    band_columns: dict[str, Array] = field(default_factory=dict)
     evaluations: int = 0
     steps: int = 0
     seconds: float = 0.0
@@ -157,7 +158,7 @@ class Estimate:
     k: float = np.nan
     k_stderr: float = np.nan
     knee: Knee = field(default_factory=Knee)
-    table: xr.Dataset = field(default_factory=xr.Dataset)
+    tabulated: xr.Dataset | None = None
     measured_rms_K: float = np.nan
     pulse: PulseCalibration | None = None
     gum: TemperatureBudget | None = None
@@ -168,8 +169,12 @@ class Estimate:
         problem, residuals, prediction = solution.problem, solution.residuals, solution.prediction
         columns, weighted = prediction.columns, residuals.weighted(prediction.values)
         slopes = prediction.tip_slopes[:, solution.objective.columns]
-        along = {name: columns[name] for name in ("time_us", "bias_V") if name in columns}
         covariance = solution.posterior.covariance
+        band = {name: columns[name] for name in ("time_us", "bias_V") if name in columns} | {
+            "power_mW": solution.probe.circuit.power(columns["bias_V"], columns["current_mA"]),
+            "tip_K": columns["tip_K"],
+            "tip_stderr_K": standard_errors(slopes, covariance),
+        }
         of_others = "fit" in problem.prior.sources
         weights = dict(zip(residuals.observables, residuals.data_weights, strict=True))
         return cls(
@@ -187,20 +192,13 @@ class Estimate:
             weights=None if of_others else weights,
             sum_of_squares=float(weighted @ weighted),
             residual_rms=residuals.rms(prediction.values),
-            band=band_dataset(
-                **along,
-                power_mW=solution.probe.circuit.power(columns["bias_V"], columns["current_mA"]),
-                tip_K=columns["tip_K"],
-                tip_stderr_K=standard_errors(slopes, covariance),
-            ),
+            band_columns=rising_band(band),
             evaluations=solution.predictor.evaluations,
             steps=solution.optimiser.steps,
             seconds=solution.seconds,
         )
 
     def __post_init__(self) -> None:
-        # figures of it say of which lever it is
-        object.__setattr__(self, "band", self.band.assign_attrs(lever=self.probe.title))
         if not self.describes_data:
             for name, value in self._without_errors().items():
                 object.__setattr__(self, name, value)
@@ -219,11 +217,14 @@ class Estimate:
             "gum": None,
         }
         errors = ("tip_stderr_K", *STATED, *OF_THE_CONTACT[1::2], "budget_K", "apex_budget_K")
-        for name, rows in (("band", self.band), ("table", self.table)):
-            unknown = {
-                error: xr.full_like(rows[error], np.nan) for error in errors if error in rows
-            }
-            without[name] = rows.assign(unknown)
+        without["band_columns"] = {
+            name: np.full_like(values, np.nan) if name in errors else values
+            for name, values in self.band_columns.items()
+        }
+        if (rows := self.tabulated) is not None:
+            without["tabulated"] = rows.assign(
+                {error: rows[error] * np.nan for error in errors if error in rows}
+            )
         return without
 
     # --- the verdict ------------------------------------------------------------------------------
@@ -334,6 +335,15 @@ class Estimate:
         return float(standard_errors(slope, self.covariance))
 
     # --- the lever, and what it is compared with --------------------------------------------------
+
+    @property
+    def band(self) -> xr.Dataset:
+        """The ``band_columns`` on the dimension ``bias`` or ``time``, and of which lever."""
+        columns = self.band_columns
+        if not columns:
+            return labelled({})
+        along, name = ("time", "time_us") if "time_us" in columns else ("bias", "bias_V")
+        return labelled(columns, along, {along: columns[name]}, lever=self.probe.title)
 
     def model(self, bias: ArrayLike | None = None) -> xr.Dataset:
         """Solve the estimated lever, at the measured biases by default; see `Lever.sweep`.
@@ -451,6 +461,22 @@ class Estimate:
         return np.asarray((circuit or self.probe.circuit).bias(lever, current))
 
     @property
+    def table(self) -> xr.Dataset:
+        """The tip temperature by bias, with its errors; see ``tabulated``.
+
+        Raises
+        ------
+        InputError
+            If the tip was not asked for.
+        """
+        if self.tabulated is None:
+            raise InputError(
+                f"{self.measurement.path or 'an estimate'}: is a fit, expected a calibration, "
+                "which has a table of the tip temperature"
+            )
+        return self.tabulated
+
+    @property
     def heating(self) -> xr.Dataset:
         """The rows of the table that have a tip temperature, from the coldest on.
 
@@ -459,11 +485,6 @@ class Estimate:
         InputError
             If the tip was not asked for.
         """
-        if not self.route:
-            raise InputError(
-                f"{self.measurement.path or 'an estimate'}: is a fit, expected a calibration, "
-                "which has a table of the tip temperature"
-            )
         rows, known = self.table, np.isfinite(self.table.tip_K.values)
         if not known.all():  # of rows by an array xarray asks whether it is Dask's, as of a number
             rows = rows.isel(bias=known)
@@ -497,7 +518,7 @@ class Estimate:
         # by temperature and power from the coldest row on
         table = self.table if by == "bias" else self.heating
         rows = even_rows(table, self.columns, TABLES_BY[by][0], step)
-        return frame_text(pd.DataFrame(rows), index=False, float_format="%.6g")
+        return frame_text(rows, index=False, float_format="%.6g")
 
     # --- its file ---------------------------------------------------------------------------------
 

@@ -373,9 +373,10 @@ def _error_of_choice(tip_K: Array, other_K: Array) -> Array:
 
 def _either(estimate: Estimate, other: Estimate) -> Estimate:
     """Return an estimate whose errors hold another of the same data as well."""
-    band, choice = estimate.band, _error_of_choice(estimate.band.tip_K, other.band.tip_K)
-    band = band.assign(tip_stderr_K=np.hypot(band.tip_stderr_K, choice))
-    estimate = replace(estimate, band=band)
+    band = estimate.band_columns
+    choice = _error_of_choice(band["tip_K"], other.band_columns["tip_K"])
+    band = {**band, "tip_stderr_K": np.hypot(band["tip_stderr_K"], choice)}
+    estimate = replace(estimate, band_columns=band)
     if not estimate.route:
         return estimate
     columns = {name: estimate.table[name].values for name in estimate.columns}
@@ -399,7 +400,7 @@ def _either(estimate: Estimate, other: Estimate) -> Estimate:
         row = columns["bias_V"].tolist().index(gum.bias_V)
         limits = limits_of(table.isel(bias=row), gum.of)
         gum = gum.in_either(other.gum, choices[f"{gum.of}_K"][row].item(), limits)
-    return replace(estimate, table=table, gum=gum)
+    return replace(estimate, tabulated=table, gum=gum)
 
 
 # --- what is said of the parameters of a fit ----------------------------------------------------
@@ -457,7 +458,7 @@ def undetermined(fit: Estimate) -> list[str]:
         f"data (correlation {correlation[first, second]:+.2f})"
         for first, second in np.argwhere(np.abs(correlation) > 0.95)
     ]
-    largest = float(np.fmax.reduce(fit.band.tip_stderr_K.values))
+    largest = float(np.fmax.reduce(fit.band_columns["tip_stderr_K"]))
     if texts and np.isfinite(largest):
         texts.append(
             "the tip temperature that follows has nevertheless a standard error of at most "

@@ -9,11 +9,11 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-import xarray as xr
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -28,7 +28,6 @@ from pydantic import (
 )
 
 from hotlever import __version__
-from hotlever.datasets import labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.estimate.knee import Knee
 from hotlever.estimate.options import BudgetOf, FitOptions
@@ -61,6 +60,9 @@ from hotlever.quantities import FITTED, Observable
 from hotlever.records import Number, StandardError, explained, stored_as
 from hotlever.text import value_with_error, with_unit
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # --- values that stand in files in another form --------------------------------------------------
 
@@ -115,15 +117,11 @@ def _law(values: dict[str, float], info: ValidationInfo) -> PowerLaw:
     return PowerLaw.from_values(coefficients, f"{info.context}: power_law")
 
 
-def _band(columns: dict[str, Array]) -> xr.Dataset:
+def _band(columns: dict[str, Array]) -> dict[str, Array]:
     expected = {"bias_V", "power_mW", "tip_K", "tip_stderr_K"}
     if not columns.keys() >= expected or len({values.size for values in columns.values()}) > 1:
         raise ValueError(f"expected {', '.join(sorted(expected))}, as many of each")
-    return band_dataset(**columns)
-
-
-def _columns_of(band: xr.Dataset) -> dict[str, list[float]]:
-    return {str(name): values.values.tolist() for name, values in band.data_vars.items()}
+    return rising_band(columns)
 
 
 def _options(values: Any, check: ValidatorFunctionWrapHandler, info: ValidationInfo) -> FitOptions:
@@ -283,7 +281,7 @@ class ParameterFields(Section):
     ) = None
     common_noise_covariance: Annotated[Array, stored_as(list[list[Number]], _matrix)] | None = None
     sum_of_squares: Number = np.nan
-    band: Annotated[xr.Dataset, stored_as(dict[str, Vector], _band, _columns_of)] | None = None
+    band: Annotated[dict[str, Vector], AfterValidator(_band)] | None = None
 
 
 class PulseSection(Section):
@@ -420,7 +418,7 @@ class TipFields(Section):
         return {
             "law_residual_K": self.power_law_residual_K,
             "knee": Knee(**knee),
-            "table": table,
+            "tabulated": table,
             "pulse": None if self.pulse is None else self.pulse.pulse(),
             "gum": self._budget(table),
         }
@@ -467,6 +465,7 @@ class EstimateFile(ParameterFields, TipFields):
         return cls.holding(
             estimate,
             **of_tip,
+            band=estimate.band_columns,
             correlation=correlation if estimate.names else None,
             data=MeasurementSection.of(estimate.measurement),
             request=request,
@@ -569,6 +568,7 @@ class EstimateFile(ParameterFields, TipFields):
         attributes = {
             name: getattr(self, name) for name in names if name in type(self).model_fields
         } | {
+            "band_columns": self.band or {},
             "measurement": self.data.measurement(),
             "converged": self.describes_data is not None,
             "reason": self.reason or ("" if self.describes_data else "the file does not say why"),
@@ -589,12 +589,11 @@ class EstimateFile(ParameterFields, TipFields):
         return {name: value for name, value in attributes.items() if name not in absent}
 
 
-def band_dataset(**columns: Array) -> xr.Dataset:
-    """Return the `band` of an estimate: one row per bias or, with ``time_us``, time; rising."""
-    along, name = ("time", "time_us") if "time_us" in columns else ("bias", "bias_V")
-    rising, order = np.unique(columns[name], return_index=True)
-    ordered = {name: values[order] for name, values in columns.items()}
-    return labelled(ordered, along, {along: rising})
+def rising_band(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the columns of a band with one row per bias or, with ``time_us``, time; rising."""
+    along = columns["time_us" if "time_us" in columns else "bias_V"]
+    _, rows = np.unique(along, return_index=True)
+    return {name: values[rows] for name, values in columns.items()}
 
 
 def _check_rows(

@@ -171,7 +171,7 @@ def calibrated_by_knee(
         )
     own = reference.at(circuit.power(measured.bias_V, current), knee_mW)
     return Estimate(
-        table=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, {"budget_K": parts}),
+        tabulated=table_by_bias(circuit, rows.bias_V, rows.current_mA, tip, {"budget_K": parts}),
         route=route,
         power_law=used,
         law_residual_K=residual,

@@ -13,10 +13,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-import xarray as xr
 from scipy.optimize import nnls
 from scipy.special import ndtri
 
@@ -46,6 +45,9 @@ from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.text import aligned
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # --- what rows tell -------------------------------------------------------------------------------
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
@@ -27,6 +26,8 @@ from hotlever.text import BAND
 from hotlever.types import Array, Index
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hotlever.estimate.estimate import Estimate
 
 #: Confidence levels whose intervals are read off the profile of a parameter.

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.tip_table import PulseCalibration, budgets_of
@@ -17,6 +16,9 @@ from hotlever.probe.probe_parameters import parameters_of
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.text import NOT_DETERMINED, aligned, significant, value_with_error
 from hotlever.types import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: What the numbers of a fit are that does not describe its data.
 NEAREST = (
@@ -41,7 +43,7 @@ def parameter_rows(fit: Estimate) -> list[tuple[str, str, str, str]]:
 
 def conclusions(fit: Estimate) -> list[str]:
     """Say what follows from the parameters of a fit, and how well it describes the data."""
-    lines = [_tip_in_time(fit.band)] if fit.in_time else []
+    lines = [_tip_in_time(fit.band_columns)] if fit.in_time else []
     if np.isfinite(fit.inversion_temperature_K):
         inversion = value_with_error(
             fit.inversion_temperature_K, fit.inversion_temperature_stderr_K
@@ -59,12 +61,12 @@ def conclusions(fit: Estimate) -> list[str]:
     ]
 
 
-def _tip_in_time(band: xr.Dataset) -> str:
+def _tip_in_time(band: Mapping[str, Array]) -> str:
     """Say how hot the tip became."""
     hottest, last = (
-        f"{value_with_error(row.tip_K.item(), row.tip_stderr_K.item())} K after "
-        f"{row.time_us.item():.4g} µs"
-        for row in (band.isel(time=band.tip_K.argmax("time")), band.isel(time=-1))
+        f"{value_with_error(float(band['tip_K'][row]), float(band['tip_stderr_K'][row]))} K after "
+        f"{band['time_us'][row]:.4g} µs"
+        for row in (int(np.argmax(band["tip_K"])), -1)
     )
     if hottest == last:
         return f"tip temperature: {last}, at its hottest and last"

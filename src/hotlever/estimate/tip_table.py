@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hotlever.datasets import frame_text, labelled
@@ -18,6 +17,9 @@ from hotlever.probe import Circuit
 from hotlever.quantities import QUANTITIES
 from hotlever.text import BAND
 from hotlever.types import Array, Mask
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Columns of a calibration's table; the last say how sure it is.
 STATED = ("tip_stderr_K", "tip_low_K", "tip_high_K")
@@ -254,7 +256,7 @@ class PulseCalibration:
         if along is None:
             raise InputError(f"a table of pulses by {by}: expected by temperature or bias")
         rows = even_rows(self.table, PULSE_COLUMNS, along, step, tip="peak_K")
-        return frame_text(pd.DataFrame(rows), index=False, float_format="%.6g")
+        return frame_text(rows, index=False, float_format="%.6g")
 
 
 def _column(moment: str) -> str:

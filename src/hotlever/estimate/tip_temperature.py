@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hotlever.datasets import quantity
 from hotlever.errors import InputError
@@ -35,6 +35,9 @@ from hotlever.probe.surroundings import Surroundings
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: By which source of error a parameter counts that is not the lever's own.
 OF_THE_MEASUREMENT = {

@@ -11,10 +11,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field, WrapValidator
 from scipy.special import stdtrit
 
@@ -35,6 +34,9 @@ from hotlever.quantities import FITTED, OBSERVABLES
 from hotlever.records import Number
 from hotlever.text import BAND
 from hotlever.types import Array, Index
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # --- budgets of any quantity ----------------------------------------------------------------------
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import meshio
 import numpy as np
 import shapely
-import xarray as xr
 from shapely import Polygon
 
 from hotlever.air.operator import PanelledAir
@@ -22,6 +22,9 @@ from hotlever.lever.lever import Lever, State
 from hotlever.materials.air import temperature_from_kirchhoff
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class AirFields:

@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import meshio
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from skfem import MeshTri
@@ -32,6 +32,9 @@ from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)

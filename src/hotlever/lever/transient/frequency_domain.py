@@ -17,7 +17,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from hotlever.datasets import labelled
@@ -36,6 +35,8 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hotlever.lever.lever import Lever
 
 Complex = NDArray[np.complexfloating[Any, Any]]

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
@@ -23,6 +22,8 @@ from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hotlever.lever.lever import Lever
 
 #: Columns of a file in time.

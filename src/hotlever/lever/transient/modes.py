@@ -17,7 +17,6 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import LinearOperator, eigs
 
@@ -33,6 +32,8 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hotlever.lever.lever import Lever
 
 #: What the source holds: the bias behind the series resistor, or at the lever itself.

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hotlever.datasets import labelled
@@ -30,6 +29,8 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hotlever.lever.lever import Lever
 
 

@@ -18,7 +18,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError
@@ -35,6 +34,8 @@ from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hotlever.lever.lever import Lever
 
 
