@@ -90,18 +90,18 @@ def measure(number: int) -> dict[str, Any]:
         RampOptions(stay_below_K=LIMIT_K, settle_s=0.0),
     )
     began = time.process_time()
-    measured = ramp.measure(instrument, lambda *_: None)
+    ramp.measure(instrument, lambda *_: None)
     record: dict[str, Any] = {
         "number": number,
-        "rows": len(measured.readings),
+        "rows": len(ramp.readings),
         "hottest_K": instrument.hottest_K,
-        "reason": "" if measured.complete else measured.reason,
-        "seconds": (time.process_time() - began) / max(len(measured.readings), 1),
+        "reason": "" if ramp.complete else ramp.reason,
+        "seconds": (time.process_time() - began) / max(len(ramp.readings), 1),
     }
-    if not measured.complete:
+    if not ramp.complete:
         return record
     aim, at_limit = np.interp((AT_K, LIMIT_K), curve.tip_K, curve.bias_V).tolist()
-    last = measured.readings[-1].bias_V
+    last = ramp.readings[-1].bias_V
     ways = {"ramp": ramp.measurement()}
     for way, end in (("even", last), ("limit", at_limit)):
         even, nothing = np.linspace(end / EVEN, end, EVEN), np.full(EVEN, np.nan)

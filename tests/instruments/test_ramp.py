@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.instruments.curve_file import CurveFile
-from hotlever.instruments.ramp import Ramp, RampOptions
+from hotlever.instruments.ramp import CurveFile, Ramp, RampOptions
 from hotlever.instruments.source_meter import Reading
 from hotlever.instruments.twin import RampCurve, TwinBench, drawn_from_priors
 from hotlever.lever.lever import COARSE
@@ -45,8 +44,8 @@ def ramp(bias, **options) -> Ramp:
 
 def test_the_tip_stays_below_the_limit_and_steps_become_finer_before_it(curve):
     twin, rows = WithoutLine(curve, seed=1), []
-    measuring = ramp([3.0, 5.0, 9.0, 10.0], stay_below_K=500.0)
-    measured = measuring.measure(twin, lambda reading, step: rows.append((reading, step)))
+    measured = ramp([3.0, 5.0, 9.0, 10.0], stay_below_K=500.0)
+    measured.measure(twin, lambda reading, step: rows.append((reading, step)))
     assert measured.complete
     assert "might be above 500 K" in measured.reason or "all 4 rows are taken" in measured.reason
     assert 400.0 < twin.hottest_K < 500.0
@@ -79,8 +78,8 @@ def test_compliance_ends_it_without_the_row(curve):
         def read(self) -> Reading:
             return super().read()._replace(at_compliance=self.bias_V > 2.0)
 
-    rows = []
-    measured = ramp([1.0, 1.5, 2.5]).measure(Limited(curve), lambda *row: rows.append(row))
+    rows, measured = [], ramp([1.0, 1.5, 2.5])
+    measured.measure(Limited(curve), lambda *row: rows.append(row))
     assert measured.complete
     assert "compliance" in measured.reason
     assert [reading.bias_V for reading, _ in rows] == [1.0, 1.5]
@@ -92,7 +91,8 @@ def test_rows_of_another_lever_end_it(curve):
             reading = super().read()
             return reading._replace(current_mA=5.0 * reading.current_mA)
 
-    measured = ramp([1.0, 2.0, 3.0, 4.0]).measure(Doubled(curve), lambda *row: None)
+    measured = ramp([1.0, 2.0, 3.0, 4.0])
+    measured.measure(Doubled(curve), lambda *row: None)
     assert not measured.complete
     assert "of no lever like the probe" in measured.reason
     assert len(measured.readings) == 3

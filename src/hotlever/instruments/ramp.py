@@ -4,14 +4,17 @@ The paper's procedure is a ramp of the bias with a wait at each. Here each next 
 if the lever, as far as it is known by then, has its tip below a limit there with a certainty of
 99 %; what is known is brought up to date by the rows so far while the lever settles. Where the
 next bias that is wanted is too hot, the highest that is not is taken, until that is hardly above
-the last.
+the last. Each row is on disk as soon as it is read.
 """
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
 
 import numpy as np
 
@@ -23,6 +26,7 @@ from hotlever.instruments.supervisor import Supervisor
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
+from hotlever.quantities import QUANTITIES
 from hotlever.types import Array
 from hotlever.units import MOST_BIAS
 
@@ -76,27 +80,6 @@ class Step:
     tip_limit_K: float
 
 
-@dataclass
-class MeasuredRamp:
-    """What was measured.
-
-    Attributes
-    ----------
-    readings : list of Reading
-    steps : list of Step
-        What was known of each before it was taken.
-    reason : str
-        Why no other bias was taken.
-    complete : bool
-        Whether that is as it was wanted: nothing went wrong.
-    """
-
-    readings: list[Reading] = field(default_factory=list)
-    steps: list[Step] = field(default_factory=list)
-    reason: str = ""
-    complete: bool = True
-
-
 class Ramp:
     """A measurement of one lever.
 
@@ -109,6 +92,16 @@ class Ramp:
     options : RampOptions, optional
     priors : mapping of str to Prior or str, optional
         In place of some of the usual ones.
+
+    Attributes
+    ----------
+    readings : list of Reading
+    steps : list of Step
+        What was known of each before it was taken.
+    reason : str
+        Why no other bias was taken.
+    complete : bool
+        Whether that is as it was wanted: nothing went wrong.
 
     Raises
     ------
@@ -129,15 +122,17 @@ class Ramp:
         self._probe, self._bias = probe, bias
         self._spacing = float(np.diff(bias).mean()) if bias.size > 1 else float(bias[0])
         self._lever = RowByRow(probe, priors)
-        self.measured = MeasuredRamp()
+        self.readings: list[Reading] = []
+        self.steps: list[Step] = []
+        self.reason, self.complete = "", True
 
     def measure(
         self,
         instrument: Supervisor,
         record: Callable[[Reading, Step], None],
         wait: Callable[[float], None] = time.sleep,
-    ) -> MeasuredRamp:
-        """Measure row by row; what was measured so far is in ``measured`` also if that fails.
+    ) -> None:
+        """Measure row by row; what was measured so far stays known if that fails.
 
         Parameters
         ----------
@@ -152,7 +147,7 @@ class Ramp:
         HotleverError
             If the instrument fails.
         """
-        options, measured = self.options, self.measured
+        options = self.options
         while (step := self._next_step()) is not None:
             instrument.set_bias(step.bias_V)
             begin, first = time.monotonic(), None
@@ -164,28 +159,20 @@ class Ramp:
             wait(max(options.settle_s - (time.monotonic() - begin), 0.0))
             reading = instrument.read()
             if reading.at_compliance or (first is not None and first.at_compliance):
-                return self._stopped(
-                    f"the source limits the current at {step.bias_V:.4g} V (compliance)",
-                    complete=True,
-                )
-            measured.readings.append(reading)
-            measured.steps.append(step)
+                self.reason = f"the source limits the current at {step.bias_V:.4g} V (compliance)"
+                self.complete = True
+                return
+            self.readings.append(reading)
+            self.steps.append(step)
             record(reading, step)
             if first is None or abs(reading.current_mA / first.current_mA - 1.0) > options.changed:
                 self._update()
-            if measured.reason:
-                return measured
-        return measured
-
-    def _stopped(self, reason: str, complete: bool = False) -> MeasuredRamp:
-        self.measured.reason, self.measured.complete = reason, complete
-        return self.measured
 
     # --- what is known ----------------------------------------------------------------------------
 
     def measurement(self, *more: Reading) -> Measurement:
         """Return the rows so far, and more, as a measurement."""
-        bias, current, reader, _ = np.array([*self.measured.readings, *more], dtype=float).T
+        bias, current, reader, _ = np.array([*self.readings, *more], dtype=float).T
         nothing = np.full(bias.size, np.nan)
         return Measurement(
             bias, current, reader, nothing, nothing, medium=self._probe.surroundings.medium
@@ -193,12 +180,12 @@ class Ramp:
 
     def _update(self, *more: Reading) -> None:
         """Bring what is known up to date by the rows so far, and more."""
-        if len(self.measured.readings) + len(more) < self.options.unknown_rows:
+        if len(self.readings) + len(more) < self.options.unknown_rows:
             return
         try:
             self._lever.update(self.measurement(*more))
         except (InputError, ComputationError) as error:
-            self._stopped(f"the rows are of no lever like the probe: {error}")
+            self.reason, self.complete = f"the rows are of no lever like the probe: {error}", False
 
     @property
     def known(self) -> LinearisedLever:
@@ -230,11 +217,11 @@ class Ramp:
 
     def _next_step(self) -> Step | None:
         """Return what to take next; None, with the reason, if nothing."""
-        last_V = max((reading.bias_V for reading in self.measured.readings), default=0.0)
-        if self.measured.reason:
+        last_V = max((reading.bias_V for reading in self.readings), default=0.0)
+        if self.reason:
             return None
-        if len(self.measured.readings) == self._bias.size:
-            self._stopped(f"all {self._bias.size} rows are taken", complete=True)
+        if len(self.readings) == self._bias.size:
+            self.reason = f"all {self._bias.size} rows are taken"
             return None
         bias = (
             self._proposed(last_V) if self.options.propose and self.tells else self._wanted(last_V)
@@ -247,23 +234,22 @@ class Ramp:
     @property
     def tells(self) -> bool:
         """Whether there are rows enough to tell something of the lever."""
-        return len(self.measured.readings) >= self.options.unknown_rows
+        return len(self.readings) >= self.options.unknown_rows
 
     def _wanted(self, last_V: float) -> float | None:
         """Return the next wanted bias (V), or the highest that is safe before it."""
         finest = self.options.finest * self._spacing
         above = self._bias[self._bias > last_V + finest]
         if not above.size:
-            self._stopped(f"{last_V:.4g} V is the highest bias that was wanted", complete=True)
+            self.reason = f"{last_V:.4g} V is the highest bias that was wanted"
             return None
         biases = np.linspace(last_V, float(above[0]), self.options.between + 1)[1:]
         # a bias beyond one that is not safe is none either
         safe = np.logical_and.accumulate(self._tip_limits(biases) < self.limit_K)
         if safe.any() and biases[safe][-1] - last_V >= finest:
             return float(biases[safe][-1])
-        self._stopped(
-            f"the tip might be above {self.limit_K:.0f} K beyond {last_V:.4g} V with more than 1 %",
-            complete=True,
+        self.reason = (
+            f"the tip might be above {self.limit_K:.0f} K beyond {last_V:.4g} V with more than 1 %"
         )
         return None
 
@@ -282,6 +268,72 @@ class Ramp:
                 allowed={"bias": None},
             )
         except HotleverError as error:
-            self._stopped(f"nothing is proposed: {error}")
+            self.reason, self.complete = f"nothing is proposed: {error}", False
             return None
         return float(plan.proposals.bias_V.values[0])
+
+
+# --- the file of a measurement that goes on -------------------------------------------------------
+
+
+class CurveFile:
+    """A CSV file of rows as they come, with circuit and surroundings in comments above.
+
+    It is a new one: a measurement never takes the place of another. Without a row there is none.
+
+    Parameters
+    ----------
+    path : path
+    probe : Probe
+        Whose circuit and medium are said.
+    with_reader : bool
+        Whether there is a column for the reader.
+
+    Raises
+    ------
+    InputError
+        If the file exists or cannot be written.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], probe: Probe, with_reader: bool) -> None:
+        self._path = Path(path)
+        self._names = ("bias_V", "current_mA", "reader_V")[: 2 + with_reader]
+        self._has_heads = False
+        try:
+            self._file = self._path.open("x", encoding="utf-8", newline="\n")
+        except FileExistsError:
+            raise InputError(
+                f"{self._path}: exists, expected a new name: a measurement overwrites nothing"
+            ) from None
+        except OSError as error:
+            raise InputError(f"{self._path}: cannot be written ({error.strerror})") from None
+        self.comment(f"measured by hotlever from {datetime.now().astimezone().isoformat()}")
+        self.comment(f"R_s (kOhm): {probe.circuit.series_kohm:.9g}")
+        self.comment(f"base temperature (K): {probe.circuit.base_temperature_K:.6g}")
+        self.comment(f"medium: {probe.surroundings.medium}")
+
+    def __enter__(self) -> CurveFile:
+        return self
+
+    def comment(self, text: str) -> None:
+        """Write a line of words."""
+        self._write(f"# {text}")
+
+    def add(self, reading: Reading) -> None:
+        """Write a row, the first one behind what heads the columns."""
+        if not self._has_heads:
+            quantities = [QUANTITIES[name] for name in self._names]
+            self._write(",".join(f"{each.symbol} ({each.unit})" for each in quantities))
+            self._has_heads = True
+        values = (getattr(reading, name) for name in self._names)
+        self._write(",".join("" if np.isnan(value) else f"{value:.9g}" for value in values))
+
+    def _write(self, line: str) -> None:
+        self._file.write(f"{line}\n")
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+        if not self._has_heads:
+            self._path.unlink(missing_ok=True)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from hotlever.errors import InputError, InstrumentError, excerpt
+
+if TYPE_CHECKING:
+    from pyvisa.resources import MessageBasedResource
 
 
 class Reading(NamedTuple):
@@ -84,20 +87,7 @@ DIALECTS = {
 }
 
 
-class Line(Protocol):
-    """A line to an instrument: what VISA calls a message-based resource."""
-
-    def query(self, message: str) -> str:
-        """Send a message and return the answer."""
-
-    def write(self, message: str) -> Any:
-        """Send a message."""
-
-    def close(self) -> None:
-        """Give the line back."""
-
-
-def open_line(resource: str, timeout_s: float) -> Line:
+def open_line(resource: str, timeout_s: float) -> MessageBasedResource:
     """Open the line to an instrument by its VISA resource name.
 
     Raises
@@ -129,11 +119,9 @@ def open_line(resource: str, timeout_s: float) -> Line:
             )
             line.timeout = int(1000 * timeout_s)
             line.read_termination = line.write_termination = "\n"
+            return cast("MessageBasedResource", line)
         except (pyvisa.Error, OSError, ValueError) as error:
             failure = error
-        else:
-            opened: Line = line
-            return opened
     raise InstrumentError(f"{resource}: no instrument answers ({_reason(failure)})")
 
 
@@ -160,15 +148,15 @@ class SourceMeter:
     resource, identity : str
         Its VISA resource name, and what it says of itself.
     dialect : Dialect
-    source : Line
-    reader : Line or None
+    source : pyvisa.resources.MessageBasedResource
+    reader : pyvisa.resources.MessageBasedResource or None
     """
 
     resource: str
     identity: str
     dialect: Dialect
-    source: Line
-    reader: Line | None = None
+    source: MessageBasedResource
+    reader: MessageBasedResource | None = None
 
     @classmethod
     def open(cls, resource: str, reader: str | None = None, timeout_s: float = 5.0) -> SourceMeter:
@@ -182,7 +170,14 @@ class SourceMeter:
         with ExitStack() as lines:
             source = lines.enter_context(closing(open_line(resource, timeout_s)))
             identity = _asked(source, "*IDN?", resource)
-            dialect = _dialect_of(resource, identity)
+            dialect = next(
+                (each for each in DIALECTS.values() if re.search(each.model, identity, re.I)), None
+            )
+            if dialect is None:
+                raise InputError(
+                    f"{resource}: found {excerpt(identity, 60)!r}, expected a source meter whose "
+                    f"commands are known: {'; '.join(DIALECTS)}"
+                )
             voltmeter = None if reader is None else open_line(reader, timeout_s)
             lines.pop_all()
         return cls(resource, identity, dialect, source, voltmeter)
@@ -255,7 +250,7 @@ class SourceMeter:
         if not re.match(r"[+-]?0\b", answer.strip()):
             raise InstrumentError(f"{self.resource}: reports {excerpt(answer, 80)}")
 
-    def _numbers(self, line: Line, command: str, count: int) -> list[float]:
+    def _numbers(self, line: MessageBasedResource, command: str, count: int) -> list[float]:
         answer = _asked(line, command, self.resource)
         try:
             numbers = [float(each) for each in answer.split(",")]
@@ -269,17 +264,7 @@ class SourceMeter:
         return numbers
 
 
-def _dialect_of(resource: str, identity: str) -> Dialect:
-    for dialect in DIALECTS.values():
-        if re.search(dialect.model, identity, re.IGNORECASE):
-            return dialect
-    raise InputError(
-        f"{resource}: found {excerpt(identity, 60)!r}, expected a source meter whose commands are "
-        f"known: {'; '.join(DIALECTS)}"
-    )
-
-
-def _asked(line: Line, command: str, resource: str) -> str:
+def _asked(line: MessageBasedResource, command: str, resource: str) -> str:
     try:
         return str(line.query(command))
     except Exception as error:  # of VISA, its backends and sockets

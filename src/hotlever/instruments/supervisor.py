@@ -18,7 +18,6 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from types import TracebackType
 from typing import Any
 
 from hotlever.errors import HotleverError, InstrumentError, unforeseen_error
@@ -71,7 +70,13 @@ class Supervisor:
         self.identity = ""
 
     def __enter__(self) -> Supervisor:
-        self._start()
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=supervise, args=(theirs, self._supply), daemon=False)
+        self._process.start()
+        theirs.close()
+        self._watch = threading.Thread(target=self._turn_off_if_it_dies, daemon=True)
+        self._watch.start()
         try:
             self.identity = self._answer(self._supply.start_s)
         except BaseException as error:
@@ -88,22 +93,8 @@ class Supervisor:
         reading: Reading = self._ask("read")
         return reading
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         self._end(error)
-
-    def _start(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=supervise, args=(theirs, self._supply), daemon=False)
-        self._process.start()
-        theirs.close()
-        self._watch = threading.Thread(target=self._turn_off_if_it_dies, daemon=True)
-        self._watch.start()
 
     def _turn_off_if_it_dies(self) -> None:
         """Turn the output off where the supervising process ends before it is asked to.
@@ -116,14 +107,12 @@ class Supervisor:
             self._is_off = _turned_off(None, self._supply)
 
     def _ask(self, request: float | str) -> Any:
-        try:
-            self._pipe.send(request)
-        except OSError as error:
-            raise InstrumentError("the process that supervises the source meter died") from error
-        return self._answer(self._supply.answer_s)
+        return self._answer(self._supply.answer_s, request)
 
-    def _answer(self, within_s: float) -> Any:
+    def _answer(self, within_s: float, *requests: float | str) -> Any:
         try:
+            for request in requests:
+                self._pipe.send(request)
             if not self._pipe.poll(within_s):
                 raise InstrumentError(f"{self._supply.source}: no answer for {within_s:g} s")
             answer = self._pipe.recv()
@@ -189,7 +178,12 @@ def supervise(pipe: Connection, supply: Supply) -> None:
         meter = SourceMeter.open(supply.source, supply.reader, supply.timeout_s)
         meter.start(supply.limit_mA)
         pipe.send(meter.identity)
-        _serve(pipe, meter)
+        while (request := pipe.recv()) is not None:
+            if request == "read":
+                pipe.send(meter.read())
+            else:
+                meter.set_bias(request)
+                pipe.send(None)
     except (EOFError, OSError):
         pass
     except Exception as error:
@@ -206,15 +200,6 @@ def supervise(pipe: Connection, supply: Supply) -> None:
             # nobody is there any more to say it
             if not confirmed:
                 print(f"hotlever: {_still_on(supply.source)}", file=sys.stderr, flush=True)
-
-
-def _serve(pipe: Connection, meter: SourceMeter) -> None:
-    while (request := pipe.recv()) is not None:
-        if request == "read":
-            pipe.send(meter.read())
-        else:
-            meter.set_bias(request)
-            pipe.send(None)
 
 
 def _turned_off(meter: SourceMeter | None, supply: Supply) -> bool:

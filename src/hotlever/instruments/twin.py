@@ -12,7 +12,6 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -102,23 +101,18 @@ class TwinBench:
 
     def __post_init__(self) -> None:
         self._rng = np.random.default_rng(self.seed)
-        self._lock = threading.Lock()
         self._errors: list[str] = []
         self._servers: list[_Server] = []
 
     def __enter__(self) -> TwinBench:
+        lock = threading.Lock()
         for answer in (self.source_answer, self.voltmeter_answer):
-            server = _Server(answer)
+            server = _Server(answer, lock)
             threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
             self._servers.append(server)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.break_lines()
 
     @property
@@ -159,20 +153,15 @@ class TwinBench:
 
     # --- the instruments --------------------------------------------------------------------------
 
-    def source_answer(self, message: str) -> str | None:
-        """Do what the source meter is told; return its answer to a question."""
-        with self._lock:
-            return self._source(message)
-
     def voltmeter_answer(self, message: str) -> str | None:
         """Do what the voltmeter is told; return its answer to a question."""
-        with self._lock:
-            header, _ = _parsed(message)
-            if header == "*IDN?":
-                return "KEITHLEY INSTRUMENTS,MODEL DMM6500,0,twin"
-            return f"{self._noisy(self._shown()[2]):.8E}" if header == "MEAS:VOLT?" else None
+        header, _ = _parsed(message)
+        if header == "*IDN?":
+            return "KEITHLEY INSTRUMENTS,MODEL DMM6500,0,twin"
+        return f"{self._noisy(self._shown()[2]):.8E}" if header == "MEAS:VOLT?" else None
 
-    def _source(self, message: str) -> str | None:
+    def source_answer(self, message: str) -> str | None:
+        """Do what the source meter is told; return its answer to a question."""
         header, argument = _parsed(message)
         bias, current, _ = self._shown()
         waits = header == "SYST:ERR?" and self._errors
@@ -221,8 +210,8 @@ class _Server(socketserver.ThreadingTCPServer):
 
     allow_reuse_address, daemon_threads = True, True
 
-    def __init__(self, answer: Callable[[str], str | None]) -> None:
-        self.answer = answer
+    def __init__(self, answer: Callable[[str], str | None], lock: threading.Lock) -> None:
+        self.answer, self.lock = answer, lock
         self._connections: list[Any] = []
         super().__init__(("127.0.0.1", 0), _Connection)
 
@@ -253,6 +242,7 @@ class _Connection(socketserver.StreamRequestHandler):
         """Answer until the other end is closed."""
         with suppress(OSError):
             for line in self.rfile:
-                answer = self.server.answer(line.decode("ascii", "replace"))
+                with self.server.lock:
+                    answer = self.server.answer(line.decode("ascii", "replace"))
                 if answer is not None:
                     self.wfile.write(f"{answer}\n".encode("ascii"))

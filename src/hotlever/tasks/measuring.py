@@ -74,8 +74,7 @@ def measure_lever(
     """
     from hotlever.estimate import calibrate
     from hotlever.estimate.summary import calibration_text
-    from hotlever.instruments.curve_file import CurveFile
-    from hotlever.instruments.ramp import Ramp, RampOptions
+    from hotlever.instruments.ramp import CurveFile, Ramp, RampOptions
     from hotlever.instruments.supervisor import Supervisor, Supply
     from hotlever.measurement import read_measurement_of
 
@@ -101,23 +100,23 @@ def measure_lever(
 
         def record(reading: Reading, step: Step) -> None:
             file.add(reading)
-            reporter.tell(_row(len(ramp.measured.readings), reading, step))
+            reporter.tell(_row(len(ramp.readings), reading, step))
             reporter.show("rows", _rows(ramp))
 
         supply = Supply(of_source, of_reader, limit_mA)
         try:
             with Supervisor(supply) as instrument:
                 file.comment(f"source: {instrument.identity}")
-                measured = ramp.measure(instrument, record)
+                ramp.measure(instrument, record)
         except KeyboardInterrupt:
-            rows = counted(len(ramp.measured.readings), "row")
+            rows = counted(len(ramp.readings), "row")
             raise ComputationError(
                 f"{output}: {rows}; stopped by the user, the output is off"
             ) from None
-        file.comment(f"ended: {measured.reason}")
+        file.comment(f"ended: {ramp.reason}")
     reporter.give(_result(output, ramp))
-    if not measured.complete:
-        raise ComputationError(f"{output}: {len(measured.readings)} rows; {measured.reason}")
+    if not ramp.complete:
+        raise ComputationError(f"{output}: {len(ramp.readings)} rows; {ramp.reason}")
     if calibration is not None:
         with reporter.progress("calibrate") as update:
             whole = calibrate(
@@ -162,11 +161,10 @@ def _row(number: int, reading: Reading, step: Step) -> str:
 
 def _rows(ramp: Ramp) -> dict[str, Any]:
     """Return the rows so far, what was foretold of each, and the tip by what is known now."""
-    measured = ramp.measured
     shown: dict[str, Any] = {
-        "bias_V": [reading.bias_V for reading in measured.readings],
-        "current_mA": [reading.current_mA for reading in measured.readings],
-        "foretold_K": [step.tip_limit_K for step in measured.steps],
+        "bias_V": [reading.bias_V for reading in ramp.readings],
+        "current_mA": [reading.current_mA for reading in ramp.readings],
+        "foretold_K": [step.tip_limit_K for step in ramp.steps],
         "limit_K": ramp.limit_K,
     }
     biases = np.linspace(0.0, max(shown["bias_V"]), 101)[1:]
@@ -181,8 +179,8 @@ def _rows(ramp: Ramp) -> dict[str, Any]:
 
 def _result(output: Path, ramp: Ramp) -> str:
     """Return what was measured, in words."""
-    readings = ramp.measured.readings
-    text = f"{len(readings)} rows in {output}: {ramp.measured.reason}.\n"
+    readings = ramp.readings
+    text = f"{len(readings)} rows in {output}: {ramp.reason}.\n"
     if ramp.tells:
         last_V = max(reading.bias_V for reading in readings)
         low, tip, high = ramp.known.likely.band(np.array([last_V]))[:, 0].tolist()
