@@ -19,7 +19,7 @@ import warnings
 import zipfile
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice, zip_longest
@@ -37,7 +37,7 @@ from hotlever.units import TIMES, conversion, name_and_unit
 
 T = TypeVar("T")
 # The tables of a file by name, whose lines are made when they are asked for.
-Groups = Mapping[str, Callable[[], list[str]]]
+Groups = dict[str, Callable[[], list[str]]]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class _Format:
     extra, package : str
         What brings its library, and this.
     groups : callable
-        Opens a file's content for as long as a context lasts, and gives its tables.
+        Returns the tables of a file's content.
     named : bool
         Whether these have names; else there is one.
     """
@@ -59,15 +59,15 @@ class _Format:
     what: str
     extra: str
     package: str
-    groups: Callable[[bytes, str], AbstractContextManager[Groups]]
+    groups: Callable[[bytes, str], Groups]
     named: bool = True
 
     def read(self, raw: bytes, where: str, take: Callable[[Groups], T]) -> T:
         """Return what is taken of the tables; errors of the library are those of the input."""
         try:
             # a damaged file has numbers that are none
-            with np.errstate(invalid="ignore"), self.groups(raw, where) as groups:
-                return take(groups)
+            with np.errstate(invalid="ignore"):
+                return take(self.groups(raw, where))
         except ImportError:
             raise InputError(
                 f"{where}: reading a {self.what} needs the package {self.package}; install it "
@@ -128,7 +128,7 @@ def _format_of(raw: bytes) -> _Format | None:
     if _experiment_order(raw):
         return _Format("Igor experiment", "igor", "igor2", _experiment_groups)
     if raw.startswith(waves):
-        return _Format("Igor wave", "igor", "igor2", _igor_groups, named=False)
+        return _Format("Igor wave", "igor", "igor2", _wave_alone, named=False)
     # MATLAB's of version 7.3 have a block of their own in front
     if raw.startswith(hdf5) or raw[512:].startswith(hdf5):
         return _Format("HDF5 file", "hdf5", "h5py", _hdf5_groups)
@@ -172,13 +172,8 @@ def _check_length(rows: int, where: str) -> None:
 # --- Igor's waves -------------------------------------------------------------------------------
 
 
-@contextmanager
-def _igor_groups(raw: bytes, where: str) -> Iterator[Groups]:
-    yield {"": partial(_igor_lines, raw, where)}
-
-
-def _igor_lines(raw: bytes, where: str) -> list[str]:
-    """Return the lines of a wave.
+def _wave_alone(raw: bytes, where: str) -> Groups:
+    """Give the lines of a wave.
 
     A column with the wave's scale comes first, called ``time`` or ``x``, unless rows are merely
     numbered. Columns are called by their labels; one alone is called like the wave, and has its
@@ -200,8 +195,8 @@ def _igor_lines(raw: bytes, where: str) -> list[str]:
     if scale is not None:
         names.insert(0, scale[0])
         columns.insert(0, scale[1].tolist())
-    lines = [*_note(wave, where), "\t".join(names)]
-    return lines + ["\t".join(map(repr, row)) for row in zip(*columns, strict=True)]
+    rows = ("\t".join(map(repr, row)) for row in zip(*columns, strict=True))
+    return {"": lambda: [*_note(wave, where), "\t".join(names), *rows]}
 
 
 def _wave(raw: bytes) -> dict[str, Any]:
@@ -238,10 +233,9 @@ def _experiment_order(raw: bytes) -> str:
     return ""
 
 
-@contextmanager
-def _experiment_groups(raw: bytes, where: str) -> Iterator[Groups]:
+def _experiment_groups(raw: bytes, where: str) -> Groups:
     """Give the waves of each folder of an experiment, and the scales that they have."""
-    order, at, path, known = _experiment_order(raw), 0, ["/"], {"/": _Node.empty()}
+    order, at, path, known = _experiment_order(raw), 0, ["/"], {"/": _Node()}
     while at < len(raw):
         kind, _, size = struct.unpack_from(f"{order}HHi", raw, at)
         content, at = raw[at + 8 : at + 8 + size], at + 8 + size
@@ -251,13 +245,13 @@ def _experiment_groups(raw: bytes, where: str) -> Iterator[Groups]:
             case 9:
                 name = f"{path[-1].rstrip('/')}/{_name(content)}"
                 path.append(name)
-                known.setdefault(name, _Node.empty())
+                known.setdefault(name, _Node())
             case 10 if len(path) > 1:
                 path.pop()
-    tables: dict[str, Callable[[], list[str]]] = {}
+    tables: Groups = {}
     for name, node in known.items():
         tables |= node.tables(name, where)
-    yield tables
+    return tables
 
 
 def _add_wave(node: _Node, content: bytes, where: str) -> None:
@@ -329,40 +323,39 @@ def _name(name: Any) -> str:
 
 
 @contextmanager
-def _tdms_file(raw: bytes) -> Iterator[Any]:
-    """Open a TDMS file; what the library would only print is an error."""
-    from nptdms import TdmsFile
+def _refusing() -> Iterator[None]:
+    """Raise what the library would only print: that a file is cut short, and its values a guess."""
     from nptdms.log import log_manager
 
+    def refuse(record: logging.LogRecord) -> bool:
+        raise ValueError(record.getMessage())
+
     console = log_manager.console_handler
-    console.addFilter(_refuse)
+    console.addFilter(refuse)
     try:
-        # channels are read one by one, as a damaged file may claim any length
-        with TdmsFile.open(io.BytesIO(raw)) as file:
-            yield file
+        yield
     finally:
-        console.removeFilter(_refuse)
+        console.removeFilter(refuse)
 
 
-@contextmanager
-def _tdms_groups(raw: bytes, where: str) -> Iterator[Groups]:
+def _tdms_groups(raw: bytes, where: str) -> Groups:
     """Give the groups with values by their names, as these are told.
 
     Where channels are waveforms, and none has the times, a column of these comes first.
     """
-    with _tdms_file(raw) as file:
-        yield {
+    from nptdms import TdmsFile
+
+    with _refusing():
+        # channels are read one by one, as a damaged file may claim any length
+        file = TdmsFile.open(io.BytesIO(raw))
+        return {
             _cell(group.name): partial(_lines_of_group, file, group, where)
             for group in file.groups()
             if any(map(len, group.channels()))
         }
 
 
-def _refuse(record: logging.LogRecord) -> bool:
-    """Raise what the library would only print: that a file is cut short, and its values a guess."""
-    raise ValueError(record.getMessage())
-
-
+@_refusing()
 def _lines_of_group(file: Any, group: Any, where: str) -> list[str]:
     channels = group.channels()
     length = max(map(len, channels))
@@ -414,9 +407,9 @@ def _times(channels: Sequence[Any], names: Sequence[str], where: str) -> tuple[f
 
 def _cell(value: Any) -> str:
     """Return a cell: the shortest text of a number that is read as the same one."""
-    return (
-        repr(value) if isinstance(value, float) else " ".join(str(value).split()).replace('"', "")
-    )
+    if isinstance(value, float):
+        return repr(value)
+    return " ".join(str(value).split()).replace('"', "")
 
 
 # --- HDF5 and MATLAB ----------------------------------------------------------------------------
@@ -438,15 +431,10 @@ class _Node:
         Columns that an array may be; one of more is an image.
     """
 
-    settings: list[str]
-    columns: dict[int, dict[str, Array]]
+    settings: list[str] = field(default_factory=list)
+    columns: dict[int, dict[str, Array]] = field(default_factory=lambda: defaultdict(dict))
     matrices: list[tuple[str, str, Array]] = field(default_factory=list)
     most: int = 64
-
-    @classmethod
-    def empty(cls, settings: Sequence[str] = ()) -> _Node:
-        """Return one without columns."""
-        return cls(list(settings), defaultdict(dict))
 
     def add(self, name: str, value: Any, unit: str = "") -> None:
         """Add what has a name: columns, or a setting; what is neither is said to be left out."""
@@ -467,8 +455,11 @@ class _Node:
         else:
             self.settings.append(f"# left out, an image: {heading}")
 
-    def _add_columns_of_matrices(self) -> None:
-        """Make columns of matrices: as long as a column beside them, else as the longer side."""
+    def tables(self, name: str, where: str) -> Groups:
+        """Return its tables by name, one for each number of rows.
+
+        Columns of matrices are as long as a column beside them, else as the longer side.
+        """
         lengths = set(self.columns)
         for name, unit, values in self.matrices:
             rows, width = values.shape
@@ -476,16 +467,12 @@ class _Node:
             lies = beside < 0 or (beside == 0 and rows < width)
             for number, column in enumerate(values if lies else values.T, start=1):
                 self.columns[column.size][_heading(f"{name} {number}", unit)] = column
-        self.matrices.clear()
-
-    def tables(self, name: str, where: str) -> dict[str, Callable[[], list[str]]]:
-        """Return its tables by name, one for each number of rows."""
-        self._add_columns_of_matrices()
-        names = {
-            rows: name if len(self.columns) == 1 else f"{name} ({rows} rows)"
+        return {
+            name if len(self.columns) == 1 else f"{name} ({rows} rows)": partial(
+                self._lines, rows, where
+            )
             for rows in self.columns
         }
-        return {names[rows]: partial(self._lines, rows, where) for rows in self.columns}
 
     def _lines(self, rows: int, where: str) -> list[str]:
         _check_length(rows, where)
@@ -498,28 +485,19 @@ def _decoded(text: Any) -> Any:
     return text.decode("utf-8", errors="replace") if isinstance(text, bytes) else text
 
 
-@contextmanager
-def _hdf5_groups(raw: bytes, where: str) -> Iterator[Groups]:
+def _hdf5_groups(raw: bytes, where: str) -> Groups:
     """Give the groups of an HDF5 file that have datasets, and what attributes say of them."""
     import h5py
 
     with h5py.File(io.BytesIO(raw), "r") as file:
-        tables: dict[str, Callable[[], list[str]]] = {}
-        _walk_hdf5(file, "/", [], tables, where)
-        yield tables
+        return _in_group(file, "/", [], where)
 
 
-def _walk_hdf5(
-    group: Any,
-    name: str,
-    above: Sequence[str],
-    tables: dict[str, Callable[[], list[str]]],
-    where: str,
-) -> None:
-    """Add the tables of a group, and of those in it."""
+def _in_group(group: Any, name: str, above: Sequence[str], where: str) -> Groups:
+    """Return the tables of a group, and of those in it."""
     import h5py
 
-    node = _Node.empty([*above, *_attributes(group)])
+    node = _Node([*above, *_attributes(group)])
     inner = {}
     for key in group:
         # a link may lead nowhere
@@ -531,17 +509,18 @@ def _walk_hdf5(
         elif isinstance(part, h5py.Dataset):
             _check_filters(part, where)
             _add_dataset(node, key, part)
-    tables |= node.tables(name, where)
+    tables = node.tables(name, where)
     for key, part in inner.items():
         path = f"{name.rstrip('/')}/{_cell(key)}"
         if isinstance(part, h5py.Group):
-            _walk_hdf5(part, path, node.settings, tables, where)
+            tables |= _in_group(part, path, node.settings, where)
         else:
             _check_filters(part, where)
-            table = _Node.empty([*node.settings, *_attributes(part)])
+            table = _Node([*node.settings, *_attributes(part)])
             for column in part.dtype.names:
                 table.add(column, part[column])
             tables |= table.tables(path, where)
+    return tables
 
 
 def _check_filters(dataset: Any, where: str) -> None:
@@ -600,33 +579,25 @@ def _unpacked(values: Any, said: Mapping[str, list[Any]]) -> Any:
 
 def _attributes(group: Any) -> list[str]:
     """Return what the attributes of a group say, as comments."""
-    node = _Node.empty()
+    node = _Node()
     for key, value in group.attrs.items():
         if np.size(value) == 1:
             node.add(key, value)
     return node.settings
 
 
-@contextmanager
-def _matlab_groups(raw: bytes, where: str) -> Iterator[Groups]:
+def _matlab_groups(raw: bytes, where: str) -> Groups:
     """Give the variables of a MATLAB file, and its structures, each a table of its own."""
     from scipy.io import loadmat
 
-    content = loadmat(io.BytesIO(raw), simplify_cells=True)
-    tables: dict[str, Callable[[], list[str]]] = {}
-    _walk_matlab(content, "/", [], tables, where)
-    yield tables
+    return _in_structure(loadmat(io.BytesIO(raw), simplify_cells=True), "/", [], where)
 
 
-def _walk_matlab(
-    content: Mapping[str, Any],
-    name: str,
-    above: Sequence[str],
-    tables: dict[str, Callable[[], list[str]]],
-    where: str,
-) -> None:
-    """Add the tables of a structure, and of those in it."""
-    node, inner = _Node.empty(above), dict[str, Mapping[str, Any]]()
+def _in_structure(
+    content: Mapping[str, Any], name: str, above: Sequence[str], where: str
+) -> Groups:
+    """Return the tables of a structure, and of those in it."""
+    node, inner = _Node([*above]), dict[str, Mapping[str, Any]]()
     for key, value in content.items():
         if key.startswith("__"):
             continue
@@ -636,16 +607,16 @@ def _walk_matlab(
             inner |= {f"{key}({n})" if many else key: part for n, part in enumerate(parts, start=1)}
         else:
             node.add(key, value)
-    tables |= node.tables(name, where)
+    tables = node.tables(name, where)
     for key, part in inner.items():
-        _walk_matlab(part, f"{name.rstrip('/')}/{key}", node.settings, tables, where)
+        tables |= _in_structure(part, f"{name.rstrip('/')}/{key}", node.settings, where)
+    return tables
 
 
 # --- workbooks ----------------------------------------------------------------------------------
 
 
-@contextmanager
-def _workbook_groups(raw: bytes, where: str) -> Iterator[Groups]:
+def _workbook_groups(raw: bytes, where: str) -> Groups:
     """Give the sheets of a packed workbook that hold numbers, hidden ones too."""
     import openpyxl
 
@@ -655,12 +626,9 @@ def _workbook_groups(raw: bytes, where: str) -> Iterator[Groups]:
         warnings.simplefilter("ignore")
         packed = io.BytesIO(_without_fills(raw))
         book = openpyxl.load_workbook(packed, read_only=True, data_only=True)
-        try:
+        with closing(book):
             sheets = {each.title: each.iter_rows(values_only=True) for each in book.worksheets}
-            groups = _sheets(sheets, where)
-        finally:
-            book.close()
-    yield groups
+            return _sheets(sheets, where)
 
 
 def _without_fills(raw: bytes) -> bytes:
@@ -679,8 +647,7 @@ def _without_fills(raw: bytes) -> bytes:
     return packed.getvalue()
 
 
-@contextmanager
-def _old_workbook_groups(raw: bytes, where: str) -> Iterator[Groups]:
+def _old_workbook_groups(raw: bytes, where: str) -> Groups:
     """Give the sheets of an .xls file that hold numbers, hidden ones too."""
     import xlrd
 
@@ -693,19 +660,16 @@ def _old_workbook_groups(raw: bytes, where: str) -> Iterator[Groups]:
                 with suppress(OverflowError):
                     return xlrd.xldate_as_datetime(cell.value, book.datemode)
                 return "#VALUE!"
-            return (
-                xlrd.error_text_from_code[cell.value]
-                if cell.ctype == xlrd.XL_CELL_ERROR
-                else cell.value
-            )
+            is_error = cell.ctype == xlrd.XL_CELL_ERROR
+            return xlrd.error_text_from_code[cell.value] if is_error else cell.value
 
         sheets = {sheet.name: [list(map(value, row)) for row in sheet.get_rows()] for sheet in book}
-        yield _sheets(sheets, where)
+        return _sheets(sheets, where)
 
 
 def _sheets(sheets: Mapping[str, Iterable[Sequence[Any]]], where: str) -> Groups:
     """Return the tables of sheets that hold numbers."""
-    groups: dict[str, Callable[[], list[str]]] = {}
+    groups: Groups = {}
     for name, cells in sheets.items():
         rows = list(islice(cells, MOST_LINES + 1))
         if any(isinstance(cell, int | float) for row in rows for cell in row):
