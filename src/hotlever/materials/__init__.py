@@ -1,4 +1,5 @@
 """Material laws, the doping profile, and the published parameter sets."""
+# ruff: noqa: F401 (what is imported here is what the package offers)
 
 from hotlever.materials.kind import Kind
 from hotlever.materials.kinds import KINDS
@@ -10,17 +11,3 @@ from hotlever.materials.parameters import (
     full_name,
 )
 from hotlever.materials.presets import PUBLISHED, REFERENCE, Material, published
-
-__all__ = [
-    "HIGH_DOPED",
-    "KINDS",
-    "LOW_DOPED",
-    "PARAMETERS",
-    "PUBLISHED",
-    "REFERENCE",
-    "Kind",
-    "Material",
-    "Parameter",
-    "full_name",
-    "published",
-]

@@ -114,8 +114,8 @@ def assignments(
         if quantity.partition(" ")[0] == UNUSED:
             assigned.append(Assignment(None, None, f"{UNUSED} {len(assigned) + 1}", heading))
             continue
-        symbol, unit = _quantity(quantity, assigned=True)
-        symbol = GROUP if quantity == GROUP else symbol
+        symbol = GROUP if quantity == GROUP else quantity_of(quantity, assigned=True)
+        unit = name_and_unit(quantity)[1]
         if symbol is None:
             names = [*MEASURANDS, UNUSED, GROUP]
             raise unknown_name("quantity", name_and_unit(quantity)[0], names, where)
@@ -137,51 +137,45 @@ def _lines(text: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
             yield f"{text}: line {row}", line
 
 
-def _quantity(heading: str, assigned: bool = False) -> tuple[str | None, str | None]:
-    """Return the quantity that a heading names, None if that is not known, and its unit.
+def quantity_of(heading: str, *, assigned: bool = False) -> str | None:
+    """Return the quantity that a heading, or what is assigned to one, names; None if not known.
 
     The name alone is no time, unless it is assigned: settings of instruments are called so too.
     """
     name, unit = name_and_unit(heading)
     of_time = assigned or conversion(unit or "", MEASURANDS["t"].typed_unit)
-    is_time = name.casefold() in TIMES and of_time
-    return "t" if is_time else symbol_of(name), unit
+    return "t" if name.casefold() in TIMES and of_time else symbol_of(name)
 
 
-def quantity_of(heading: str, *, assigned: bool = False) -> str | None:
-    """Return the quantity that a heading, or what is assigned to one, names; None if not known."""
-    return _quantity(heading, assigned)[0]
-
-
-def of_columns(assigned: Sequence[Assignment]) -> list[Assignment]:
-    """Return what is said of columns, without the group that they are of."""
-    return [each for each in assigned if each.symbol != GROUP]
-
-
-def measured_table(path: str | os.PathLike[str], assigned: Sequence[Assignment]) -> TextTable:
+def measured_table(
+    path: str | os.PathLike[str], columns: Mapping[str, str] | None
+) -> tuple[TextTable, list[Assignment]]:
     """Read the table of a measurement file, below the row whose headings are known or assigned.
+
+    Returns it, and what is said of its columns (`parse_columns`).
 
     Raises
     ------
     InputError
         If there is none.
     """
-    headings = {each.heading.casefold() for each in of_columns(assigned)}
-    group = next((each.heading for each in assigned if each.symbol == GROUP), None)
+    said = assignments(columns)
+    assigned = [each for each in said if each.symbol != GROUP]
+    group = next((each.heading for each in said if each.symbol == GROUP), None)
 
     def is_heading(name: str) -> bool:
         bare = name_and_unit(name)[0]
         named = symbol_of(bare) is not None or any(_bare(bare) in plain for plain in PLAIN.values())
-        return named or bool({name.casefold(), bare.casefold()} & headings)
+        return named or _is_assigned(name, assigned)
 
-    expected = "one like 'V_b (V),I_h (mA),V_r (mV)'"
-    return read_table(
-        path,
-        expected,
-        is_heading=is_heading,
-        group=group,
-        group_stated_by=f"--column '{GROUP}={{group}}'",
-    )
+    expected, stated_by = "one like 'V_b (V),I_h (mA),V_r (mV)'", f"--column '{GROUP}={{group}}'"
+    return read_table(path, expected, True, is_heading, group, stated_by), assigned
+
+
+def _is_assigned(name: str, assigned: Sequence[Assignment]) -> bool:
+    """Whether a heading is named, with or without its unit, where something is said of columns."""
+    names = {name.casefold(), name_and_unit(name)[0].casefold()}
+    return any(each.heading.casefold() in names for each in assigned)
 
 
 def find_columns(
@@ -205,7 +199,7 @@ def find_columns(
     where = table.where(-1)
     columns: dict[str, Column] = {}
     unused = {table.index(each.heading) for each in assigned if each.symbol is None}
-    for symbol, unit, _, heading in of_columns(assigned):
+    for symbol, unit, _, heading in assigned:
         if symbol is None:
             continue
         index = table.index(heading)
@@ -220,7 +214,7 @@ def find_columns(
     unavailable = unused | {column.index for column in columns.values()}
     candidates = defaultdict[str, list[int]](list)
     for index, heading in enumerate(table.names):
-        named, _ = _quantity(heading)
+        named = quantity_of(heading)
         if named is not None and named not in columns and index not in unavailable:
             candidates[named].append(index)
     for symbol, indices in candidates.items():
@@ -341,11 +335,8 @@ def _require(table: TextTable, columns: Mapping[str, Column], driven: bool) -> N
 def constant_bias(table: TextTable) -> float | None:
     """Return the one bias (V) of a table that a comment states, such as ``# V_b (V): 8``."""
     for key, value in table.settings.items():
-        symbol, unit = _quantity(key)
-        if symbol == "V_b":
-            return amount(
-                value, unit, MEASURANDS[symbol].typed_unit, f"{table.path}: {excerpt(key)}"
-            )
+        if quantity_of(key) == "V_b":
+            return amount(value, name_and_unit(key)[1], "V", f"{table.path}: {excerpt(key)}")
     return None
 
 
@@ -371,14 +362,12 @@ def note_on_bias(
 def note_on_header(table: TextTable, assigned: Sequence[Assignment]) -> list[str]:
     """Say what was taken for the header row where nobody knows a heading in it."""
     names = [name for name in table.names if name.strip()]
-    assigned_names = {each.heading.casefold() for each in of_columns(assigned)}
-
-    def is_known(name: str) -> bool:
-        bare, unit = name_and_unit(name)
-        is_assigned = bool({name.casefold(), bare.casefold()} & assigned_names)
-        return is_assigned or unit is not None or quantity_of(name) is not None
-
-    if not names or any(map(is_known, names)):
+    if not names or any(
+        _is_assigned(name, assigned)
+        or name_and_unit(name)[1] is not None
+        or quantity_of(name) is not None
+        for name in names
+    ):
         return []
     row = ", ".join(f"'{excerpt(name)}'" for name in names[:6])
     return [f"{table.where(-1)}: {row} is taken for the header row"]

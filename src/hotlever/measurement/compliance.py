@@ -71,17 +71,14 @@ class ComplianceOptions:
     named: int = 8
 
 
-def is_level(values: Array, options: ComplianceOptions | None = None) -> Mask:
+def is_level(values: Array) -> Mask:
     """Return which values, (n,), are level with the one of the largest magnitude."""
     size = np.abs(values)
-    share = (options or ComplianceOptions()).level
-    return np.asarray(size >= (1.0 - share) * np.nanmax(size, initial=0.0))
+    return np.asarray(size >= (1.0 - ComplianceOptions.level) * np.nanmax(size, initial=0.0))
 
 
 def without_rows_at_compliance(
-    measurement: Measurement,
-    circuit: Circuit | None = None,
-    options: ComplianceOptions | None = None,
+    measurement: Measurement, circuit: Circuit | None = None
 ) -> Measurement:
     """Return a measurement without rows at a limit of an instrument; a note names them.
 
@@ -93,9 +90,8 @@ def without_rows_at_compliance(
         As it is returned if it has no such rows, or is one in time.
     circuit : Circuit, optional
         By whose R_s the voltage over the lever follows, unless the measurement has another one.
-    options : ComplianceOptions, optional
     """
-    options = options or ComplianceOptions()
+    options = ComplianceOptions()
     if measurement.time_us is not None:
         return measurement
     while True:
@@ -146,7 +142,7 @@ def _at_limit(measurement: Measurement, column: _Column, options: ComplianceOpti
     """
     values, along = column.values, column.along
     usable = np.isfinite(values) & np.isfinite(along)
-    level = usable & is_level(np.where(usable, values, np.nan), options)
+    level = usable & is_level(np.where(usable, values, np.nan))
     stopped, largest = np.zeros_like(level), np.abs(values[usable]).max(initial=0.0)
     distance = measurement.distance_um
     place = np.zeros(level.shape) if distance is None else np.nan_to_num(distance)
@@ -155,7 +151,7 @@ def _at_limit(measurement: Measurement, column: _Column, options: ComplianceOpti
         for sweep in sweeps_of(measurement.bias_V[rows]):
             part = rows[sweep]
             part = part[np.argsort(along[part], kind="stable")]
-            highest = is_level(values[part], options)
+            highest = is_level(values[part])
             near = np.abs(values[part]).max() >= (1.0 - options.apart) * largest
             if near and _stops(np.abs(along[part]), np.abs(values[part]), highest, options):
                 stopped[part[highest]] = True

@@ -14,7 +14,6 @@ from hotlever.errors import InputError, counted, excerpt
 from hotlever.files import read_bytes
 from hotlever.lever.transient.waveform import Polyline, Waveform
 from hotlever.measurement.columns import (
-    assignments,
     constant_bias,
     find_columns,
     is_taken_as_bias,
@@ -23,7 +22,6 @@ from hotlever.measurement.columns import (
     note_on_header,
     note_on_unused,
     note_on_words,
-    of_columns,
     quantity_of,
 )
 from hotlever.measurement.compliance import without_rows_at_compliance
@@ -38,56 +36,11 @@ from hotlever.measurement.rows import described, disagreements, sweeps_of
 from hotlever.probe import Circuit, Probe
 from hotlever.quantities import FITTED, MEASURANDS
 from hotlever.tables import groups_in
-from hotlever.types import Array
+from hotlever.types import Array, Mask
 from hotlever.units import MOST_BIAS, name_and_unit
 
 
-@dataclass(frozen=True)
-class BiasOptions:
-    """How a bias follows from voltages, currents and times.
-
-    Attributes
-    ----------
-    in_series : float
-        Times the largest resistance of a lever: in series, it makes the bias rise along its curve.
-    fall : float
-        Share of the largest bias by which it may fall along the curve, for noise.
-    cold : float
-        Share of the largest current below which resistances are noise.
-    agreement : float
-        Share of the largest bias by which V_b - V_l may be off R_s I_h.
-    straight : float
-        Share of the largest bias by which it may be off straight lines.
-    deviations : float
-        The same in standard deviations of its noise.
-    noise : float
-        Share of the largest bias up to which these count.
-    same_time : float
-        Share of a time within which it is the same.
-    jump : float
-        Share of the largest bias by which it jumps from one row to the next.
-    most_lines : int
-        Straight lines that a wave form may have.
-    """
-
-    in_series: float = 2.0
-    fall: float = 2e-3
-    cold: float = 0.1
-    agreement: float = 0.05
-    straight: float = 1e-3
-    deviations: float = 5.0
-    noise: float = 0.03
-    same_time: float = 1e-9
-    jump: float = 0.1
-    most_lines: int = 500
-
-
-def find_bias(
-    contents: Contents,
-    circuit: Circuit | None,
-    waveform: Waveform | None,
-    options: BiasOptions,
-) -> None:
+def find_bias(contents: Contents, circuit: Circuit | None, waveform: Waveform | None) -> None:
     """Complete bias, current and R_s from the voltage over the lever and the wave form, if given.
 
     Raises
@@ -109,21 +62,19 @@ def find_bias(
         values["V_b"] = np.full_like(values["V_b"], bias)
         contents.origin["V_b"] = "a comment, the same for all rows"
     else:
-        _bias_of_lever_voltage(contents, circuit, options)
+        _bias_of_lever_voltage(contents, circuit)
     if "V_l" in columns and "t" in columns and "I_h" not in columns:
         _current_of_voltages(contents, circuit)
     elif "V_l" in columns and "V_b" in columns and waveform is None:
-        _compare_voltages(contents, options)
+        _compare_voltages(contents)
 
 
-def _bias_of_lever_voltage(
-    contents: Contents, circuit: Circuit | None, options: BiasOptions
-) -> None:
+def _bias_of_lever_voltage(contents: Contents, circuit: Circuit | None) -> None:
     lever, current = contents.values["V_l"], contents.values["I_h"]
     for symbol, missing in (("V_l", np.isnan(lever)), ("I_h", np.isnan(current))):
         contents.refuse(missing, "a number, since V_b follows from V_l", symbol)
     kohm = _series_kohm(contents, circuit, "V_l without R_s, from which the bias follows")
-    more = _telling_kohm(lever, current, kohm, options)
+    more = _telling_kohm(lever, current, kohm)
     if "t" not in contents.columns and more > kohm:
         contents.note(
             f"V_b = V_l + R_s I_h with R_s = {1000.0 * kohm:g} ohm does not tell the points beyond "
@@ -166,34 +117,40 @@ def _put_resistance(contents: Contents, ohm: float, what: str, origin: str) -> N
     contents.settings.put("series_resistance_ohm", ohm, origin)
 
 
-def _telling_kohm(lever: Array, current: Array, kohm: float, options: BiasOptions) -> float:
+def _telling_kohm(lever: Array, current: Array, kohm: float) -> float:
     """Return a resistance behind which no two points of a curve have one bias: its own if it can.
 
     Beyond the knee voltage and current fall and rise again, each on its own; behind a resistance
     of the lever's size or more the bias rises all the way.
     """
-    warm = np.abs(current) > options.cold * np.abs(current).max()
-    enough = options.in_series * float(np.max(np.abs(lever[warm] / current[warm]), initial=0.0))
+    warm = _is_warm(current)
+    # twice the largest resistance of a lever: the bias rises along its curve behind that
+    enough = 2.0 * float(np.max(np.abs(lever[warm] / current[warm]), initial=0.0))
     order = np.argsort(np.abs(lever + enough * current), kind="stable")
     bias = np.abs(lever + kohm * current)[order]
-    falls = np.max(np.maximum.accumulate(bias) - bias) > options.fall * bias.max()
+    # by more than noise
+    falls = np.max(np.maximum.accumulate(bias) - bias) > 2e-3 * bias.max()
     return float(f"{enough:.2g}") if falls and enough > kohm else kohm
 
 
-def _compare_voltages(contents: Contents, options: BiasOptions) -> None:
+def _is_warm(current: Array) -> Mask:
+    """Return where a resistance, of this current, is more than noise."""
+    return np.asarray(np.abs(current) > 0.1 * np.nanmax(np.abs(current), initial=0.0))
+
+
+def _compare_voltages(contents: Contents) -> None:
     """Take R_s from bias and lever voltage, or check that the one given agrees with them."""
     path, values = contents.table.path, contents.values
     settings = contents.settings.values
     behind, current = values["V_b"] - values["V_l"], values["I_h"]
-    warm = np.abs(current) > options.cold * np.nanmax(np.abs(current), initial=0.0)
-    warm &= np.isfinite(behind)
+    warm = _is_warm(current) & np.isfinite(behind)
     if not warm.any():
         contents.note("V_l is not used beside V_b without I_h")
         return
     kohm = float(np.median(behind[warm] / current[warm]))
     ohm = settings.get("series_resistance_ohm", 1000.0 * kohm)
     off = np.abs(behind[warm] - ohm / 1000.0 * current[warm])
-    if kohm < 0.0 or np.median(off) > options.agreement * np.abs(values["V_b"]).max():
+    if kohm < 0.0 or np.median(off) > 0.05 * np.abs(values["V_b"]).max():
         raise InputError(
             f"{path}: V_b - V_l is {kohm:.4g} kOhm times I_h, expected R_s = "
             f"{ohm:.4g} ohm; is a unit wrong?"
@@ -244,10 +201,10 @@ def check_times(contents: Contents) -> None:
         raise InputError(f"{contents.table.path}: found one row, expected two or more times")
 
 
-def leave_out_jumps(contents: Contents, waveform: Waveform, options: BiasOptions) -> None:
+def leave_out_jumps(contents: Contents, waveform: Waveform) -> None:
     """Leave out what was measured when the bias jumps: nobody can tell if before or behind."""
     times, values = contents.values["t"], contents.values
-    same = options.same_time
+    same = 1e-9  # share of a time within which it is the same
     pieces = waveform.pieces(float(times[-1]) * (1.0 + same) + same)
     jumps = np.array([piece.start for piece in pieces if piece.jumps])
     at_jump = np.isclose(times[:, None], jumps, rtol=same, atol=0.0).any(axis=1)
@@ -256,7 +213,7 @@ def leave_out_jumps(contents: Contents, waveform: Waveform, options: BiasOptions
     contents.note_rows(at_jump, "the bias jumps at this time, so that the row is not used")
 
 
-def find_waveform(contents: Contents, options: BiasOptions) -> Waveform:
+def find_waveform(contents: Contents, most_lines: int = 500) -> Waveform:
     """Return the straight lines that biases lie on within their noise; times count from 0 on.
 
     Raises
@@ -267,8 +224,8 @@ def find_waveform(contents: Contents, options: BiasOptions) -> Waveform:
     table, times, bias = contents.table, contents.values["t"], contents.values["V_b"]
     largest = float(np.abs(bias).max())
     noise = noise_about_neighbours(bias) if bias.size > 4 else 0.0
-    scatter = min(options.deviations * noise, options.noise * largest)
-    tolerance = max(options.straight * largest, scatter)
+    # off straight lines by a share of the largest bias, or by its noise if that is no more than 3 %
+    tolerance = max(1e-3 * largest, min(5.0 * noise, 0.03 * largest))
     begins_on = abs(float(bias[0])) > tolerance
     if begins_on and times[0] < 0.0:
         raise InputError(
@@ -277,10 +234,10 @@ def find_waveform(contents: Contents, options: BiasOptions) -> Waveform:
         )
     if not begins_on:
         times = contents.values["t"] = times - times[0]
-    corners = _corners(times, bias, tolerance, options.most_lines)
+    corners = _corners(times, bias, tolerance, most_lines)
     if corners is None:
         raise InputError(
-            f"{table.path}: V_b has more than {options.most_lines} straight parts, expected fewer, "
+            f"{table.path}: V_b has more than {most_lines} straight parts, expected fewer, "
             "or the wave form beside the file, such as --pulse 10V,5us"
         )
     from scipy.interpolate import make_lsq_spline  # takes half a second
@@ -296,7 +253,7 @@ def find_waveform(contents: Contents, options: BiasOptions) -> Waveform:
             at, volts = np.append(0.0, at), np.append(volts[0], volts)
     else:
         volts[0] = 0.0
-    steep = (np.diff(corners) == 1) & (np.abs(np.diff(bias[corners])) > options.jump * largest)
+    steep = (np.diff(corners) == 1) & (np.abs(np.diff(bias[corners])) > 0.1 * largest)
     if steep.any():
         row = int(corners[:-1][steep][0]) + 1
         contents.notes.append(
@@ -370,8 +327,7 @@ def read_measurement(
         Naming file, line and column, what was found and what is expected; also for values that
         no lever can have, or whose unit must be wrong.
     """
-    assigned = assignments(columns)
-    table = measured_table(path, assigned)
+    table, assigned = measured_table(path, columns)
     settings = Settings.of(table)
     quantities = find_columns(table, assigned, driven=waveform is not None)
     remarks = (
@@ -422,13 +378,12 @@ def _complete_in_time(
     contents: Contents, circuit: Circuit | None, waveform: Waveform | None
 ) -> tuple[Waveform, str]:
     """Complete what was measured in time; return its wave form, and its order in words."""
-    options = BiasOptions()
     check_times(contents)
-    find_bias(contents, circuit, waveform, options)
+    find_bias(contents, circuit, waveform)
     if waveform is None:
-        waveform = find_waveform(contents, options)
+        waveform = find_waveform(contents)
     else:
-        leave_out_jumps(contents, waveform, options)
+        leave_out_jumps(contents, waveform)
     check(contents, signed=True)
     return waveform, f"in time, {counted(len(contents.table.rows), 'row')}; {waveform.text}"
 
@@ -437,7 +392,7 @@ def _complete_at_rest(
     contents: Contents, circuit: Circuit | None, series_ohm: float, *, symmetric: bool
 ) -> str:
     """Complete a slow sweep, of either polarity; return the order of its rows in words."""
-    find_bias(contents, circuit, None, BiasOptions())
+    find_bias(contents, circuit, None)
     bias = contents.values["V_b"]
     if symmetric:
         mirror(contents)
@@ -560,8 +515,7 @@ def file_columns(
     InputError
         If the file holds no table.
     """
-    assigned = assignments(columns)
-    table = measured_table(path, assigned)
+    table, assigned = measured_table(path, columns)
     symbols = dict[int, str]()
     try:
         used = find_columns(table, assigned, driven=driven)
@@ -569,7 +523,7 @@ def file_columns(
     except InputError:
         # what is missing or stands twice is for the user to say
         symbols = {i: quantity_of(name) or "" for i, name in enumerate(table.names)}
-        for each in of_columns(assigned):
+        for each in assigned:
             with suppress(InputError):
                 symbols[table.index(each.heading)] = each.symbol or ""
     headings = [name.casefold() for name in table.names]

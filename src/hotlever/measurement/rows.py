@@ -9,7 +9,7 @@ the mean bias, some mK of the tip temperature.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -20,69 +20,29 @@ from hotlever.quantities import FITTED
 from hotlever.types import Array, Index, Mask
 
 
-@dataclass(frozen=True)
-class RowOptions:
-    """What counts as a sweep, as a difference of sweeps, and as many rows.
-
-    Attributes
-    ----------
-    turn : float
-        Share of the range of the bias by which it goes back where it turns.
-    fewest : int
-        Rows of a sweep.
-    different : float
-        Share of the largest value by which sweeps differ (rms).
-    deviations : float
-        Noise has von Neumann's ratio of 1 within so many of its standard deviations, 1/√n (Ann.
-        Math. Stat. 12, 367 (1941)): half the mean square between neighbours over that of all.
-    compared : int
-        Rows that two sweeps have in common, from which on they are compared.
-    many : int
-        Rows up to which all are used as they are.
-    steps : int
-        Of the bias, in which more rows are averaged.
-    outlier : float
-        Standard deviations (median-based) of the data of a step, beyond which a datum is left out
-        of a robust mean.
-    fewest_in_step : int
-        Rows of a step that tell these.
-    """
-
-    turn: float = 0.1
-    fewest: int = 3
-    different: float = 1e-3
-    deviations: float = 3.0
-    compared: int = 8
-    many: int = 2000
-    steps: int = 1000
-    outlier: float = 8.0
-    fewest_in_step: int = 5
-
-
-def sweeps_of(bias: Array, options: RowOptions | None = None) -> list[slice]:
+def sweeps_of(bias: Array, fewest: int = 3) -> list[slice]:
     """Return the rows of each sweep: from turn to turn, and on either side of zero.
 
-    `bias` has its sign. Rows in no order are one sweep.
+    `bias` has its sign. Rows in no order are one sweep; one has so many rows at the `fewest`.
 
     Examples
     --------
     >>> sweeps_of(np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0]))
     [slice(0, 4, None), slice(4, 7, None)]
     """
-    options = options or RowOptions()
     # rows at which the bias has another sign than before
     signed = np.flatnonzero(bias != 0.0)
     crossings = signed[1:][np.diff(np.sign(bias[signed])) != 0.0].tolist()
-    ends = sorted({0, *_turns(bias, options.turn), *crossings, bias.size})
-    if np.median(np.diff(ends)) < options.fewest:
+    ends = sorted({0, *_turns(bias), *crossings, bias.size})
+    if np.median(np.diff(ends)) < fewest:
         return [slice(0, bias.size)]
     # what is too short for a sweep belongs to the one before
-    begins = [at for at, end in pairwise(ends) if at == 0 or end - at >= options.fewest]
+    begins = [at for at, end in pairwise(ends) if at == 0 or end - at >= fewest]
     return [slice(begin, end) for begin, end in pairwise([*begins, bias.size])]
 
 
-def _turns(bias: Array, share: float) -> list[int]:
-    """Rows with which a sweep begins because the bias turns."""
+def _turns(bias: Array, share: float = 0.1) -> list[int]:
+    """Rows with which a sweep begins because the bias turns, and goes back by a share of it."""
     back = share * np.ptp(bias) if bias.size else 0.0
     turns: list[int] = []
     farthest, way = 0, 0
@@ -114,23 +74,16 @@ def described(bias: Array, sweeps: list[slice]) -> str:
 
 
 def disagreements(
-    bias: Array,
-    sweeps: list[slice],
-    data: dict[str, Array],
-    symmetric: bool = True,
-    options: RowOptions | None = None,
+    bias: Array, sweeps: list[slice], data: dict[str, Array], symmetric: bool = True
 ) -> list[str]:
     """Say by how much sweeps differ from the first, if by more than noise.
 
     Polarities are compared if the circuit is symmetric.
     """
-    options = options or RowOptions()
     texts, along = [], np.abs(bias) if symmetric else bias
     for name, values in data.items():
         largest = np.nanmax(np.abs(values), initial=0.0)
-        sizes = [
-            _difference(along, values, sweeps[0], sweep, largest, options) for sweep in sweeps[1:]
-        ]
+        sizes = [_difference(along, values, sweeps[0], sweep, largest) for sweep in sweeps[1:]]
         if max(sizes, default=0.0) > 0.0:
             texts.append(
                 f"{name} of sweep {2 + np.argmax(sizes)} differs from that of sweep 1 by "
@@ -140,26 +93,24 @@ def disagreements(
     return texts
 
 
-def _difference(
-    along: Array,
-    values: Array,
-    first: slice,
-    other: slice,
-    largest: float,
-    options: RowOptions,
-) -> float:
-    """Return what one sweep has beside another (rms); 0 where that is noise, or next to nothing."""
+def _difference(along: Array, values: Array, first: slice, other: slice, largest: float) -> float:
+    """Return what one sweep has beside another (rms); 0 where that is noise, or next to nothing.
+
+    Noise has von Neumann's ratio of 1 within three of its standard deviations, 1/√n (Ann. Math.
+    Stat. 12, 367 (1941)): half the mean square between neighbours over that of all.
+    """
     (x, y), (at, others) = (_rising(along[rows], values[rows]) for rows in (first, other))
-    if x.size < options.fewest:
+    if x.size < 3:
         return 0.0
     difference = others - np.interp(at, x, y, np.nan, np.nan)
     difference = difference[np.isfinite(difference)]
-    if difference.size < options.compared:
+    # fewer rows that both have tell nothing
+    if difference.size < 8:
         return 0.0
     noise, square = 0.5 * np.mean(np.diff(difference) ** 2), np.mean(difference**2)
-    beyond = square - noise > options.deviations / np.sqrt(difference.size) * square
+    beyond = square - noise > 3.0 / np.sqrt(difference.size) * square
     size = float(np.sqrt(square))
-    return size if beyond and size > options.different * largest else 0.0
+    return size if beyond and size > 1e-3 * largest else 0.0
 
 
 def _rising(x: Array, y: Array) -> tuple[Array, Array]:
@@ -172,17 +123,16 @@ def _rising(x: Array, y: Array) -> tuple[Array, Array]:
 # --- many rows averaged to some -----------------------------------------------------------------
 
 
-def averaged(
-    measurement: Measurement, robust: bool = False, options: RowOptions | None = None
-) -> Measurement:
-    """Average the rows of equal or nearly equal bias, if there are very many.
+def averaged(measurement: Measurement, robust: bool = False, many: int = 2000) -> Measurement:
+    """Average the rows of equal or nearly equal bias, if there are more than very many.
 
     Parameters
     ----------
     measurement : Measurement
     robust : bool
         Whether data far off the others of their step are left out.
-    options : RowOptions, optional
+    many : int
+        Rows up to which all are used as they are; there are half as many steps of the bias.
 
     Returns
     -------
@@ -190,20 +140,19 @@ def averaged(
         As it was, if it has few rows, is one of averages or in time. Else its ``rows`` say of how
         many each is the mean; in the order of the file.
     """
-    options = options or RowOptions()
-    few = measurement.bias_V.size <= options.many
+    few = measurement.bias_V.size <= many
     if few or measurement.rows is not None or measurement.time_us is not None:
         return measurement
     columns = {column.name: getattr(measurement, column.name) for column in MEASURED}
     columns = {name: values for name, values in columns.items() if values is not None}
-    step = _steps(measurement.bias_V, options.steps)
+    step = _steps(measurement.bias_V, many // 2)
     if measurement.distance_um is not None:
         # other distances from a sample are other states of the lever
         distance = np.nan_to_num(measurement.distance_um)
         step = np.unique([step, distance], axis=1, return_inverse=True)[1]
     if robust:
         for name in (FITTED[observable].name for observable in measurement.observables):
-            columns[name] = np.where(_far_off(columns[name], step, options), np.nan, columns[name])
+            columns[name] = np.where(_far_off(columns[name], step), np.nan, columns[name])
     observed = [columns[FITTED[name].name] for name in measurement.observables]
     has_data = np.isfinite(observed).any(axis=0)
     used = {name: values[has_data] for name, values in columns.items()}
@@ -243,8 +192,8 @@ def _steps(bias: Array, most: int) -> Index:
     return np.minimum((bias - levels[0]) / width, most - 1).astype(np.intp)
 
 
-def _far_off(values: Array, step: Index, options: RowOptions) -> Mask:
-    """Return which data are far off the others of their step."""
+def _far_off(values: Array, step: Index) -> Mask:
+    """Return which data are far off the others of their step, which five or more tell."""
     finite = np.isfinite(values)
     data, (steps, group) = values[finite], np.unique(step[finite], return_inverse=True)
     from scipy.ndimage import median  # not needed for most measurements
@@ -252,8 +201,9 @@ def _far_off(values: Array, step: Index, options: RowOptions) -> Mask:
     numbers = np.arange(steps.size)
     away = np.abs(data - median(data, group, numbers)[group])
     scatter = 1.4826 * median(away, group, numbers)[group]
-    enough = np.bincount(group)[group] >= options.fewest_in_step
+    enough = np.bincount(group)[group] >= 5
     usual = np.median(scatter[enough & (scatter > 0)]) if np.any(enough & (scatter > 0)) else 0.0
     far = np.zeros(values.size, dtype=bool)
-    far[finite] = enough & (away > options.outlier * np.maximum(scatter, usual))
+    # in standard deviations, median-based
+    far[finite] = enough & (away > 8.0 * np.maximum(scatter, usual))
     return far

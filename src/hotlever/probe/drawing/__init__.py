@@ -4,6 +4,7 @@ A file's *sheet* (its outlines by layer) becomes a shape of the probe file, whos
 healed, cut into regions and checked; a `Drawing` of areas made in Python goes the same way. Nothing
 of this is loaded for a shape by its dimensions.
 """
+# ruff: noqa: F401 (what is imported here is what the package offers)
 
 from hotlever.probe.drawing.kit import (
     Drawing,
@@ -15,5 +16,3 @@ from hotlever.probe.drawing.kit import (
     rectangle,
     union,
 )
-
-__all__ = ["Drawing", "Layer", "Polygon", "difference", "fillet", "mirror", "rectangle", "union"]
