@@ -30,22 +30,25 @@ from hotlever.units import (
     unit_behind,
 )
 
-#: Settings: attribute of a `Measurement`, name and unit.
+#: Settings: attribute of a `Measurement`, name, unit, and how people write the name, without case,
+#: blanks and underscores.
 _SETTINGS = {
-    "series_resistance_ohm": ("R_s", "ohm"),
-    "base_temperature_K": ("T_base", "K"),
-    "medium": ("medium", ""),
-    "pressure_mbar": ("pressure", "mbar"),
-    "gas_conductivity": ("gas conductivity", "of air's"),
-    "raman_scale": ("raman_scale", "of the rise"),
+    "series_resistance_ohm": (
+        "R_s",
+        "ohm",
+        "rs rseries seriesresistance seriesresistor vorwiderstand",
+    ),
+    "base_temperature_K": ("T_base", "K", "basetemperature basetemp tbase t0 basistemperatur"),
+    "medium": ("medium", "", "medium gas atmosphere environment surroundings"),
+    "pressure_mbar": ("pressure", "mbar", "p"),
+    "gas_conductivity": ("gas conductivity", "of air's", ""),
+    "raman_scale": ("raman_scale", "of the rise", "ramanscale"),
 }
 #: Media by their names, and other gases, whose conductivity is another.
 _MEDIA = {
-    "vacuum": "vacuum",
-    "evacuated": "vacuum",
+    **dict.fromkeys(("vacuum", "evacuated"), "vacuum"),
+    **dict.fromkeys(("nitrogen", "n2"), "nitrogen"),
     "air": "air",
-    "nitrogen": "nitrogen",
-    "n2": "nitrogen",
 }
 _OTHER_GASES = {
     *("helium", "he", "argon", "ar", "hydrogen", "h2", "oxygen", "o2", "co2", "neon", "ne"),
@@ -120,7 +123,7 @@ class Settings:
 
     def understood(self) -> Iterator[tuple[str, str, str]]:
         """Give what is set, to what, and where it was said."""
-        for attribute, (name, unit) in _SETTINGS.items():
+        for attribute, (name, unit, _) in _SETTINGS.items():
             value = self.values.get(attribute)
             if value is not None:
                 text = value if isinstance(value, str) else f"{value:g} {unit}"
@@ -168,20 +171,8 @@ def _setting(text: str, where: str, thousands: str) -> dict[str, Any] | None:
         key, value = (part.strip(' ,"') for part in (*key.split(",", 1), "")[:2])
     name, unit = name_and_unit(key)
     bare = re.sub(r"[\W_]+", "", name[:40]).lower()
-    # as people write them, without case, blanks and underscores
-    spellings = {
-        **dict.fromkeys(
-            ("rs", "rseries", "seriesresistance", "seriesresistor", "vorwiderstand"),
-            "series_resistance_ohm",
-        ),
-        **dict.fromkeys(
-            ("basetemperature", "basetemp", "tbase", "t0", "basistemperatur"), "base_temperature_K"
-        ),
-        **dict.fromkeys(("medium", "gas", "atmosphere", "environment", "surroundings"), "medium"),
-        "p": "pressure_mbar",
-        "ramanscale": "raman_scale",
-    }
-    attribute = "pressure_mbar" if bare.endswith("pressure") else spellings.get(bare)
+    so_called = (each for each, (*_, names) in _SETTINGS.items() if bare in names.split())
+    attribute = "pressure_mbar" if bare.endswith("pressure") else next(so_called, None)
     if value and attribute == "medium":
         return _gas(value, where) if bare == "medium" or _gases(value) else None
     if value and attribute == "pressure_mbar" and unit is None and _gases(value):
@@ -189,7 +180,7 @@ def _setting(text: str, where: str, thousands: str) -> dict[str, Any] | None:
     if value and attribute == "raman_scale":
         return {attribute: share_of(value[:_LONGEST], f"{where}: {attribute}")}
     if value and attribute:
-        setting, inside = _SETTINGS[attribute]
+        setting, inside, _ = _SETTINGS[attribute]
         where = f"{where}: {setting}"
         converted = amount(value[:_LONGEST], unit, inside, where, thousands)
         if converted is None:
@@ -379,8 +370,7 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
         bias, current = values["V_b"], values["I_h"]
         ohm = settings.get("series_resistance_ohm", series_ohm)
         lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
-        below = lever < -NOISE * bias.max()
-        if below.any():
+        if (below := lever < -NOISE * bias.max()).any():
             row = int(np.argmax(below))
             raise InputError(
                 f"{contents.table.where(row)}: V_b = {bias[row]:g} V and I_h = {current[row]:g} mA "

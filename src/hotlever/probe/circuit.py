@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.records import Record
@@ -143,6 +143,10 @@ class Circuit(Record):
     8.268
     """
 
+    # other keys are sections of contacts, by the names of their terminals
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Contact]
+
     series_resistance_ohm: float = resistance("between the bias source and the lever, R_s", 5600.0)
     base_temperature_K: float = Field(
         default=BASE_TEMPERATURE_K, ge=250, le=1000, description="of the leg ends"
@@ -167,8 +171,11 @@ class Circuit(Record):
         le=MOST_OFFSET_V,
         description="that the bridge's amplifier shows of no voltage",
     )
-    swept: str = Field(default="supply", description="terminal of the supply that is swept")
-    contacts: dict[str, Contact] = Field(default_factory=dict)
+    swept: str = Field(
+        default="supply",
+        description="terminal of the supply that is swept",
+        exclude_if=lambda name: name == "supply",
+    )
 
     @model_validator(mode="after")
     def _bridge_is_whole(self) -> Self:
@@ -190,20 +197,24 @@ class Circuit(Record):
     def from_values(cls, values: dict[str, Any], where: str) -> Self:
         """Check `values` and make a circuit; `where` names their origin in an error."""
         contacts = {
-            name: Contact.from_values(section, f"{where[:-1]}.{name}]")
-            for name, section in _contacts_of(values).items()
-            if not isinstance(section, Contact)
+            name: Contact.from_values(dict(section), f"{where[:-1]}.{name}]")
+            for name, section in values.items()
+            if name not in cls.model_fields and isinstance(section, Mapping)
         }
         return super().from_values({**values, **contacts}, where)
 
     @model_validator(mode="before")
     @classmethod
-    def _sections_are_contacts(cls, values: Any) -> Any:
-        contacts = _contacts_of(values) if isinstance(values, Mapping) else {}
-        if not contacts:
-            return values
-        own = {name: value for name, value in values.items() if name not in contacts}
-        return {**own, "contacts": contacts}
+    def _other_keys_are_sections(cls, values: Any) -> Any:
+        for name, value in values.items() if isinstance(values, Mapping) else ():
+            if name not in cls.model_fields and not isinstance(value, Mapping | Contact):
+                raise ValueError(str(unknown_name("key", name, cls.model_fields)))
+        return values
+
+    @property
+    def contacts(self) -> dict[str, Contact]:
+        """What is said to be wired to terminals, by their names."""
+        return self.model_extra or {}
 
     @model_validator(mode="after")
     def _one_supply_is_swept(self) -> Self:
@@ -224,18 +235,6 @@ class Circuit(Record):
                     f"swept one is '{self.swept}'"
                 )
         return self
-
-    @model_serializer(mode="wrap")
-    def _contacts_are_sections(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        values = handler(self)
-        contacts = values.pop("contacts")
-        if self.swept == type(self).model_fields["swept"].default:
-            del values["swept"]
-        return {**values, **contacts}
-
-    def __hash__(self) -> int:
-        own = (getattr(self, name) for name in type(self).model_fields if name != "contacts")
-        return hash((*own, *self.contacts.items()))
 
     def contact(self, name: str) -> Contact:
         """Return what is wired to a terminal."""
@@ -391,12 +390,3 @@ class Circuit(Record):
         gain, upper, lower = self._arms
         difference_V = (bridge_V - self.bridge_offset_V) / gain
         return np.asarray((upper / (upper + lower) * bias_V - difference_V) / self.series_kohm)
-
-
-def _contacts_of(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the sections inside ``[circuit]``, by the names of their terminals."""
-    return {
-        name: value
-        for name, value in values.items()
-        if name not in Circuit.model_fields and isinstance(value, Mapping | Contact)
-    }

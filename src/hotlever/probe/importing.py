@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import tomllib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -46,22 +47,6 @@ from hotlever.text import aligned, as_toml
 Drawn = str | tuple[Ring, ...]
 
 
-@dataclass(frozen=True)
-class InferenceOptions:
-    """What the layers of a drawing are told by.
-
-    Attributes
-    ----------
-    low_doped_share : float
-        Share of the silicon that a low-doped layer does not exceed.
-    tip_distance : float
-        Of a film's greatest distance from the terminals, the share from which on its tip may be.
-    """
-
-    low_doped_share: float = 0.6
-    tip_distance: float = 0.95
-
-
 @dataclass
 class LayerInference:
     """What is what in a drawing.
@@ -83,14 +68,11 @@ class LayerInference:
     doubts: list[str] = field(default_factory=list)
 
 
-def infer_layers(
-    sheet: Sheet, tolerance: float, options: InferenceOptions | None = None
-) -> LayerInference:
+def infer_layers(sheet: Sheet, tolerance: float) -> LayerInference:
     """Say which layer of a drawing is what, and why."""
-    options = options or InferenceOptions()
     inferred = LayerInference()
     shapes = _shapes(sheet, tolerance, inferred.doubts)
-    judged = [_Silicon(name, sheet, shapes, tolerance, options) for name in shapes]
+    judged = [_Silicon(name, sheet, shapes, tolerance) for name in shapes]
     best = max(judged, key=lambda candidate: candidate.merit, default=None)
     if best is None:
         inferred.doubts.append("no layer holds a closed outline")
@@ -118,7 +100,7 @@ def infer_layers(
             "and what it and the body are made of, the drawing does not say"
         )
     _terminals(best, sheet, inferred)
-    _tip(best, sheet, shapes, inferred, options)
+    _tip(best, sheet, shapes, inferred)
     return inferred
 
 
@@ -150,14 +132,9 @@ class _Silicon:
     """
 
     def __init__(
-        self,
-        name: str,
-        sheet: Sheet,
-        shapes: dict[str, BaseGeometry],
-        tolerance: float,
-        options: InferenceOptions,
+        self, name: str, sheet: Sheet, shapes: dict[str, BaseGeometry], tolerance: float
     ) -> None:
-        self.name, self.tolerance, self._options = name, tolerance, options
+        self.name, self.tolerance = name, tolerance
         self.pieces = sorted(parts_of(shapes[name]), key=lambda piece: -piece.area)
         self.shape: Polygon = self.pieces[0]
         self.areas = shapes
@@ -176,7 +153,8 @@ class _Silicon:
         """Whether the silicon falls apart, or has one more hole, without another layer."""
         inside = self._sizable(self.shape.intersection(other))
         area = sum(piece.area for piece in inside)
-        if not 0 < area < self._options.low_doped_share * self.shape.area:
+        # a low-doped layer is no larger share of the silicon
+        if not 0 < area < 0.6 * self.shape.area:
             return False
         rest = self._sizable(self.shape.difference(other.buffer(self.tolerance)))
         holes = sum(len(piece.interiors) for piece in rest)
@@ -198,12 +176,10 @@ class _Silicon:
 
     def ends_of(self, name: str, sheet: Sheet, layer: SheetLayer) -> bool:
         """Whether a layer touches the outline along an edge."""
-        try:
-            return bool(
-                terminal_edges(self.shape, {name: sheet.rings(layer, lines=True)}, self.tolerance)
-            )
-        except DrawingError:
-            return False
+        with suppress(DrawingError):
+            drawn = {name: sheet.rings(layer, lines=True)}
+            return bool(terminal_edges(self.shape, drawn, self.tolerance))
+        return False
 
 
 def _body_and_film(best: _Silicon, judged: list[_Silicon]) -> tuple[_Silicon, _Silicon | None]:
@@ -349,11 +325,10 @@ def _grouped(partition: Partition, at: dict[str, set[int]], heaters: set[int]) -
     groups: list[list[str]] = []
     for name in at:
         reached = partition.reached(at[name], heaters)
-        group = next((others for others in groups if at[others[0]] & reached), None)
-        if group is None:
-            groups.append([name])
-        else:
-            group.append(name)
+        group = next((others for others in groups if at[others[0]] & reached), [])
+        if not group:
+            groups.append(group)
+        group.append(name)
     return groups
 
 
@@ -375,11 +350,7 @@ def _base(silicon: Polygon, heater: BaseGeometry) -> list[tuple[Point, Point]]:
 
 
 def _tip(
-    best: _Silicon,
-    sheet: Sheet,
-    shapes: dict[str, BaseGeometry],
-    inferred: LayerInference,
-    options: InferenceOptions,
+    best: _Silicon, sheet: Sheet, shapes: dict[str, BaseGeometry], inferred: LayerInference
 ) -> None:
     """Find the place of the tip."""
     for _, text, point in sheet.labels:
@@ -391,16 +362,14 @@ def _tip(
     if isinstance(heater, str):
         area, why = shapes[heater].intersection(best.shape), "the middle of the heater"
     elif isinstance(film, str):
-        drawn = [
-            inferred.terminals[end] for end in ("supply", "ground") if end in inferred.terminals
-        ]
         ends = [
             shapes.get(end, best.shape) if isinstance(end, str) else shapely.MultiPoint(end[0])
-            for end in drawn
+            for name in ("supply", "ground")
+            if (end := inferred.terminals.get(name)) is not None
         ]
         near = shapely.union_all(ends or [best.shape]).centroid
         reach = shapely.hausdorff_distance(near, shapes[film].boundary)
-        area = shapes[film].difference(near.buffer(options.tip_distance * reach))
+        area = shapes[film].difference(near.buffer(0.95 * reach))
         why = "where the film is farthest from the terminals"
     else:
         return
@@ -438,8 +407,7 @@ class Imported:
     @property
     def outlines(self) -> dict[str, tuple[Ring, ...]]:
         """All that is drawn, by what it is and by layer."""
-        roles = _by_part(self.inference)
-        of_layer = {drawn: role for role, drawn in roles.items() if isinstance(drawn, str)}
+        roles, of_layer = _by_part(self.inference)
         outlines = {}
         for name, layer in self.sheet.layers.items():
             role = of_layer.get(name)
@@ -477,14 +445,12 @@ def import_drawing(path: Path, cell: str | None, folder: Path, unit: str | None 
     listing = _listing(sheet, inference)
     name = relative(path, folder)
     text = _probe_file(sheet, inference, listing, name, unit)
-    fault: InputError | None = None
-    notes: list[str] = []
     try:
         shape = Probe.from_sections(tomllib.loads(text), str(path), folder).shape
         notes = [note for note in shape.notes() if note not in listing]
-    except InputError as error:
-        fault = error
-    return Imported(sheet, inference, listing, text, fault, notes)
+    except InputError as fault:
+        return Imported(sheet, inference, listing, text, fault, [])
+    return Imported(sheet, inference, listing, text, None, notes)
 
 
 def _check_unit(sheet: Sheet, inference: LayerInference, unit: str | None) -> None:
@@ -525,10 +491,11 @@ def _silicon_in(sheet: Sheet, unit: str) -> str | None:
     return silicon if is_lever(extent_of(other.layers[silicon].rings)) else None
 
 
-def _by_part(inference: LayerInference) -> dict[str, Drawn]:
-    """Return what is drawn by what it is taken as."""
+def _by_part(inference: LayerInference) -> tuple[dict[str, Drawn], dict[str, str]]:
+    """Return what is drawn by what it is taken as, and what layers are taken as."""
     ends = {terminal_part(name): drawn for name, drawn in inference.terminals.items()}
-    return inference.layers | ends
+    roles = inference.layers | ends
+    return roles, {drawn: role for role, drawn in roles.items() if isinstance(drawn, str)}
 
 
 def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:
@@ -542,8 +509,7 @@ def _listing(sheet: Sheet, inference: LayerInference) -> list[str]:
         lines.append("the file states no unit: taken to be in µm; see --unit and unit_um")
     elif sheet.cell is None:
         lines.append(f"one unit of the file is {sheet.unit_um:g} µm")
-    roles = _by_part(inference)
-    of_layer = {drawn: role for role, drawn in roles.items() if isinstance(drawn, str)}
+    _, of_layer = _by_part(inference)
     rows = [["layer", "outlines", "area (µm²)", "x (µm)", "y (µm)", "taken as"]]
     most = 60
     for name, layer in list(sheet.layers.items())[:most]:
@@ -604,18 +570,13 @@ def _film_sections(inference: LayerInference) -> list[str]:
     """Return the sections of a film, of its body, and of the materials that are assumed of both."""
     lines: list[str] = []
     unsaid = "assumed: a drawing does not say"
-    assumed_of = {
-        "body": {"kind": "dielectric", "preset": "SiN"},
-        "film": {"kind": "metal-film", "preset": "Pd"},
-    }
-    for name, assumed in assumed_of.items():
-        layer: dict[str, object] = {"drawn": inference.layers[name], "material": assumed["preset"]}
-        if name == "film":
-            layer["thickness_um"] = 0.05
+    for name, material, own in (("body", "SiN", {}), ("film", "Pd", {"thickness_um": 0.05})):
+        layer = {"drawn": inference.layers[name], "material": material, **own}
         meaning = {"drawn": inference.reasons[name], "thickness_um": unsaid}
         lines += section_lines(f"layers.{name}", layer, meaning)
-    for assumed in assumed_of.values():
-        lines += section_lines(f"materials.{assumed['preset']}", assumed, {"preset": unsaid})
+    for kind, preset in (("dielectric", "SiN"), ("metal-film", "Pd")):
+        assumed = {"kind": kind, "preset": preset}
+        lines += section_lines(f"materials.{preset}", assumed, {"preset": unsaid})
     return lines
 
 
