@@ -25,20 +25,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from hotlever.errors import InputError
+from hotlever.materials import films, heat, silicon, thermopower
 from hotlever.materials.departures import FACTORS, PROFILE
-from hotlever.materials.films import (
-    constant_conductivity,
-    dielectric_conductivity,
-    metal_conductivity,
-    reciprocal,
-    wiedemann_franz,
-)
-from hotlever.materials.heat import (
-    enthalpy,
-    enthalpy_by_capacity,
-    thermal_conductivity,
-    thermal_conductivity_of_layer,
-)
 from hotlever.materials.kind import Kind
 from hotlever.materials.laws import FORMULA_TO, Evaluated, Law
 from hotlever.materials.parameters import (
@@ -49,21 +37,7 @@ from hotlever.materials.parameters import (
     field_bounds,
     field_of,
 )
-from hotlever.materials.silicon import (
-    MELTING_POINT,
-    Carrier,
-    conductivity_high_doped,
-    conductivity_low_doped,
-    conductivity_p,
-    inversion_temperature,
-)
 from hotlever.materials.stated import StatedLaw, number_or_law
-from hotlever.materials.thermopower import (
-    of_one_carrier,
-    thermoelectric_high_doped,
-    thermoelectric_n_silicon,
-    thermoelectric_p_silicon,
-)
 from hotlever.types import Array
 
 # What c_κ may be.
@@ -97,7 +71,7 @@ class Silicon(Kind):
     @property
     def _heat(self) -> Law:
         by_thickness = self.c_kappa == "thickness"
-        return thermal_conductivity_of_layer if by_thickness else thermal_conductivity
+        return heat.thermal_conductivity_of_layer if by_thickness else heat.thermal_conductivity
 
     def thermal_conductivity(self, T: Array, thickness_um: Array | float) -> Evaluated:
         """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
@@ -120,7 +94,7 @@ class Silicon(Kind):
 
     def enthalpy(self, T: Array) -> Evaluated:
         """Return the heat held (J cm⁻³), see `Kind.enthalpy`."""
-        held, by = enthalpy(T)
+        held, by = heat.enthalpy(T)
         scale = self.heat_capacity_scale
         return scale * held, {"T": scale * by["T"], "heat_capacity_scale": held}
 
@@ -132,7 +106,7 @@ class LowDopedSilicon(Silicon):
     conductivity: ClassVar[Law]
     #: Its law of thermoelectricity, by these and the scattering exponent; and the majority.
     seebeck: ClassVar[Law]
-    carrier: ClassVar[Carrier]
+    carrier: ClassVar[silicon.Carrier]
 
     delta: float = field_of(OF_SILICON["delta"])
     n_d: float = field_of(OF_SILICON["n_d"])
@@ -194,7 +168,7 @@ class LowDopedSilicon(Silicon):
         """Of thermoelectricity."""
         return (type(self).seebeck,)
 
-    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
+    def thermoelectric(self, T: Array, n: Array | float, carrier: silicon.Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""
         own = self.of_carriers | {"scattering_exponent": self.scattering_exponent}
         return self._departing(type(self).seebeck, T, n, **own)
@@ -204,7 +178,7 @@ class LowDopedSilicon(Silicon):
 
         Of its own doping by default; NaN where there is none below 1700 K.
         """
-        return inversion_temperature(
+        return silicon.inversion_temperature(
             self.n_d if n is None else n,
             **self.of_carriers,
             conductivity=partial(self._departing, type(self).conductivity),
@@ -214,8 +188,8 @@ class LowDopedSilicon(Silicon):
 class NSilicon(LowDopedSilicon):
     """Silicon doped with phosphorus, as in the paper."""
 
-    conductivity: ClassVar = conductivity_low_doped
-    seebeck: ClassVar = thermoelectric_n_silicon
+    conductivity: ClassVar = silicon.conductivity_low_doped
+    seebeck: ClassVar = thermopower.thermoelectric_n_silicon
     carrier: ClassVar = "electron"
 
     kind: Literal["n-silicon"] = "n-silicon"
@@ -224,8 +198,8 @@ class NSilicon(LowDopedSilicon):
 class PSilicon(LowDopedSilicon):
     """Silicon doped with boron."""
 
-    conductivity: ClassVar = conductivity_p
-    seebeck: ClassVar = thermoelectric_p_silicon
+    conductivity: ClassVar = silicon.conductivity_p
+    seebeck: ClassVar = thermopower.thermoelectric_p_silicon
     carrier: ClassVar = "hole"
 
     kind: Literal["p-silicon"] = "p-silicon"
@@ -256,21 +230,21 @@ class HighDopedSilicon(Silicon):
     @property
     def laws(self) -> tuple[Law, ...]:
         """Of thermal and electrical conductivity."""
-        return self._heat, conductivity_high_doped
+        return self._heat, silicon.conductivity_high_doped
 
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
-        return self._departed("legs", T, conductivity_high_doped(T, self.a0, self.a1))
+        return self._departed("legs", T, silicon.conductivity_high_doped(T, self.a0, self.a1))
 
     @property
     def effects(self) -> tuple[Law, ...]:
         """Of thermoelectricity."""
-        return (thermoelectric_high_doped,)
+        return (thermopower.thermoelectric_high_doped,)
 
-    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
+    def thermoelectric(self, T: Array, n: Array | float, carrier: silicon.Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""
         own = self.a0, self.a1, self.n_hd, self.scattering_exponent
-        return self._departed("legs", T, thermoelectric_high_doped(T, *own, carrier))
+        return self._departed("legs", T, thermopower.thermoelectric_high_doped(T, *own, carrier))
 
 
 # --- films ----------------------------------------------------------------------------------------
@@ -304,7 +278,7 @@ class Stored(Kind):
             )
         if isinstance(self.heat_capacity, StatedLaw):
             return self.heat_capacity.integral(T, self.numbers(self.heat_capacity))
-        return enthalpy_by_capacity(T, self.heat_capacity)
+        return heat.enthalpy_by_capacity(T, self.heat_capacity)
 
 
 class MetalFilm(Stored):
@@ -328,7 +302,7 @@ class MetalFilm(Stored):
     seebeck: float | StatedLaw = _number_or_law(OF_METAL["seebeck"])
     emissivity: float | StatedLaw = _number_or_law(OF_METAL["emissivity"])
     melting_point_K: float = Field(
-        default=MELTING_POINT, ge=400, le=4000, description="melting point (K)"
+        default=silicon.MELTING_POINT, ge=400, le=4000, description="melting point (K)"
     )
 
     @model_validator(mode="after")
@@ -349,8 +323,11 @@ class MetalFilm(Stored):
     @property
     def laws(self) -> tuple[Law | StatedLaw, ...]:
         """Of thermal and electrical conductivity."""
-        stated, heat = self.stated, wiedemann_franz if self.kappa is None else constant_conductivity
-        return stated.get("kappa", heat), stated.get("resistivity", metal_conductivity)
+        by_number = films.wiedemann_franz if self.kappa is None else films.constant_conductivity
+        return (
+            self.stated.get("kappa", by_number),
+            self.stated.get("resistivity", films.metal_conductivity),
+        )
 
     @property
     def melts_K(self) -> float:
@@ -366,22 +343,22 @@ class MetalFilm(Stored):
         if isinstance(self.kappa, StatedLaw):
             return self.property_at("kappa", T)
         if self.kappa is not None:
-            return constant_conductivity(T, self.kappa)
+            return films.constant_conductivity(T, self.kappa)
         # no doping changes the electrical conductivity
         electrical = partial(self.electrical_conductivity, n=0.0)
-        return wiedemann_franz(T, electrical, self.lorenz_ratio)
+        return films.wiedemann_franz(T, electrical, self.lorenz_ratio)
 
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), see `Kind.electrical_conductivity`."""
         if isinstance(self.resistivity, StatedLaw):
-            return reciprocal(self.property_at("resistivity", T))
-        return metal_conductivity(T, self.resistivity, self.tcr)
+            return films.reciprocal(self.property_at("resistivity", T))
+        return films.metal_conductivity(T, self.resistivity, self.tcr)
 
-    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
+    def thermoelectric(self, T: Array, n: Array | float, carrier: silicon.Carrier) -> Evaluated:
         """Return β and γ, see `Kind.thermoelectric`."""
         S, by = self.property_at("seebeck", T)
         volts = 1e-6 * S, {name: 1e-6 * slope for name, slope in by.items()}
-        return of_one_carrier(self.electrical_conductivity(T, n), volts)
+        return thermopower.of_one_carrier(self.electrical_conductivity(T, n), volts)
 
 
 class Dielectric(Stored):
@@ -403,7 +380,7 @@ class Dielectric(Stored):
     @property
     def laws(self) -> tuple[Law | StatedLaw, ...]:
         """Of the thermal conductivity."""
-        return (self.stated.get("kappa", dielectric_conductivity),)
+        return (self.stated.get("kappa", films.dielectric_conductivity),)
 
     @property
     def melts_K(self) -> float:
@@ -414,14 +391,14 @@ class Dielectric(Stored):
         """Return κ (W cm⁻¹ K⁻¹), see `Kind.thermal_conductivity`."""
         if isinstance(self.kappa, StatedLaw):
             return self.property_at("kappa", T)
-        return dielectric_conductivity(T, self.kappa, self.kappa_exponent)
+        return films.dielectric_conductivity(T, self.kappa, self.kappa_exponent)
 
     def electrical_conductivity(self, T: Array, n: Array | float) -> Evaluated:
         """Return σ (S cm⁻¹), zero."""
         nothing = 0.0 * T
         return nothing, {"T": nothing}
 
-    def thermoelectric(self, T: Array, n: Array | float, carrier: Carrier) -> Evaluated:
+    def thermoelectric(self, T: Array, n: Array | float, carrier: silicon.Carrier) -> Evaluated:
         """Return β and γ, zero."""
         nothing = np.zeros((2, *T.shape))
         return nothing, {"T": nothing}

@@ -152,25 +152,18 @@ def seebeck_of_band(
     return scale * (value - np.log(ratio)), by
 
 
-def _add(to: dict[str, Array], by: dict[str, Array], factor: Array) -> None:
-    """Add derivatives, by name, to others."""
-    for name, value in by.items():
-        to[name] = to.get(name, np.zeros(())) + factor * value
-
-
 def _summed(beside: Iterable[tuple[Evaluated, Evaluated]]) -> Evaluated:
     """Return σ, β and γ, (3, ...), by σ (S cm⁻¹) and S (V/K) of carriers beside each other."""
-    total, total_by = [np.zeros(()) for _ in range(3)], [dict[str, Array]() for _ in range(3)]
+    total: Array = np.zeros(())
+    by = dict[str, Array]()
     for (sigma, d_sigma), (S, d_S) in beside:
-        for power in range(3):
-            total[power] = total[power] + sigma * S**power
-            _add(total_by[power], d_sigma, S**power)
-            if power:
-                _add(total_by[power], d_S, sigma * power * S ** (power - 1))
-    names = set().union(*total_by)
-    nothing = np.zeros_like(total[0])
-    by = {name: np.stack([nothing + each.get(name, 0.0) for each in total_by]) for name in names}
-    return np.stack(np.broadcast_arrays(*total)), by
+        powers = np.stack([np.ones_like(S), S, S**2])
+        slopes = sigma * np.stack([np.zeros_like(S), np.ones_like(S), 2.0 * S])
+        total = total + sigma * powers
+        for factor, derivatives in ((powers, d_sigma), (slopes, d_S)):
+            for name, value in derivatives.items():
+                by[name] = by.get(name, np.zeros(())) + factor * value
+    return total, {name: np.broadcast_to(each, total.shape).copy() for name, each in by.items()}
 
 
 def _bipolar(summed: Evaluated) -> Evaluated:

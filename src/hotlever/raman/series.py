@@ -141,10 +141,9 @@ def read_lines(lines: Sequence[MeasuredLine], thermometer: Thermometer | None) -
         if peak is not None:
             column[:3] = peak.centre, peak.centre_stderr, peak.fwhm
     more: dict[str, Any] = {}
-    room: dict[str, Any] = (
-        {} if thermometer is None else {"room_temperature_K": thermometer.room_temperature_K}
-    )
+    room: dict[str, float] = {}
     if thermometer is not None:
+        room["room_temperature_K"] = thermometer.calibration.room_temperature_K
         reading = thermometer.read(numbers[0], numbers[1])
         numbers[3:] = reading.shift, reading.temperature, reading.error
         more["temperature_noise_K"] = reading.noise

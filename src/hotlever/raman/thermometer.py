@@ -19,23 +19,13 @@ from numpy.typing import ArrayLike
 from pydantic import Field, ValidationError, model_validator
 
 from hotlever import __version__
+from hotlever import spieser2017 as paper
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import read_json, write_text
 from hotlever.materials.silicon import MELTING_POINT
 from hotlever.raman import anharmonic
 from hotlever.raman.lineshape import LineShape, Peak, PeakOptions
 from hotlever.records import Record, explained
-from hotlever.spieser2017 import (
-    ABSORBED_SHARE,
-    BASE_TEMPERATURE_K,
-    DOI,
-    RAMAN_CALIBRATED_TO_K,
-    RAMAN_CONSTANT_K,
-    RAMAN_ERROR_K,
-    RAMAN_ERROR_SHARE,
-    RAMAN_SLOPE_K_CM,
-    STRESS_SHIFT,
-)
 from hotlever.types import Array
 
 Law = Literal["linear", "anharmonic"]
@@ -59,8 +49,8 @@ class LinearFit(Record):
     constant_K: Number
     slope_K_cm: Number = Field(lt=0)
     slope_stderr_K_cm: Size = 0.0
-    error_constant_K: Size = RAMAN_ERROR_K
-    error_fraction: Size = RAMAN_ERROR_SHARE
+    error_constant_K: Size = paper.RAMAN_ERROR_K
+    error_fraction: Size = paper.RAMAN_ERROR_SHARE
     residual_rms_K: Size = 0.0
 
     def temperature(self, shift: Array, room_temperature: float) -> Array:
@@ -180,10 +170,10 @@ def published_raman_calibration() -> RamanCalibration:
     (5.0, -41.1)
     """
     return RamanCalibration(
-        source=f"Spieser et al. (2017), section III, doi:{DOI}; {anharmonic.SOURCE}",
-        room_temperature_K=BASE_TEMPERATURE_K,
-        range_K=(BASE_TEMPERATURE_K, RAMAN_CALIBRATED_TO_K),
-        linear=LinearFit(constant_K=RAMAN_CONSTANT_K, slope_K_cm=RAMAN_SLOPE_K_CM),
+        source=f"Spieser et al. (2017), section III, doi:{paper.DOI}; {anharmonic.SOURCE}",
+        room_temperature_K=paper.BASE_TEMPERATURE_K,
+        range_K=(paper.BASE_TEMPERATURE_K, paper.RAMAN_CALIBRATED_TO_K),
+        linear=LinearFit(constant_K=paper.RAMAN_CONSTANT_K, slope_K_cm=paper.RAMAN_SLOPE_K_CM),
         anharmonic=AnharmonicFit(
             three_phonon_cm=anharmonic.THREE_PHONON,
             four_phonon_cm=anharmonic.FOUR_PHONON,
@@ -388,11 +378,6 @@ class Thermometer:
         _check("laser heating", self.laser_heating, 1e3, "K")
         _check("stress", self.stress, 1e4, "MPa")
 
-    @property
-    def room_temperature_K(self) -> float:
-        """At which the line is that shifts are taken from."""
-        return self.calibration.room_temperature_K
-
     def with_reference(self, peaks: Iterable[tuple[Peak, float | None]]) -> Thermometer:
         """Take the room-temperature line from spectra of the instrument as it is now.
 
@@ -460,7 +445,7 @@ class Thermometer:
             model = self._model_error(at, slope)
         own = np.abs(noise * (linear.slope_K_cm if self.law == "linear" else 1.0 / slope))
         variance = variance + model**2 + self.laser_heating**2
-        variance = variance + (STRESS_SHIFT * self.stress / slope) ** 2
+        variance = variance + (paper.STRESS_SHIFT * self.stress / slope) ** 2
         error = np.where(exists, np.sqrt(variance), np.nan)
         low, high = calibration.range_K
         outside = (temperature < low - 2.0 * error) | (temperature > high)
@@ -482,7 +467,7 @@ class Thermometer:
 
 
 def laser_heating(
-    power_mW: float, resistance_K_per_mW: float, absorbed: float = ABSORBED_SHARE
+    power_mW: float, resistance_K_per_mW: float, absorbed: float = paper.ABSORBED_SHARE
 ) -> float:
     """Estimate the heating by the laser, K.
 
