@@ -1,8 +1,7 @@
 """Material laws, the doping profile, and the published parameter sets."""
 # ruff: noqa: F401 (what is imported here is what the package offers)
 
-from hotlever.materials.kind import Kind
-from hotlever.materials.kinds import KINDS
+from hotlever.materials.kinds import KINDS, Kind
 from hotlever.materials.parameters import (
     HIGH_DOPED,
     LOW_DOPED,

@@ -12,8 +12,7 @@ import numpy as np
 
 from hotlever.errors import InputError, excerpt, unknown_name
 from hotlever.materials.heat import thermal_conductivity
-from hotlever.materials.kind import Kind
-from hotlever.materials.kinds import KINDS
+from hotlever.materials.kinds import KINDS, Kind
 from hotlever.materials.laws import Law
 from hotlever.materials.parameters import STATED, Parameter
 from hotlever.materials.presets import PRESETS

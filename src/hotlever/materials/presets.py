@@ -10,8 +10,7 @@ from pydantic import create_model, model_validator
 
 from hotlever.errors import unknown_name
 from hotlever.materials.films import SOMMERFELD
-from hotlever.materials.kind import Kind
-from hotlever.materials.kinds import KINDS, HighDopedSilicon, NSilicon, ScaleOrByThickness
+from hotlever.materials.kinds import KINDS, HighDopedSilicon, Kind, NSilicon, ScaleOrByThickness
 from hotlever.materials.parameters import HIGH_DOPED, LOW_DOPED, OF_SILICON, field_of
 from hotlever.records import Record
 from hotlever.spieser2017 import (

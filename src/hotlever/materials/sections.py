@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from hotlever.errors import InputError, counted, excerpt, quoted, unknown_name
-from hotlever.materials.kind import Kind, class_name
-from hotlever.materials.kinds import KINDS
+from hotlever.materials.kinds import KINDS, Kind, class_name
 from hotlever.materials.parameters import HIGH_DOPED, LOW_DOPED, STATED
 from hotlever.materials.presets import PRESETS, Material, usual_values
 from hotlever.materials.stated import Table

@@ -16,8 +16,7 @@ import hotlever
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import write_text
 from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, REFERENCE, Kind, Material, full_name
-from hotlever.materials.kind import class_name
-from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
+from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon, class_name
 from hotlever.materials.sections import remade
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.file_sections import (
@@ -216,7 +215,7 @@ class Probe(Record):
         """Return the probe with a class of one's own for one of its materials.
 
         The `section` is its name, or ``material`` for the silicon of that section. The
-        `material_class` is derived from its kind, see `hotlever.materials.kind.Kind`, or from
+        `material_class` is derived from its kind, see `hotlever.materials.kinds.Kind`, or from
         `hotlever.materials.Material`; the ``values`` are in its section in place of what it held.
 
         Raises

@@ -7,7 +7,7 @@ added, and what the probe's values say of bounds and scales.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
@@ -141,25 +141,22 @@ def parameters_of(
     parts = (probe.shape, probe.tip, probe.contact, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
 
-    def add(name: str, spread: float | None, within: tuple[float, float] = (0.5, 1.5)) -> None:
+    def add(
+        name: str, spread: float | None, within: tuple[float, float] = (0.5, 1.5), **own: Any
+    ) -> None:
+        """Add a parameter that stays within multiples of its value, unless its own limits are."""
         (value,) = probe.values([name]).tolist()
-        least, most = within
-        table[name] = parameter_named(name)._replace(
-            scale=value,
-            lower=least * value,
-            upper=most * value,
-            meaning=meaning.get(name, parameter_named(name).meaning),
-            spread=spread,
-            value=value,
-        )
+        lower, upper = (share * value for share in within)
+        usual = {"scale": value, "lower": lower, "upper": upper, "spread": spread, "value": value}
+        named = parameter_named(name)
+        words = meaning.get(name, named.meaning)
+        table[name] = named._replace(**{**usual, "meaning": words, **own})
 
     matter = nuisances(probe)
+    shifts = {"scale": 0.1, "lower": -MOST_EDGE_BIAS, "upper": MOST_EDGE_BIAS}
     for name in probe.shape.dimensions():
-        add(name, 0.05 if name in matter else None)
-        if own_name(name) == EDGE_BIAS:
-            table[name] = table[name]._replace(
-                scale=0.1, lower=-MOST_EDGE_BIAS, upper=MOST_EDGE_BIAS
-            )
+        own = shifts if own_name(name) == EDGE_BIAS else {}
+        add(name, 0.05 if name in matter else None, **own)
     for name in _of_the_tip(probe):
         # from a micrograph
         add(name, 0.2)
@@ -167,25 +164,19 @@ def parameters_of(
         # nothing is known of it but its power of ten
         add("interface_K_per_mW", math.log(10.0), (1e-3, 1e3))
     # of a room, or a hot plate and its thermocouple
-    add("base_temperature_K", 1.0, (0.8, 1.2))
-    table["base_temperature_K"] = table["base_temperature_K"]._replace(relative=False)
+    add("base_temperature_K", 1.0, (0.8, 1.2), relative=False)
     if anywhere or probe.circuit.chip_K_per_mW:
         usual = usual_chip(probe)
         # in pulses the spreading counts alone, which is known; the holder is not
-        within = (0.01, 100.0)
-        add("chip_K_per_mW", None if in_time else 0.6 * usual, within)
-        table["chip_K_per_mW"] = table["chip_K_per_mW"]._replace(
-            scale=usual, lower=within[0], upper=within[1], relative=False
-        )
+        limits = {"scale": usual, "lower": 0.01, "upper": 100.0, "relative": False}
+        add("chip_K_per_mW", None if in_time else 0.6 * usual, **limits)
     if probe.circuit.series_resistance_ohm > 0:
         add("series_resistance_ohm", RESISTANCE)
     if probe.circuit.has_bridge:
         add("bridge_upper_ohm", RESISTANCE)
         add("bridge_lower_ohm", RESISTANCE)
-        add("bridge_offset_V", None)
-        table["bridge_offset_V"] = table["bridge_offset_V"]._replace(
-            scale=0.01, lower=-MOST_OFFSET_V, upper=MOST_OFFSET_V, relative=False
-        )
+        limits = {"scale": 0.01, "lower": -MOST_OFFSET_V, "upper": MOST_OFFSET_V, "relative": False}
+        add("bridge_offset_V", None, **limits)
     if anywhere or probe.surroundings.medium == "air":
         # humidity, what is around, and dimensions as far as they matter to what air takes up
         add("gas_conductivity", 0.1, (0.2, 5.0))

@@ -36,8 +36,7 @@ from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP
 from hotlever.lever.transport import Fluxes, Properties, dot
 from hotlever.materials import HIGH_DOPED, LOW_DOPED
-from hotlever.materials.kind import Kind
-from hotlever.materials.kinds import LowDopedSilicon, PSilicon
+from hotlever.materials.kinds import Kind, LowDopedSilicon, PSilicon
 from hotlever.probe import Probe, Taper
 from hotlever.probe.drawing import Drawing, Layer, rectangle
 from hotlever.threads import one_blas_thread
