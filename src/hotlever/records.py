@@ -23,6 +23,11 @@ from pydantic import (
 from hotlever.errors import InputError, excerpt, quoted, unknown_name
 
 
+def bounded(meaning: str, least: float, most: float, default: Any = ...) -> Any:
+    """Return the field of a number between bounds, its default if it has one, and what it is."""
+    return Field(default, ge=least, le=most, description=meaning)
+
+
 def _nan_if_none(value: Any, check: Callable[[Any], Any]) -> Any:
     return math.nan if value is None else check(value)
 

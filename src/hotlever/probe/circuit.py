@@ -20,21 +20,12 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from hotlever.errors import InputError, unknown_name
-from hotlever.records import Record
+from hotlever.records import Record, bounded
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
 from hotlever.types import Array
 
 #: Largest offset of an amplifier (V).
 MOST_OFFSET_V = 10.0
-
-
-def resistance(meaning: str, default: float | None, least: float = 0) -> Any:
-    """Return the field of a resistor (Ω), which may be none."""
-    return Field(default=default, ge=least, le=1e7, description=meaning)
-
-
-def _of_bridge(meaning: str) -> Any:
-    return resistance(f"of a bridge, {meaning}", None, least=1e-3)
 
 
 class Contact(Record):
@@ -47,16 +38,12 @@ class Contact(Record):
     """
 
     kind: Literal["supply", "ground", "sense"]
-    bias_V: float | None = Field(
-        default=None, ge=-1000.0, le=1000.0, description="of a supply that holds a voltage"
+    bias_V: float | None = bounded("of a supply that holds a voltage", -1000.0, 1000.0, None)
+    current_mA: float | None = bounded("of a supply that holds a current", -1000.0, 1000.0, None)
+    series_resistance_ohm: float = bounded(
+        "between the terminal and its supply or ground", 0, 1e7, 0.0
     )
-    current_mA: float | None = Field(
-        default=None, ge=-1000.0, le=1000.0, description="of a supply that holds a current"
-    )
-    series_resistance_ohm: float = resistance("between the terminal and its supply or ground", 0.0)
-    base_temperature_K: float | None = Field(
-        default=None, ge=250, le=1000, description="of this leg end, if it is another"
-    )
+    base_temperature_K: float | None = bounded("of this leg end, if it is another", 250, 1000, None)
 
     @model_validator(mode="after")
     def _has_what_its_kind_has(self) -> Self:
@@ -147,29 +134,20 @@ class Circuit(Record):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Contact]
 
-    series_resistance_ohm: float = resistance("between the bias source and the lever, R_s", 5600.0)
-    base_temperature_K: float = Field(
-        default=BASE_TEMPERATURE_K, ge=250, le=1000, description="of the leg ends"
+    series_resistance_ohm: float = bounded(
+        "between the bias source and the lever, R_s", 0, 1e7, 5600.0
     )
-    chip_K_per_mW: float = Field(
-        default=0.0,
-        ge=0,
-        le=1000,
-        description="by which leg ends get warmer for the heat that enters the chip by them",
+    base_temperature_K: float = bounded("of the leg ends", 250, 1000, BASE_TEMPERATURE_K)
+    chip_K_per_mW: float = bounded(
+        "by which leg ends get warmer for the heat that enters the chip by them", 0, 1000, 0.0
     )
-    bridge_upper_ohm: float | None = _of_bridge("from the bias source to what V_l is compared with")
-    bridge_lower_ohm: float | None = _of_bridge("from there to ground")
-    bridge_gain: float | None = Field(
-        default=None,
-        ge=-1e6,
-        le=1e6,
-        description="of the bridge's amplifier; 1 if left out",
+    bridge_upper_ohm: float | None = bounded(
+        "of a bridge, from the bias source to what V_l is compared with", 1e-3, 1e7, None
     )
-    bridge_offset_V: float = Field(
-        default=0.0,
-        ge=-MOST_OFFSET_V,
-        le=MOST_OFFSET_V,
-        description="that the bridge's amplifier shows of no voltage",
+    bridge_lower_ohm: float | None = bounded("of a bridge, from there to ground", 1e-3, 1e7, None)
+    bridge_gain: float | None = bounded("of the bridge's amplifier; 1 if left out", -1e6, 1e6, None)
+    bridge_offset_V: float = bounded(
+        "that the bridge's amplifier shows of no voltage", -MOST_OFFSET_V, MOST_OFFSET_V, 0.0
     )
     swept: str = Field(
         default="supply",

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.probe.layout import Layout
 from hotlever.quantities import QUANTITIES
-from hotlever.records import Record
+from hotlever.records import Record, bounded
 from hotlever.types import Array, Mask
 
 
@@ -41,9 +41,7 @@ class Monitor(Record):
     line_um: Annotated[tuple[Place, Place], BeforeValidator(_as_tuples)] | None = Field(
         default=None, description="from one place to another, which lie on the lever"
     )
-    points: int | None = Field(
-        default=None, ge=2, le=1000, description="of the line; 101 if left out"
-    )
+    points: int | None = bounded("of the line; 101 if left out", 2, 1000, None)
     region: str | None = Field(
         default=None, description="a region, part, layer or material of the lever: a mean over it"
     )

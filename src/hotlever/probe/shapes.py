@@ -11,11 +11,11 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from hotlever.materials import LOW_DOPED
 from hotlever.probe.layout import Layout, Part, Region, Taper, Terminal, rectangle
-from hotlever.records import Record
+from hotlever.records import Record, bounded
 
 #: The dimension that is the same for all edges, and how far off it is at most (µm).
 EDGE_BIAS, MOST_EDGE_BIAS = "edge_bias_um", 2.0
@@ -23,7 +23,7 @@ EDGE_BIAS, MOST_EDGE_BIAS = "edge_bias_um", 2.0
 
 def _length(meaning: str, least: float = 0.05, most: float = 1000.0, **default: Any) -> Any:
     """Return a dimension's bounds (µm), within which any lever lies by far, and what it is."""
-    return Field(ge=least, le=most, description=meaning, **default)
+    return bounded(meaning, least, most, **default)
 
 
 def thickness(meaning: str = "of the silicon") -> Any:
@@ -33,7 +33,7 @@ def thickness(meaning: str = "of the silicon") -> Any:
 
 def edge_bias(meaning: str = "all etched edges lie so far outside the drawing") -> Any:
     """Return the bounds of how far edges are outside the drawing (µm), and what that is."""
-    return Field(default=0.0, ge=-MOST_EDGE_BIAS, le=MOST_EDGE_BIAS, description=meaning)
+    return bounded(meaning, -MOST_EDGE_BIAS, MOST_EDGE_BIAS, 0.0)
 
 
 def full_bias_name(layer: str) -> str:

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from hotlever.errors import unknown_name
 from hotlever.materials.air import ATMOSPHERE, temperature_jump_length
-from hotlever.records import Record
+from hotlever.records import Record, bounded
 
 Medium = Literal["vacuum", "air"]
 
@@ -32,45 +32,27 @@ class Surroundings(Record):
         default="vacuum",
         description="vacuum or air; the rest counts in air, all of it at the base temperature",
     )
-    surface_gap_um: float | None = Field(
-        default=None,
-        ge=0.001,
-        le=1e4,
-        description="lower face of the lever to a flat surface below, at the tip",
+    surface_gap_um: float | None = bounded(
+        "lower face of the lever to a flat surface below, at the tip", 0.001, 1e4, None
     )
-    surface_tilt_deg: float = Field(
-        default=0.0,
-        ge=-45,
-        le=45,
-        description="of that surface; positive: the base is farther away",
+    surface_tilt_deg: float = bounded(
+        "of that surface; positive: the base is farther away", -45, 45, 0.0
     )
     chip: bool = Field(
         default=False,
         description="whether the chip body behind the legs takes up heat from the air",
     )
-    accommodation: float | None = Field(
-        default=None,
-        ge=0.01,
-        le=1,
-        description="0.01 to 1: the air's temperature jumps at surfaces; left out: no jump",
+    accommodation: float | None = bounded(
+        "0.01 to 1: the air's temperature jumps at surfaces; left out: no jump", 0.01, 1, None
     )
-    gas_conductivity: float = Field(
-        default=1.0,
-        ge=0.01,
-        le=20,
-        description="of the gas, over that of dry air at the same temperature",
+    gas_conductivity: float = bounded(
+        "of the gas, over that of dry air at the same temperature", 0.01, 20, 1.0
     )
-    pressure_mbar: float = Field(
-        default=ATMOSPHERE,
-        ge=1e-6,
-        le=1e6,
-        description="of the air; matters only with accommodation",
+    pressure_mbar: float = bounded(
+        "of the air; matters only with accommodation", 1e-6, 1e6, ATMOSPHERE
     )
-    jump_temperature_K: float = Field(
-        default=600.0,
-        ge=250,
-        le=1700,
-        description="of the air at the lever, for the length of the jump",
+    jump_temperature_K: float = bounded(
+        "of the air at the lever, for the length of the jump", 250, 1700, 600.0
     )
 
     @model_validator(mode="after")

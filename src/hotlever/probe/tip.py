@@ -15,7 +15,7 @@ from pydantic import Field, field_validator
 
 from hotlever.errors import InputError, excerpt
 from hotlever.materials.catalogue import sample_conductivity
-from hotlever.records import Record
+from hotlever.records import Record, bounded
 from hotlever.types import Array
 from hotlever.units import product_conversion, quantity
 
@@ -36,20 +36,18 @@ class Tip(Record):
     0.52
     """
 
-    height_um: float = Field(ge=0.01, le=100, description="from the lever's surface to the apex")
-    half_angle_deg: float = Field(
-        default=20.0, ge=1, le=80, description="between the axis and the side"
-    )
-    apex_radius_um: float = Field(default=0.02, ge=1e-4, le=10, description="of the flat end")
+    height_um: float = bounded("from the lever's surface to the apex", 0.01, 100)
+    half_angle_deg: float = bounded("between the axis and the side", 1, 80, 20.0)
+    apex_radius_um: float = bounded("of the flat end", 1e-4, 10, 0.02)
     in_air: bool = Field(
         default=False,
         description="whether its surface gives heat to the air too, if the medium is air",
     )
-    kappa: float = Field(
-        default=0.25,
-        ge=1e-3,
-        le=30,
-        description="W/(cm K), of the hot tip: how heat comes to its surface; counts with in_air",
+    kappa: float = bounded(
+        "W/(cm K), of the hot tip: how heat comes to its surface; counts with in_air",
+        1e-3,
+        30,
+        0.25,
     )
 
     @property
@@ -116,11 +114,8 @@ class SampleContact(Record):
         description="layers from the top, each but the last with its thickness; a material or "
         "its W/(m K)"
     )
-    interface_K_per_mW: float = Field(
-        default=0.0,
-        ge=0,
-        le=OUT_OF_CONTACT,
-        description="thermal resistance between apex and sample",
+    interface_K_per_mW: float = bounded(
+        "thermal resistance between apex and sample", 0, OUT_OF_CONTACT, 0.0
     )
 
     @field_validator("sample")

@@ -18,7 +18,7 @@ from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.probe.drawing.outlines import Ring
 from hotlever.probe.shapes import EDGE_BIAS, edge_bias
-from hotlever.records import Record
+from hotlever.records import Record, bounded
 
 
 class DrawnPart(Record):
@@ -57,11 +57,8 @@ class DrawnLayer(DrawnPart):
     """Outlines of one layer, and what they are made of (section ``[layers.NAME]``)."""
 
     material: str = Field(description="of [materials]")
-    thickness_um: float | None = Field(
-        default=None,
-        ge=0.001,
-        le=20.0,
-        description="of a film on the body; left out: a part of the body",
+    thickness_um: float | None = bounded(
+        "of a film on the body; left out: a part of the body", 0.001, 20.0, None
     )
     edge_bias_um: float = edge_bias("edges of outline or window lie so far outside the drawing")
     #: That of the material; no key of a probe file.

@@ -56,7 +56,7 @@ from hotlever.probe.drawing.sheet import (
 from hotlever.probe.layout import BorderTaper, Film, Layout, Part, Point, Region, Taper, Terminal
 from hotlever.probe.mesh import MOST_SQUARES
 from hotlever.probe.shapes import EDGE_BIAS, Shape, full_bias_name, thickness
-from hotlever.records import Record
+from hotlever.records import Record, bounded
 
 
 @lru_cache(maxsize=32)
@@ -333,11 +333,8 @@ class DrawingFile(Record):
         le=1e6,
         description="of the file's numbers; left out: what it says, 1 if it says nothing",
     )
-    tolerance_um: float = Field(
-        default=TOLERANCE_UM,
-        ge=1e-4,
-        le=0.1,
-        description="curves become lines within it, what is nearer is the same",
+    tolerance_um: float = bounded(
+        "curves become lines within it, what is nearer is the same", 1e-4, 0.1, TOLERANCE_UM
     )
 
     def sheet(self, where: str, folder: Path | None) -> Sheet:
@@ -368,11 +365,8 @@ class DrawnShape(DrawingFile, Shape):
 
     shape: Literal["drawing"] = "drawing"
     thickness_um: float = thickness("of the lever, without films on it")
-    scale: float = Field(
-        default=1.0,
-        ge=0.01,
-        le=100,
-        description="outlines and the tip's place are so many times what is drawn",
+    scale: float = bounded(
+        "outlines and the tip's place are so many times what is drawn", 0.01, 100, 1.0
     )
     tip_um: Point = Field(description="place of the tip, as drawn")
     remarks: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
