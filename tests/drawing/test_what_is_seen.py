@@ -214,7 +214,7 @@ def test_what_a_library_does_not_read_is_said(tmp_path):
 
 
 def test_names_of_layers_do_not_differ_by_case_in_dxf():
-    sheet = Sheet("a.dxf", "DXF", [], [], None, {}, [], hidden={"Heater": "off"})
+    sheet = Sheet("a.dxf", "DXF", {}, [], hidden={"Heater": "off"})
     with pytest.raises(InputError, match="layer Heater is off"):
         sheet.layer("HEATER", "here")
 

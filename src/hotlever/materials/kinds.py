@@ -18,7 +18,7 @@ coefficients. The profile of the dopant departs where the doping is made.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -242,6 +242,12 @@ class Kind(Record):
                 useless[other] = f"{name} is {'a law' if is_law else 'no law'}"
         used = names_stated(values)
         return {name: why for name, why in useless.items() if name not in used}
+
+    @classmethod
+    def useful(cls, values: Mapping[str, Any], stated: Collection[str]) -> dict[str, Any]:
+        """Return values without those that have no use in a section, unless they are stated."""
+        useless = {*cls.without_use(values)} - {*stated}
+        return {name: value for name, value in values.items() if name not in useless}
 
     @model_validator(mode="before")
     @classmethod

@@ -67,9 +67,7 @@ def material_of(
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     # of a metal that follows a table the coefficient of a preset has no use
-    useless = material_class.without_use({**usual, **stated})
-    usual = {name: value for name, value in usual.items() if name not in useless}
-    return material_class.from_values({**usual, **stated}, where)
+    return material_class.from_values(material_class.useful({**usual, **stated}, stated), where)
 
 
 def remade(
@@ -90,8 +88,7 @@ def remade(
     own = {**material.model_dump(exclude_none=True), **values}
     if not issubclass(material_class, Kind):
         return material_class.from_values(own, f"[{name}]")
-    useless = {*material_class.without_use(own)} - values.keys()
-    own = {key: value for key, value in own.items() if key not in useless}
+    own = material_class.useful(own, values)
     return material_of(own, f"[{name}]", material_class=material_class)
 
 

@@ -80,17 +80,7 @@ def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
     InputError
         If the file cannot be read or is not TOML.
     """
-    return sections_of(read_text(path, largest=1_000_000), str(path))
-
-
-def sections_of(text: str, path: str) -> dict[str, Any]:
-    """Return the sections of the text of a probe file; `path` names it in an error.
-
-    Raises
-    ------
-    InputError
-        If it is not TOML.
-    """
+    text = read_text(path, largest=1_000_000)
     for number, line in enumerate(text.splitlines(), start=1):
         # a key of thousands of parts takes gigabytes to read
         if len(line) > 1000:
@@ -98,14 +88,13 @@ def sections_of(text: str, path: str) -> dict[str, Any]:
                 f"{path}: line {number}: {len(line)} characters, expected at most 1000"
             )
     try:
-        values = tomllib.loads(text)
+        return tomllib.loads(text)
     except RecursionError:
         raise InputError(f"{path}: not valid TOML: nested too deeply") from None
     except ValueError as error:
         # a number of thousands of digits is a ValueError too
         reason = str(error).partition(";")[0]
         raise InputError(f"{path}: not valid TOML: {reason}") from None
-    return values
 
 
 def parts_of(
@@ -312,9 +301,8 @@ def changed_sections(probe: Probe, changes: Mapping[str, Any]) -> dict[str, dict
             inside[last] = {"drawn": inside[last]}
         inside[last][key] = value
         if section in probe.materials:
-            useless = type(probe.materials[section]).without_use(inside[last])
-            for other in {*useless} - {own for _, own in keys.values()}:
-                inside[last].pop(other, None)
+            kind, stated = type(probe.materials[section]), {own for _, own in keys.values()}
+            inside[last] = kind.useful(inside[last], stated)
     sections = {name: with_values(section) for name, section in sections.items()}
     shape = PARAMETRIC.get(str(sections["probe"]["shape"]))
     if shape is not None and not isinstance(probe.shape, shape):
@@ -324,11 +312,6 @@ def changed_sections(probe: Probe, changes: Mapping[str, Any]) -> dict[str, dict
 
 
 # --- as text --------------------------------------------------------------------------------------
-
-
-def commented(entry: str, text: str | None) -> str:
-    """Return a line of a probe file with a comment, if there is one."""
-    return f"{entry:<30}  # {text}" if text else entry
 
 
 def section_lines(
@@ -351,7 +334,7 @@ def section_lines(
             continue
         written = f"{value:.12g}" if isinstance(value, float) else as_toml(value)
         entry = f"# {key} =" if value is None else f"{start}{key} = {written}"
-        lines.append(commented(entry, meaning.get(key)))
+        lines.append(f"{entry:<30}  # {meaning[key]}" if meaning.get(key) else entry)
     for key, values in inner.items():
         lines += section_lines(f"{name}.{key}", values, {})
     return lines

@@ -294,21 +294,14 @@ class UShape(Parametric):
     edge_bias_um: float = edge_bias()
 
     def _parts_fit(self) -> None:
-        _need(
-            self.bridge_width_um < self.length_um,
-            f"bridge_width_um = {self.bridge_width_um:g} must be less than "
-            f"length_um = {self.length_um:g}",
-        )
-        _need(
-            self.heater_width_um <= self.bridge_width_um,
-            f"heater_width_um = {self.heater_width_um:g} must not exceed "
-            f"bridge_width_um = {self.bridge_width_um:g}",
-        )
-        _need(
-            self.heater_length_um <= self.gap_um,
-            f"heater_length_um = {self.heater_length_um:g} must not exceed "
-            f"gap_um = {self.gap_um:g}",
-        )
+        for name, other, fits in (
+            ("bridge_width_um", "length_um", "be less than"),
+            ("heater_width_um", "bridge_width_um", "not exceed"),
+            ("heater_length_um", "gap_um", "not exceed"),
+        ):
+            size, room = getattr(self, name), getattr(self, other)
+            wide = size < room or (size == room and fits == "not exceed")
+            _need(wide, f"{name} = {size:g} must {fits} {other} = {room:g}")
 
     @classmethod
     def reference(cls) -> UShape:

@@ -211,9 +211,6 @@ def read_dxf(
     drawing.flatten()
     return {
         "kind": "DXF",
-        "cells": [],
-        "top": [],
-        "cell": None,
         "layers": drawing.outlines.layers,
         "labels": drawing.labels[:1000],
         "unit_um": unit_um,

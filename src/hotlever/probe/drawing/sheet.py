@@ -56,13 +56,13 @@ class Sheet:
     file : str
     kind : str
         GDSII, OASIS or DXF.
+    layers : dict of str to SheetLayer
+    labels : list of (str, str, Point)
+        Layer, text and place of each text.
     cells, top : list of str
         All cells, and those that no other refers to.
     cell : str or None
         The one whose layers these are; None in a DXF file.
-    layers : dict of str to SheetLayer
-    labels : list of (str, str, Point)
-        Layer, text and place of each text.
     unit_um : float
         Of the file's numbers.
     unit_stated : bool
@@ -76,11 +76,11 @@ class Sheet:
 
     file: str
     kind: str
-    cells: list[str]
-    top: list[str]
-    cell: str | None
     layers: dict[str, SheetLayer]
     labels: list[tuple[str, str, Point]]
+    cells: list[str] = field(default_factory=list)
+    top: list[str] = field(default_factory=list)
+    cell: str | None = None
     unit_um: float = 1.0
     unit_stated: bool = True
     remarks: list[tuple[str, str]] = field(default_factory=list)
