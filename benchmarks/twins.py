@@ -58,7 +58,7 @@ from hotlever.lever import Branch, Lever
 from hotlever.lever.discretisation import chosen_space, energy_between_degrees, making
 from hotlever.lever.full_space import FullSpace
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.file_sections import PriorTexts
+from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import default_priors, updated
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.studies.simulation_based_calibration import (

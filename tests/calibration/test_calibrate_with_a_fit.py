@@ -11,7 +11,7 @@ import pytest
 
 from hotlever.estimate import fit, read_fit
 from hotlever.estimate.estimator import known_before_a_fit
-from hotlever.probe.file_sections import PriorTexts
+from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import Prior, published_material
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")

@@ -27,7 +27,7 @@ from hotlever.estimate.surrogate import Rows
 from hotlever.estimate.tip_table import budgets_of
 from hotlever.materials.departures import DEPARTURES, departure_of
 from hotlever.materials.parameters import own_name
-from hotlever.probe import Probe
+from hotlever.probe.parts import ProbeParts
 from hotlever.probe.priors import SCALES
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import FITTED, OBSERVABLES
@@ -434,7 +434,7 @@ def _by_law(contributions: dict[str, Array]) -> dict[str, dict[str, float]]:
 
 
 def _rows_of_fit(
-    probe: Probe, prior: PriorDensity, by_fit: Array, units: Mapping[str, str]
+    probe: ProbeParts, prior: PriorDensity, by_fit: Array, units: Mapping[str, str]
 ) -> tuple[list[InputQuantity], Array]:
     """Return the parameters that a fit to other data has left as rows, and their correlation.
 

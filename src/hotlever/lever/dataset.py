@@ -35,7 +35,7 @@ from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.observables import with_bridge
 from hotlever.materials import Kind
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.file_sections import SECTIONS
+from hotlever.probe.parts import SECTIONS
 from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import OBSERVABLES
 from hotlever.types import Array, Mask

@@ -7,18 +7,15 @@ through its holder, in milliseconds or more. At rest both count, in pulses the s
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.materials.heat import thermal_conductivity
 from hotlever.probe.layout import Layout
+from hotlever.probe.parts import ProbeParts, ProbesParts
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
-
-if TYPE_CHECKING:
-    from hotlever.probe.probe import Probe
 
 
 def mean_inverse_distance(a: ArrayLike, b: ArrayLike) -> Array:
@@ -62,20 +59,20 @@ def spreading_K_per_mW(layout: Layout, base_temperature_K: float) -> float:
     return float(1.0 / (2.0 * math.pi * kappa * np.linalg.inv(inverse).sum()))
 
 
-def usual_chip(probe: Probe) -> float:
+def usual_chip(probe: ProbeParts) -> float:
     """Return what a chip in its holder usually has (K/mW): spreading, and a holder."""
     # a holder, glue or a clip usually adds as much (K/mW), of which nothing is known but its size
     return spreading_K_per_mW(probe.layout(), probe.circuit.base_temperature_K) + 1.0
 
 
-def on_usual_chip(probe: Probe, without: bool = False) -> Probe:
+def on_usual_chip(probe: ProbesParts, without: bool = False) -> ProbesParts:
     """Return a probe on a chip that gets warm as is usual, if its file says nothing of one."""
     if probe.circuit.chip_K_per_mW or without:
         return probe
     return probe.replace({"chip_K_per_mW": usual_chip(probe)})
 
 
-def in_pulses(probe: Probe) -> Probe:
+def in_pulses(probe: ProbesParts) -> ProbesParts:
     """Return a probe as it is in pulses, while its holder stays cold."""
     at_rest = probe.circuit.chip_K_per_mW
     if not at_rest:

@@ -6,70 +6,34 @@ import os
 import tomllib
 from collections.abc import Container, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from pydantic import ConfigDict, model_validator
+from typing import Any
 
 from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text
-from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind, Material
+from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind
 from hotlever.materials.kinds import Silicon
 from hotlever.materials.sections import classes_at_hand, materials_of
 from hotlever.materials.stated import names_stated
-from hotlever.probe.circuit import Circuit, Contact
-from hotlever.probe.monitor_sections import Monitors
+from hotlever.probe.circuit import Contact
+from hotlever.probe.parts import (
+    PARTS,
+    SECTIONS,
+    PriorTexts,
+    ProbeParts,
+    with_values,
+)
 from hotlever.probe.priors import priors_of
-from hotlever.probe.shapes import PARAMETRIC, SHAPE_SECTIONS, Shape, ThreeLeg
-from hotlever.probe.surroundings import Physics, Surroundings
-from hotlever.probe.tip import EXAMPLE, SampleContact, Tip
+from hotlever.probe.shapes import (
+    PARAMETRIC,
+    SHAPE_SECTIONS,
+    Shape,
+    ThreeLeg,
+)
+from hotlever.probe.surroundings import Physics
+from hotlever.probe.tip import EXAMPLE
 from hotlever.records import Record
 from hotlever.spieser2017 import DOI
 from hotlever.text import as_toml
-
-if TYPE_CHECKING:
-    from hotlever.probe.probe import Probe
-
-
-class PriorTexts(Record):
-    """What is known of a lever beforehand (section ``[prior]`` of a probe file), as text."""
-
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, str]
-
-    @model_validator(mode="before")
-    @classmethod
-    def _names_may_have_dots(cls, values: Any) -> Any:
-        if not isinstance(values, Mapping):
-            return values
-        flat = dict[str, Any]()
-        for name, value in values.items():
-            inner = value.items() if isinstance(value, Mapping) else ()
-            flat |= {f"{name}.{own}": text for own, text in inner} if inner else {name: value}
-        return flat
-
-
-#: What the sections of a probe file hold, beside the shape in ``[probe]``.
-PARTS: dict[str, type[Record]] = {
-    "circuit": Circuit,
-    "material": Material,
-    "surroundings": Surroundings,
-    "tip": Tip,
-    "contact": SampleContact,
-    "physics": Physics,
-    "prior": PriorTexts,
-    "monitor": Monitors,
-}
-#: All sections of a probe file.
-SECTIONS = (*SHAPE_SECTIONS, "materials", *PARTS)
-
-
-def with_values(section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a section without the keys that have no value."""
-    return {
-        key: with_values(value) if isinstance(value, Mapping) else value
-        for key, value in section.items()
-        if value is not None
-    }
 
 
 def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -98,7 +62,7 @@ def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def parts_of(
-    values: Mapping[str, Any], where: str, folder: Path | None, like: Probe | None
+    values: Mapping[str, Any], where: str, folder: Path | None, like: ProbeParts | None
 ) -> dict[str, Any]:
     """Make the parts of a probe, each for itself, of the sections of a probe file.
 
@@ -169,7 +133,7 @@ def _shape_of(
     where: str,
     folder: Path | None,
     kinds: Mapping[str, str],
-    like: Probe | None,
+    like: ProbeParts | None,
 ) -> Shape:
     """Make the shape that some sections of a probe file describe; `kinds` are of its materials."""
     values, here = sections["probe"], f"{where}: [probe]"
@@ -195,7 +159,7 @@ def _shape_of(
     return PARAMETRIC[name].from_values(values, here)
 
 
-def check_together(probe: Probe, stated: Mapping[str, Any], where: str) -> None:
+def check_together(probe: ProbeParts, stated: Mapping[str, Any], where: str) -> None:
     """Refuse sections that do not fit the others; those `stated` are by name.
 
     Raises
@@ -224,7 +188,7 @@ def check_together(probe: Probe, stated: Mapping[str, Any], where: str) -> None:
 # --- by name --------------------------------------------------------------------------------------
 
 
-def field_of(probe: Probe, name: str) -> tuple[str, str, type[Record]]:
+def field_of(probe: ProbeParts, name: str) -> tuple[str, str, type[Record]]:
     """Return section, key and record of a name such as ``n_d`` or ``tip.height_um``.
 
     Raises
@@ -270,7 +234,7 @@ def field_of(probe: Probe, name: str) -> tuple[str, str, type[Record]]:
     raise unknown_name("name", key, dict.fromkeys(choices))
 
 
-def changed_sections(probe: Probe, changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the sections of a probe with some values changed, each named as in `field_of`.
 
     Raises
@@ -340,12 +304,12 @@ def section_lines(
     return lines
 
 
-def file_text(probe: Probe, shape: Mapping[str, Any], meaning: Mapping[str, str]) -> str:
+def file_text(probe: ProbeParts, shape: Mapping[str, Any], meaning: Mapping[str, str]) -> str:
     """Return the probe file of a probe.
 
     Parameters
     ----------
-    probe : Probe
+    probe : ProbeParts
     shape : mapping
         The sections of its shape.
     meaning : mapping of str to str
@@ -362,7 +326,7 @@ def file_text(probe: Probe, shape: Mapping[str, Any], meaning: Mapping[str, str]
     return "\n".join(lines) + "\n" + other_sections(probe)
 
 
-def other_sections(probe: Probe, without: Container[str] = ()) -> str:
+def other_sections(probe: ProbeParts, without: Container[str] = ()) -> str:
     """Return the sections of a probe's file beside those of its shape, some of them left out."""
     lines = []
     named = {f"materials.{name}": kind for name, kind in probe.materials.items()}

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,12 +20,10 @@ from scipy.sparse.linalg import splu
 from hotlever.errors import ComputationError, InputError
 from hotlever.probe.layout import BorderTaper, Layout, Point, Region
 from hotlever.probe.mesh import ProbeMesh, doubled_areas, on_line
+from hotlever.probe.parts import ProbeParts
 from hotlever.probe.probe_parameters import OF_THE_TIP
 from hotlever.probe.tip import Tip
 from hotlever.types import Array
-
-if TYPE_CHECKING:
-    from hotlever.probe.probe import Probe
 
 #: What is no match costs more than any (µm²).
 _UNLIKE = 1e12
@@ -95,13 +93,13 @@ class Movement:
 class MovingMesh:
     """A flat mesh that follows its probe."""
 
-    def __init__(self, mesh: ProbeMesh, probe: Probe) -> None:
+    def __init__(self, mesh: ProbeMesh, probe: ProbeParts) -> None:
         self._mesh, self._probe = mesh, probe
         corners = _corners(mesh.layout)
         self._positions, which = np.unique(corners.round(6), axis=0, return_inverse=True)
         self._which = which.ravel()
 
-    def movement(self, probe: Probe, name: str) -> Movement:
+    def movement(self, probe: ProbeParts, name: str) -> Movement:
         """Return how mesh and layout of a similar probe move with a dimension.
 
         Raises
@@ -124,7 +122,7 @@ class MovingMesh:
         displacement = self._follow(after) - self._follow(before)
         return Movement(now, before, after, step, displacement / (2 * step))
 
-    def mesh_of(self, probe: Probe) -> ProbeMesh:
+    def mesh_of(self, probe: ProbeParts) -> ProbeMesh:
         """Return the mesh of a probe with other dimensions.
 
         Raises

@@ -19,7 +19,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -28,14 +28,12 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.materials.departures import DEPARTURES
 from hotlever.materials.parameters import Parameter, own_name
 from hotlever.probe.chip import on_usual_chip
+from hotlever.probe.parts import ProbeParts, ProbesParts
 from hotlever.probe.probe_parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.records import StandardError
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 from hotlever.text import with_unit
-
-if TYPE_CHECKING:
-    from hotlever.probe.probe import Probe
 
 #: All laws that have a spread, and the parameters by which they depart. The last two have no shape
 #: of their own: what is around a lever, and how its heat capacity is measured, move them as a whole
@@ -189,7 +187,9 @@ def published_material() -> dict[str, Prior]:
     return {name: Prior(*scatter) for name, scatter in PUBLISHED_SCATTER.items()}
 
 
-def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) -> dict[str, Prior]:
+def default_priors(
+    probe: ProbeParts, material: Mapping[str, Prior] | None = None
+) -> dict[str, Prior]:
     """Return what is known of a lever of which nothing but the probe file is known.
 
     That are the spreads of `hotlever.materials.parameters` and `hotlever.probe.probe_parameters`
@@ -209,7 +209,9 @@ def default_priors(probe: Probe, material: Mapping[str, Prior] | None = None) ->
     return updated(usual | own, probe.stated_priors, probe, "[prior]")
 
 
-def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
+def known_beforehand(
+    probe: ProbeParts, stated: Mapping[str, Prior | str] | None
+) -> dict[str, Prior]:
     """Return the usual priors, with those stated in their place; none at all for an empty mapping.
 
     Raises
@@ -225,7 +227,7 @@ def known_beforehand(probe: Probe, stated: Mapping[str, Prior | str] | None) -> 
 def updated(
     priors: Mapping[str, Prior],
     stated: Mapping[str, Prior | str],
-    probe: Probe,
+    probe: ProbeParts,
     where: str,
     *,
     in_time: bool = False,
@@ -250,7 +252,7 @@ def draw_values(priors: Mapping[str, Prior], rng: np.random.Generator) -> dict[s
     return {name: prior.at(float(rng.standard_normal())) for name, prior in priors.items()}
 
 
-def as_known(probe: Probe, stated: Mapping[str, Prior | str] | None) -> Probe:
+def as_known(probe: ProbesParts, stated: Mapping[str, Prior | str] | None) -> ProbesParts:
     """Return a probe as far as its priors say more than its file: on a chip as is usual.
 
     Not where priors are none, or laws the paper's, whose leg ends stay at the base temperature.
@@ -266,7 +268,7 @@ def is_of_laws(name: str) -> bool:
 
 
 def priors_of(
-    stated: Mapping[str, Prior | str], probe: Probe, where: str, *, in_time: bool = False
+    stated: Mapping[str, Prior | str], probe: ProbeParts, where: str, *, in_time: bool = False
 ) -> dict[str, Prior]:
     """Return priors of which some are written as text.
 
@@ -319,12 +321,12 @@ def priors_of(
     return {name: prior for name, prior in priors.items() if name in counting or name in SCALES}
 
 
-def _names_of_law(law: str, probe: Probe) -> list[str]:
+def _names_of_law(law: str, probe: ProbeParts) -> list[str]:
     """Return the parameters by which a law departs in a probe."""
     return [name for name in parameters_of(probe, anywhere=True) if own_name(name) in LAWS[law]]
 
 
-def _of_all_laws(text: Prior | str, probe: Probe, where: str) -> dict[str, Prior]:
+def _of_all_laws(text: Prior | str, probe: ProbeParts, where: str) -> dict[str, Prior]:
     """Return the priors of all departures: as is usual, or none."""
     if text not in ("paper", "uncertain"):
         raise unknown_name("choice", str(text), ("paper", "uncertain"), where)
@@ -333,7 +335,7 @@ def _of_all_laws(text: Prior | str, probe: Probe, where: str) -> dict[str, Prior
     return dict.fromkeys(names, Prior(0.0, 1.0, relative=False)) if text == "uncertain" else {}
 
 
-def _of_law(law: str, text: Prior | str, probe: Probe, where: str) -> dict[str, Prior]:
+def _of_law(law: str, text: Prior | str, probe: ProbeParts, where: str) -> dict[str, Prior]:
     """Return the priors by which a law is as uncertain as a text says."""
     if law not in LAWS:
         raise unknown_name("law", law, LAWS, where.removesuffix(f": law.{law}"))

@@ -7,18 +7,16 @@ added, and what the probe's values say of bounds and scales.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
 from hotlever.materials.parameters import own_name, parameter_named
 from hotlever.probe.chip import usual_chip
 from hotlever.probe.circuit import MOST_OFFSET_V
+from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
 from hotlever.probe.tip import OUT_OF_CONTACT
-
-if TYPE_CHECKING:
-    from hotlever.probe.probe import Probe
 
 #: Relative spread of a resistor that was measured.
 RESISTANCE = 1e-3
@@ -26,18 +24,18 @@ RESISTANCE = 1e-3
 OF_THE_TIP = ("height_um", "half_angle_deg", "apex_radius_um")
 
 
-def dimensions_of(probe: Probe) -> list[str]:
+def dimensions_of(probe: ProbeParts) -> list[str]:
     """Return the names of all that the drawing says, and the tip if there is one."""
     return [*probe.shape.dimensions(), *_of_the_tip(probe)]
 
 
-def _of_the_tip(probe: Probe) -> tuple[str, ...]:
+def _of_the_tip(probe: ProbeParts) -> tuple[str, ...]:
     if probe.tip is None:
         return ()
     return OF_THE_TIP if probe.contact is not None else OF_THE_TIP[:-1]
 
 
-def nuisances(probe: Probe) -> list[str]:
+def nuisances(probe: ProbeParts) -> list[str]:
     """Return the dimensions of the drawing that matter to the tip, each by itself."""
     # the reader does not matter to the tip
     held = ("reader_length_um", "reader_centre_um", *probe.shape.tied())
@@ -49,7 +47,7 @@ def nuisances(probe: Probe) -> list[str]:
 
 
 def of_materials(
-    probe: Probe, *, anywhere: bool = False, in_time: bool = False
+    probe: ProbeParts, *, anywhere: bool = False, in_time: bool = False
 ) -> dict[str, Parameter]:
     """Return all parameters of what a probe is made of, by name: first those a fit usually varies.
 
@@ -79,7 +77,7 @@ def of_materials(
     return {name: table[name] for name in dict.fromkeys([*usual, *table])}
 
 
-def usual_parameters(probe: Probe) -> tuple[str, ...]:
+def usual_parameters(probe: ProbeParts) -> tuple[str, ...]:
     """Return what a fit varies of a probe unless it is told otherwise: the paper's six, if it can.
 
     Of other materials what each kind says, as far as it matters here: without a border with
@@ -102,12 +100,12 @@ def usual_parameters(probe: Probe) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*plain, *usual]))
 
 
-def _kinds(probe: Probe) -> list[tuple[str, Kind]]:
+def _kinds(probe: ProbeParts) -> list[tuple[str, Kind]]:
     """Return the materials of a probe, low-doped silicon first."""
     return sorted(probe.made_of.items(), key=lambda item: item[0] != LOW_DOPED)
 
 
-def heat_capacities(probe: Probe) -> tuple[str, ...]:
+def heat_capacities(probe: ProbeParts) -> tuple[str, ...]:
     """Return what a fit varies of what was measured in time unless it is told otherwise.
 
     Examples
@@ -124,7 +122,7 @@ def heat_capacities(probe: Probe) -> tuple[str, ...]:
 
 
 def parameters_of(
-    probe: Probe, *, anywhere: bool = False, in_time: bool = False
+    probe: ProbeParts, *, anywhere: bool = False, in_time: bool = False
 ) -> dict[str, Parameter]:
     """Return all that a fit may vary, by name: first the materials' parameters.
 
@@ -185,7 +183,9 @@ def parameters_of(
     return table
 
 
-def parameter_of(probe: Probe, name: str, where: str = "", *, in_time: bool = False) -> Parameter:
+def parameter_of(
+    probe: ProbeParts, name: str, where: str = "", *, in_time: bool = False
+) -> Parameter:
     """Return one of them.
 
     Raises

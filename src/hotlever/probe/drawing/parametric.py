@@ -14,8 +14,8 @@ from pydantic import Field, create_model
 from hotlever.errors import InputError, quoted
 from hotlever.probe.drawing.kit import Drawing
 from hotlever.probe.drawing.shape import DrawnShape
-from hotlever.probe.file_sections import PARTS
 from hotlever.probe.layout import Layout
+from hotlever.probe.parts import PARTS
 from hotlever.probe.shapes import EDGE_BIAS, Shape, edge_bias
 
 #: The shapes of functions that probes of this process were made of, by the functions' names.
