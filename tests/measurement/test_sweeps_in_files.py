@@ -11,7 +11,7 @@ from test_lab_files import write
 from hotlever.errors import InputError
 from hotlever.estimate import fit, read_measurement
 from hotlever.measurement import parse_columns, with_measured_circuit
-from hotlever.measurement.contents import NITROGEN
+from hotlever.measurement.measurement_file import NITROGEN
 from hotlever.measurement.rows import disagreements, sweeps_of
 from hotlever.probe import Circuit, Probe
 

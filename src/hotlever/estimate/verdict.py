@@ -25,7 +25,7 @@ from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
-from hotlever.measurement.contents import colder_than_base
+from hotlever.measurement.data import colder_than_base
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
 from hotlever.probe.probe_parameters import parameters_of

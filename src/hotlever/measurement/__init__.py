@@ -1,8 +1,8 @@
 """Measured data of one lever: the record, and the files that it is read from.
 
-`columns` knows the names and units of the columns, `contents` the comments that give circuit and
-surroundings and what no lever can show, `rows` the order of the rows, `compliance` what an
-instrument has clipped; `measurement_file` completes the rows and takes these together.
+`columns` knows the names and units of the columns, `rows` their order, `compliance` what an
+instrument has clipped; `measurement_file` reads the comments that give circuit and surroundings,
+refuses what no lever can show, completes the rows and takes these together.
 """
 # ruff: noqa: F401 (what is imported here is what the package offers)
 

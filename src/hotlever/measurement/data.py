@@ -229,12 +229,6 @@ class Measurement:
         return tuple(name for name in FITTED if np.isfinite(self.observable(name)).any())
 
 
-#: Columns that a measurement may be without; of the others it has NaN where nothing was measured.
-OPTIONAL = [
-    column.name for column in MEASURED if getattr(Measurement, column.name, MEASURED) is None
-]
-
-
 def with_measured_circuit(
     probe: Probe, measurement: Measurement, medium: str | None = None
 ) -> tuple[Probe, list[str]]:
@@ -330,3 +324,11 @@ def noise_about_neighbours(values: Array) -> float:
     """
     # the variance of one datum twice less its neighbours is six times that of white noise
     return 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / float(np.sqrt(6.0))
+
+
+def colder_than_base(
+    tip_K: Array, error_K: Array, base_K: float, offset_K: float = 20.0, errors: float = 4.0
+) -> Mask:
+    """Return where a tip seems colder than its base by more than an offset or noise explain."""
+    margin = np.maximum(offset_K, errors * np.nan_to_num(error_K))
+    return np.asarray(tip_K < base_K - margin)

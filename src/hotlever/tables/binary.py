@@ -23,7 +23,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice, zip_longest
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -32,10 +32,9 @@ from hotlever.files import LARGEST_TEXT
 from hotlever.tables.headings import with_units
 from hotlever.tables.table import MOST_LINES, Line, decode
 from hotlever.tables.table import number as decimal
-from hotlever.types import Array
+from hotlever.types import Array, T
 from hotlever.units import TIMES, conversion, name_and_unit
 
-T = TypeVar("T")
 # The tables of a file by name, whose lines are made when they are asked for.
 Groups = dict[str, Callable[[], list[str]]]
 
