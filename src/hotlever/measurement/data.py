@@ -229,6 +229,12 @@ class Measurement:
         return tuple(name for name in FITTED if np.isfinite(self.observable(name)).any())
 
 
+#: Columns that a measurement may be without; of the others it has NaN where nothing was measured.
+OPTIONAL = [
+    column.name for column in MEASURED if getattr(Measurement, column.name, MEASURED) is None
+]
+
+
 def with_measured_circuit(
     probe: Probe, measurement: Measurement, medium: str | None = None
 ) -> tuple[Probe, list[str]]:

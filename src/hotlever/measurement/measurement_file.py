@@ -30,6 +30,7 @@ from hotlever.measurement.columns import (
 from hotlever.measurement.compliance import without_rows_at_compliance
 from hotlever.measurement.data import (
     MEASURED,
+    OPTIONAL,
     Measurement,
     colder_than_base,
     noise_about_neighbours,
@@ -719,9 +720,7 @@ def read_measurement(
     if more > 0:
         notes[most:] = [f"{path}: {more} more such notes"]
     rows: dict[str, Any] = {column.name: contents.values[column.symbol] for column in MEASURED}
-    # without a column that has no values, where a measurement may be without it
-    optional = [name for name in rows if getattr(Measurement, name, MEASURED) is None]
-    rows |= {name: None for name in optional if np.isnan(rows[name]).all()}
+    rows |= {name: None for name in OPTIONAL if np.isnan(rows[name]).all()}
     measurement = Measurement(
         **rows,
         **contents.settings,
