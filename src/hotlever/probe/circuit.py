@@ -132,7 +132,7 @@ class Circuit(Record):
 
     # other keys are sections of contacts, by the names of their terminals
     model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, Contact]
+    __pydantic_extra__: dict[str, Contact] = Field(init=False)
 
     series_resistance_ohm: float = bounded(
         "between the bias source and the lever, R_s", 0, 1e7, 5600.0

@@ -139,9 +139,7 @@ def parameters_of(
     parts = (probe.shape, probe.tip, probe.contact, probe.circuit, probe.surroundings)
     meaning = {name: text for part in parts if part for name, text in part.description().items()}
 
-    def add(
-        name: str, spread: float | None, within: tuple[float, float] = (0.5, 1.5), **own: Any
-    ) -> None:
+    def add(name: str, spread: float | None, within: Any = (0.5, 1.5), **own: Any) -> None:
         """Add a parameter that stays within multiples of its value, unless its own limits are."""
         (value,) = probe.values([name]).tolist()
         lower, upper = (share * value for share in within)
@@ -151,7 +149,7 @@ def parameters_of(
         table[name] = named._replace(**{**usual, "meaning": words, **own})
 
     matter = nuisances(probe)
-    shifts = {"scale": 0.1, "lower": -MOST_EDGE_BIAS, "upper": MOST_EDGE_BIAS}
+    shifts: dict[str, Any] = {"scale": 0.1, "lower": -MOST_EDGE_BIAS, "upper": MOST_EDGE_BIAS}
     for name in probe.shape.dimensions():
         own = shifts if own_name(name) == EDGE_BIAS else {}
         add(name, 0.05 if name in matter else None, **own)

@@ -141,7 +141,7 @@ def read_lines(lines: Sequence[MeasuredLine], thermometer: Thermometer | None) -
         if peak is not None:
             column[:3] = peak.centre, peak.centre_stderr, peak.fwhm
     more: dict[str, Any] = {}
-    room: dict[str, float] = {}
+    room: dict[str, Any] = {}
     if thermometer is not None:
         room["room_temperature_K"] = thermometer.calibration.room_temperature_K
         reading = thermometer.read(numbers[0], numbers[1])
