@@ -280,6 +280,16 @@ def test_every_command_is_registered():
     assert ended.value.code == 0
 
 
+def test_every_argument_and_option_says_what_it_is():
+    """Its help stands in a docstring, under a name that nobody would miss."""
+    commands = [command_line(lambda *_: 0)]
+    for command in commands:
+        commands += getattr(command, "commands", {}).values()
+    told = [one for command in commands for one in command.params]
+    assert len(told) > 150
+    assert [one.name for one in told if not one.help] == []
+
+
 def test_what_a_stopped_import_says_is_not_an_internal_error(monkeypatch):
     """A compiled module whose initialisation is interrupted raises ImportError instead."""
     error = ImportError("initialization failed")

@@ -30,7 +30,6 @@ from hotlever.figures.claim_figures import (
     scale_factor,
     thermoelectric_shift,
 )
-from hotlever.figures.design_figures import design_optimum, design_study
 from hotlever.figures.estimate_figures import (
     calibrated_levers,
     calibration_curves,
@@ -66,7 +65,12 @@ from hotlever.figures.maps import (
     temperature_map,
     temperature_slices,
 )
-from hotlever.figures.probe_figures import outlines_drawing, probe_drawing
+from hotlever.figures.probe_figures import (
+    design_optimum,
+    design_study,
+    outlines_drawing,
+    probe_drawing,
+)
 from hotlever.figures.raman_figures import one_spectrum, raman_check, thermometry
 from hotlever.figures.style import COLOURS, entitle, figure, save_figure
 from hotlever.lever import probe_of

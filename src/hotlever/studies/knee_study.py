@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -256,17 +256,12 @@ def measured_carriers(T: ArrayLike) -> Array:
     return np.asarray(5.29e19 * (temperature / 300.0) ** 2.54 * np.exp(-6726.0 / temperature))
 
 
-def _departed(probe: Probe, law: str, ratio: Callable[[Array], Array]) -> Probe:
-    """Return a probe one of whose laws is another, by the modes of its departure."""
+def _departure(law: str, ratio: Callable[[Array], Array]) -> dict[str, float]:
+    """Return by which coefficients of its departure a law is so many times as large."""
     factor = FACTORS[law]
     T = np.linspace(factor.low_K, factor.high_K, 100)
     coefficients = np.linalg.lstsq(factor.modes(T).T, np.log(ratio(T)), rcond=None)[0]
-    return probe.with_(**dict(zip(factor.names, coefficients.tolist(), strict=True)))
-
-
-def _more_carriers(T: Array) -> Array:
-    """Return n_i as measured over that of Eq. 7."""
-    return measured_carriers(T) / intrinsic_density(T, 0.0)[0]
+    return dict(zip(factor.names, coefficients.tolist(), strict=True))
 
 
 def scattered_at_surfaces(T: ArrayLike, c_kappa: float) -> Array:
@@ -296,19 +291,19 @@ def suspect_lever(probe: Probe, suspect: str) -> tuple[Probe, bool]:
         probe = probe.model_copy(update={"tip": tip})
     if suspect == Suspect.IN_AIR or (everything and probe.surroundings.medium == "air"):
         probe = probe.model_copy(update={"tip": tip.with_(in_air=True)})
-    if Suspect.FILM in has:
-        probe = probe.with_(c_kappa="thickness")
-    if Suspect.SURFACES in has:
-        c_kappa = float(probe.values(["c_kappa"])[0])
-        probe = _departed(probe, "kappa", lambda T: scattered_at_surfaces(T, c_kappa))
-    if Suspect.CARRIERS in has:
-        probe = _departed(probe, "n_i", _more_carriers)
-    if Suspect.FEW_CARRIERS in has:
-        probe = probe.with_(intrinsic_scale=0.6)
-    if Suspect.CHIP_WARMS in has:
-        probe = probe.with_(chip_K_per_mW=2.0)
-    if departure_of(suspect) is not None:
-        probe = probe.with_(**{suspect: 1.0})
+    c_kappa = float(probe.values(["c_kappa"])[0])
+    values: dict[str, dict[str, Any]] = {
+        Suspect.FILM: {"c_kappa": "thickness"},
+        Suspect.SURFACES: _departure("kappa", lambda T: scattered_at_surfaces(T, c_kappa)),
+        Suspect.CARRIERS: _departure(
+            "n_i", lambda T: measured_carriers(T) / intrinsic_density(T, 0.0)[0]
+        ),
+        Suspect.FEW_CARRIERS: {"intrinsic_scale": 0.6},
+        Suspect.CHIP_WARMS: {"chip_K_per_mW": 2.0},
+        **({} if departure_of(suspect) is None else {suspect: {suspect: 1.0}}),
+    }
+    for name in has & values.keys():
+        probe = probe.with_(**values[name])
     if Suspect.MOBILITY in has:
         probe = probe.with_material("material", MinimosMaterial)
     effects = ["thermoelectric"] if has & {Suspect.TOWARDS, Suspect.AWAY} else []

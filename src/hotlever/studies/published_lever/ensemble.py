@@ -322,17 +322,17 @@ class Criterion(NamedTuple):
     ----------
     column : str
         The number of a layout, in the ensemble.
-    least, most : float
     form : str
         How the number is written.
     unit : str
+    least, most : float
     """
 
     column: str
-    least: float
-    most: float
     form: str
     unit: str = ""
+    least: float = -np.inf
+    most: float = np.inf
 
     def holds(self, value: float | xr.DataArray) -> bool | xr.DataArray:
         """Return whether a claim holds for a number, or where it does."""
@@ -343,50 +343,46 @@ class Criterion(NamedTuple):
         return f"{value:{self.form}}{self.unit}"
 
 
-def _below(column: str, most: float, form: str, unit: str = "") -> Criterion:
-    return Criterion(column, -np.inf, most, form, unit)
-
-
-def _above(column: str, least: float, form: str, unit: str = "") -> Criterion:
-    return Criterion(column, least, np.inf, form, unit)
-
-
 #: By the name of the claim.
 CRITERIA: dict[str, Criterion] = {
-    "operating_points": _below("points_off", 0.01, ".2%"),
+    "operating_points": Criterion("points_off", ".2%", most=0.01),
     # the paper reads it off 25 points
     "simulated_knee": Criterion(
-        "knee_K", paper.KNEE_PREDICTED_K - 10.0, paper.KNEE_PREDICTED_K + 10.0, ".0f", " K"
+        "knee_K",
+        ".0f",
+        " K",
+        least=paper.KNEE_PREDICTED_K - 10.0,
+        most=paper.KNEE_PREDICTED_K + 10.0,
     ),
-    "power_law": _below("eq12_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
-    "legs_prevail": _above("legs_prevail_K", paper.LEGS_PREVAIL_K - 50.0, ".0f", " K"),
-    "heater_length": Criterion("heater_left", 0.35, 0.65, ".0%"),
+    "power_law": Criterion("eq12_K", ".0f", " K", most=paper.POWER_LAW_SPREAD_K),
+    "legs_prevail": Criterion("legs_prevail_K", ".0f", " K", least=paper.LEGS_PREVAIL_K - 50.0),
+    "heater_length": Criterion("heater_left", ".0%", least=0.35, most=0.65),
     # a part of the 25 K within which temperatures are described
-    "knee_condition": _below("by_voltage_K", 5.0, ".0f", " K"),
+    "knee_condition": Criterion("by_voltage_K", ".0f", " K", most=5.0),
     "knee_by_legs": Criterion(
-        "by_legs_K", 0.5 * paper.KNEE_BY_LEGS_K, 1.5 * paper.KNEE_BY_LEGS_K, ".0f", " K"
+        "by_legs_K", ".0f", " K", least=0.5 * paper.KNEE_BY_LEGS_K, most=1.5 * paper.KNEE_BY_LEGS_K
     ),
-    "knee_by_doping": Criterion("doping_share", 0.75, 1.25, ".0%"),
+    "knee_by_doping": Criterion("doping_share", ".0%", least=0.75, most=1.25),
     # as large as it must be for the highest V_l to be that of another row
-    "knee_misses": _above("ramp_up_current", paper.CURRENT_ERROR, ".2%"),
-    "dependent_parameters": _above("coupling_I", 0.8, ".2f"),
-    "decoupled_groups": _below("coupling_III", 0.6, ".2f"),
-    "current_alone": _above("tip_I_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
-    "doping_held": _below("tip_n_d_held_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
-    "one_factor": _below("eq12_air_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
-    "constant_share": Criterion("share_growth", 0.9, 1.1, ".2f", "-fold"),
-    "factor_of_the_knee": _below("k_by_knee_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
-    "one_sided": _below("one_sided_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
-    "linear_branch": _below("straight_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
-    "proportional_branch": _below("proportional_K", paper.POWER_LAW_SPREAD_K, ".0f", " K"),
-    "missing_tip": _above("tip_carries_K", 0.75 * paper.KNEE_OFF_K, "+.2f", " K"),
-    "tip_in_air": _above("tip_in_air_K", 0.75 * paper.KNEE_OFF_K, "+.2f", " K"),
-    "thermoelectric_size": _below("shift_nm", paper.SHIFT_NM, ".0f", " nm"),
-    "thermoelectric_direction": _above("shift_along_nm", 0.0, "+.0f", " nm"),
-    "thermoelectric_prediction": _below(
-        "without_heat_carried_K", paper.POWER_LAW_SPREAD_K, ".1f", " K"
+    "knee_misses": Criterion("ramp_up_current", ".2%", least=paper.CURRENT_ERROR),
+    "dependent_parameters": Criterion("coupling_I", ".2f", least=0.8),
+    "decoupled_groups": Criterion("coupling_III", ".2f", most=0.6),
+    "current_alone": Criterion("tip_I_K", ".0f", " K", least=paper.POWER_LAW_SPREAD_K),
+    "doping_held": Criterion("tip_n_d_held_K", ".0f", " K", most=paper.POWER_LAW_SPREAD_K),
+    "one_factor": Criterion("eq12_air_K", ".0f", " K", most=paper.POWER_LAW_SPREAD_K),
+    "constant_share": Criterion("share_growth", ".2f", "-fold", least=0.9, most=1.1),
+    "factor_of_the_knee": Criterion("k_by_knee_K", ".0f", " K", most=paper.POWER_LAW_SPREAD_K),
+    "one_sided": Criterion("one_sided_K", ".0f", " K", most=paper.POWER_LAW_SPREAD_K),
+    "linear_branch": Criterion("straight_K", ".0f", " K", most=paper.POWER_LAW_SPREAD_K),
+    "proportional_branch": Criterion("proportional_K", ".0f", " K", most=paper.POWER_LAW_SPREAD_K),
+    "missing_tip": Criterion("tip_carries_K", "+.2f", " K", least=0.75 * paper.KNEE_OFF_K),
+    "tip_in_air": Criterion("tip_in_air_K", "+.2f", " K", least=0.75 * paper.KNEE_OFF_K),
+    "thermoelectric_size": Criterion("shift_nm", ".0f", " nm", most=paper.SHIFT_NM),
+    "thermoelectric_direction": Criterion("shift_along_nm", "+.0f", " nm", least=0.0),
+    "thermoelectric_prediction": Criterion(
+        "without_heat_carried_K", ".1f", " K", most=paper.POWER_LAW_SPREAD_K
     ),
-    "radiation": _below("radiated_share", 1e-3, ".2%"),
+    "radiation": Criterion("radiated_share", ".2%", most=1e-3),
 }
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -215,13 +216,10 @@ def _operating_point(options: Mapping[str, Readings]) -> Deviation:
     return off, slopes[:2, 0] / HALF_DIGIT
 
 
-def _passes(point: paper.PublishedPoint) -> Callable[[Mapping[str, Readings]], Deviation]:
-    def deviation(options: Mapping[str, Readings]) -> Deviation:
-        at = (point.lever_V, point.current_mA)
-        distance, slopes = options[MAIN].off_point(at, (HALF_DIGIT, HALF_DIGIT))
-        return np.array([distance]), slopes[None]
-
-    return deviation
+def _passes(point: paper.PublishedPoint, options: Mapping[str, Readings]) -> Deviation:
+    at = (point.lever_V, point.current_mA)
+    distance, slopes = options[MAIN].off_point(at, (HALF_DIGIT, HALF_DIGIT))
+    return np.array([distance]), slopes[None]
 
 
 def _on_the_ramp(options: Mapping[str, Readings]) -> Deviation:
@@ -265,24 +263,18 @@ def _beside_main(
     return options[option].at_bias(bias_V), options[MAIN].at_bias(bias_V)
 
 
-def _same_current(option: str) -> Callable[[Mapping[str, Readings]], Deviation]:
-    def deviation(options: Mapping[str, Readings]) -> Deviation:
-        (ours, by), (main, main_by) = _beside_main(options, option)
-        ratio = ours[1] / main[1]
-        slopes = (by[1] - ratio[:, None] * main_by[1]) / main[1][:, None]
-        return (ratio - 1.0) / paper.CURRENT_ERROR, slopes / paper.CURRENT_ERROR
-
-    return deviation
+def _same_current(option: str, options: Mapping[str, Readings]) -> Deviation:
+    (ours, by), (main, main_by) = _beside_main(options, option)
+    ratio = ours[1] / main[1]
+    slopes = (by[1] - ratio[:, None] * main_by[1]) / main[1][:, None]
+    return (ratio - 1.0) / paper.CURRENT_ERROR, slopes / paper.CURRENT_ERROR
 
 
-def _same_reader(option: str) -> Callable[[Mapping[str, Readings]], Deviation]:
-    def deviation(options: Mapping[str, Readings]) -> Deviation:
-        (ours, by), (main, main_by) = _beside_main(options, option)
-        # observables are compared over their largest values
-        unit = paper.CURRENT_ERROR * main[2].max()
-        return (ours[2] - main[2]) / unit, (by[2] - main_by[2]) / unit
-
-    return deviation
+def _same_reader(option: str, options: Mapping[str, Readings]) -> Deviation:
+    (ours, by), (main, main_by) = _beside_main(options, option)
+    # observables are compared over their largest values
+    unit = paper.CURRENT_ERROR * main[2].max()
+    return (ours[2] - main[2]) / unit, (by[2] - main_by[2]) / unit
 
 
 def _same_tip(options: Mapping[str, Readings]) -> Deviation:
@@ -305,7 +297,7 @@ SEARCHED: tuple[Printed, ...] = (
             f"{point.name} point",
             "Fig. 7b",
             f"the I-V curve passes {point.lever_V:.2f} V, {point.current_mA} mA",
-            _passes(point),
+            partial(_passes, point),
         )
         for point in (_printed_point("plateau"), _printed_point("hot"))
     ),
@@ -339,7 +331,7 @@ SEARCHED: tuple[Printed, ...] = (
             f"current, {option}",
             f"{where}, Figs. 3 and 4",
             f"{OPTIONS[option]} has the I_h of option III within {paper.CURRENT_ERROR:.0%}",
-            _same_current(option),
+            partial(_same_current, option),
         )
         for option, where in (("I", "Table I"), ("II", "Table I"), ("n_d held", "Table II"))
     ),
@@ -349,7 +341,7 @@ SEARCHED: tuple[Printed, ...] = (
             f"{where}, Figs. 3 and 4",
             f"{OPTIONS[option]} has the V_r of option III, over its largest value within "
             f"{paper.CURRENT_ERROR:.0%}",
-            _same_reader(option),
+            partial(_same_reader, option),
         )
         for option, where in (("II", "Table I"), ("n_d held", "Table II"))
     ),
