@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import count as count_up
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from hotlever.errors import (
     ComputationError,
-    HistoryEndError,
     InputError,
     as_far_as_possible,
     excerpt,
@@ -231,7 +230,6 @@ def simulate_in_time(
     end, times = parse_times(drive.until, drive.at)
     meshed = make_lever(reporter, read_surrounded_probe(reporter, lever))
     frames = None if film is None else _Frames(times or _even(bias, end))
-    failure: HistoryEndError | None = None
     # figures and rise times are of smooth curves, the table of the steps alone
     per_step = 8 if times is None else 1
     kept_at: list[float] = []
@@ -248,16 +246,10 @@ def simulate_in_time(
                 kept_at.append(t)
                 states.append(state)
 
-        try:
-            curve = simulate(
-                meshed, bias, end, times, per_step=per_step, progress=update, callback=keep
-            )
-        except HistoryEndError as error:
-            # what was reached is written
-            curve, failure = error.partial, error
-    resolved = times is None
+        how: Any = {"per_step": per_step, "progress": update, "callback": keep}
+        curve, failure = as_far_as_possible(lambda: simulate(meshed, bias, end, times, **how))
     if ends:
-        curve = with_times(curve, ends[0], ends[-1], resolved=resolved)
+        curve = with_times(curve, ends[0], ends[-1], resolved=times is None)
     data = curve.isel(time=slice(None, None, per_step))
     reporter.note(*notes_of(data))
     reporter.tell_table(_times(data))
