@@ -358,7 +358,7 @@ def knee_carried(carried: xr.Dataset, nearest: str, discrepancy_K: float) -> Fig
     Parameters
     ----------
     carried : xarray.Dataset
-        See `hotlever.studies.published_lever.knee_suspects.carried`.
+        See ``hotlever.studies.published_lever.knee_suspects.carried``.
     nearest : str
         The layout whose values are bars.
     discrepancy_K : float
