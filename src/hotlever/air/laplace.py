@@ -145,43 +145,53 @@ class _Sides(NamedTuple):
 
 def _seen_from(points: Array, corners: Array) -> _Sides:
     """Return what the integrals over polygons are made of; see `potential`."""
-    lengths = np.linalg.norm(np.roll(corners, -1, axis=-2) - corners, axis=-1)
-    along = (np.roll(corners, -1, axis=-2) - corners) / np.maximum(lengths, _TINY)[..., None]
+    sides = np.roll(corners, -1, axis=-2) - corners
+    lengths = np.linalg.norm(sides, axis=-1)
+    along = sides / np.maximum(lengths, _TINY)[..., None]
     area_vector = np.cross(
         corners[..., 2, :] - corners[..., 0, :], corners[..., -1, :] - corners[..., 1, :]
     )
     normal = area_vector / np.linalg.norm(area_vector, axis=-1, keepdims=True)
     outward = np.cross(along, normal[..., None, :])
-    # from every corner, seen from the point
-    to_corner = corners - points[..., None, :]
-    distance = np.sqrt(np.einsum("...kd,...kd->...k", to_corner, to_corner))
-    height = -np.einsum("...d,...d->...", to_corner[..., 0, :], normal)
-    across = np.einsum("...kd,...kd->...k", to_corner, outward)
+    # from the point to every corner; there are many points and few polygons
+    height = _dot(points, normal) - _dot(corners[..., 0, :], normal)
+    across = _dot(corners, outward) - _dot(points[..., None, :], outward)
+    x, y, z = (corners[..., axis] - points[..., None, axis] for axis in range(3))
+    square = x**2 + y**2 + z**2
+    distance = np.sqrt(square)
     both = distance + np.roll(distance, -1, axis=-1)
     # ∫ 1/R along an edge is 2 artanh(length / both)
     # at a double corner of a triangle both are nothing
     ratio = np.maximum(both + lengths, _TINY) / np.maximum(both - lengths, _TINY * both + _TINY)
-    angle = _solid_angle(to_corner, distance)
+    angle = _solid_angle(corners, np.abs(height), square, distance)
     return _Sides(outward, across, np.log(ratio), normal, height, angle)
 
 
-def _solid_angle(to_corner: Array, distance: Array) -> Array:
-    """Return the solid angle of a convex polygon, of its corners as seen from a point.
+def _dot(first: Array, second: Array) -> Array:
+    """Return products of vectors along the last axis, the others broadcast."""
+    x, y, z = (first[..., axis] * second[..., axis] for axis in range(3))
+    return np.asarray(x + y + z)
 
-    By triangles (A. van Oosterom and J. Strackee, IEEE Trans. Biomed. Eng. 30, 125 (1983)).
+
+def _solid_angle(corners: Array, height: Array, square: Array, distance: Array) -> Array:
+    """Return the solid angle of a convex polygon, of how far its plane and corners are.
+
+    By triangles (A. van Oosterom and J. Strackee, IEEE Trans. Biomed. Eng. 30, 125 (1983)). What a
+    triangle spans with the point is its area times the height, and the product of the ways to two
+    corners follows from how far these are apart.
     """
-    first, angle = to_corner[..., 0, :], np.zeros(to_corner.shape[:-2])
-    for k in range(1, to_corner.shape[-2] - 1):
-        second, third = to_corner[..., k, :], to_corner[..., k + 1, :]
+    between = corners[..., :, None, :] - corners[..., None, :, :]
+    apart = _dot(between, between)
+
+    def product(k: int, m: int) -> Array:
+        return np.asarray(square[..., k] + square[..., m] - apart[..., k, m])
+
+    angle = np.zeros(height.shape)
+    for k in range(1, corners.shape[-2] - 1):
+        area = np.linalg.norm(np.cross(between[..., k, 0, :], between[..., k + 1, 0, :]), axis=-1)
         a, b, c = (distance[..., corner] for corner in (0, k, k + 1))
-        volume = np.einsum("...d,...d->...", first, np.cross(second, third))
-        rest = (
-            a * b * c
-            + np.einsum("...d,...d->...", first, second) * c
-            + np.einsum("...d,...d->...", first, third) * b
-            + np.einsum("...d,...d->...", second, third) * a
-        )
-        angle += 2.0 * np.arctan2(np.abs(volume), rest)
+        rest = product(0, k) * c + product(0, k + 1) * b + product(k, k + 1) * a
+        angle += 2.0 * np.arctan2(area * height, a * b * c + 0.5 * rest)
     return angle
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -159,7 +159,7 @@ class Panels:
 
     def points(self, order: int) -> tuple[Array, Array]:
         """Return Gauss points (n, order², 3) and weights (n, order²) on each panel."""
-        nodes, weights = np.polynomial.legendre.leggauss(order)
+        nodes, weights = gauss_rule(order)
         s, t = np.stack(np.meshgrid(nodes, nodes, indexing="ij")).reshape(2, -1, 1) / 2 + 0.5
         a, b, c, d = np.moveaxis(self.corners, 1, 0)[:, :, None]
         # a bilinear map of the unit square, from the side a b to the side d c
@@ -167,6 +167,13 @@ class Panels:
         along, across = (b - a) + t * (c - d - b + a), far - near
         areas = np.linalg.norm(np.cross(along, across), axis=2)
         return near + t * across, areas * np.outer(weights, weights).ravel() / 4
+
+
+@lru_cache
+def gauss_rule(order: int) -> tuple[Array, Array]:
+    """Return the points and weights of Gauss's rule from −1 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(order)
+    return nodes, weights
 
 
 def square_distances(first: Panels, second: Panels) -> Array:

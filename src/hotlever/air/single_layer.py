@@ -25,6 +25,7 @@ from hotlever.air.panels import (
     IDENTITY,
     Mirror,
     Panels,
+    gauss_rule,
     spreads,
     square_distances,
     traces,
@@ -86,13 +87,13 @@ def single_layer_matrix(
         µm³, symmetric; one for each function of the kernel.
     """
     count = len(panels)
-    matrix = np.zeros((*kernel.shape, count, count), dtype=kernel.dtype)
+    matrix: Numbers = np.zeros((*kernel.shape, 0, 0))
     for done, mirror in enumerate(mirrors):
         images = panels.reflected(mirror)
         for body in (panels, images):
             # what is known of all is known of a part
             _ = body.radii, body.moments
-        image = np.empty_like(matrix)
+        image = np.empty((*kernel.shape, count, count), dtype=kernel.dtype)
         near = []
         rows_at_once = 32  # whose arrays stay in the cache
         for start in range(0, count, rows_at_once):
@@ -118,7 +119,7 @@ def single_layer_matrix(
                 share = int(100 * min(start + pairs_at_once, pairs.shape[1]) / pairs.shape[1])
                 progress(100 * done + share, 100 * len(mirrors))
         image *= mirror.sign / (4.0 * np.pi)
-        matrix += image
+        matrix = image + matrix if done else image
     return matrix
 
 
@@ -230,7 +231,7 @@ def screened_potential(points: Array, corners: Array, q: Numbers) -> Numbers:
     to_corner = corners - points[..., None, :]
     height = np.abs(np.einsum("...d,...d->...", to_corner[..., 0, :], normal))
     # along each half of an edge ∫ (exp(−qR) − 1) dR from the plane's height on, by its points
-    nodes, weights = np.polynomial.legendre.leggauss(4)
+    nodes, weights = gauss_rule(4)
     rates = q.reshape(-1, *(1,) * height.ndim)
     screened, alone = np.zeros((len(q), *height.shape), dtype=q.dtype), np.zeros(height.shape)
     last = corners.shape[-2] - 1
