@@ -196,15 +196,19 @@ class AirSolver:
     def __init__(
         self, factors: LinearSolver, air: AirLoss, kappa: Array, taken_up: Array | None = None
     ) -> None:
-        sites, modes, more = len(kappa), np.empty((0, air.sampling.shape[1])), np.empty((0, 0))
-        if taken_up is not None:
-            modes, more = air.stores.coordinates, taken_up
+        sites = len(kappa)
 
         def sampled(x: Array) -> Array:
-            return np.append(air.sampling @ x, modes @ x)
+            at_sites = air.sampling @ x
+            if taken_up is None:
+                return np.asarray(at_sites)
+            return np.append(at_sites, air.stores.coordinates @ x)
 
         def spread(lost: Array, t: Array) -> Array:
-            return np.asarray(air.spreading @ lost + (more @ t[sites:]) @ modes)
+            weak = air.spreading @ lost
+            if taken_up is not None:
+                weak += (taken_up @ t[sites:]) @ air.stores.coordinates
+            return np.asarray(weak)
 
         def lost(t: Array) -> Array:
             return spread(air.rest @ (kappa * t[:sites]).astype(air.rest.dtype), t)

@@ -20,6 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import LineString, MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
@@ -243,14 +244,13 @@ def panelled(
     ndarray, shape (n, 4, 2)
         Corners of quadrilaterals; in a triangle the last two are the same.
     """
-    panels = [
-        quadrilateral
+    cells = [
+        cell
         for face in _faces(shape, exposed, depths)
         for piece in _convex(face)
         for cell in _divided(piece, size)
-        for quadrilateral in _quadrilaterals(cell)
     ]
-    corners = np.array(panels).reshape(-1, 4, 2)
+    corners = _quadrilaterals(np.array(cells))
     diagonals = corners[:, 2:] - corners[:, :2]
     area = np.abs(diagonals[:, 0, 0] * diagonals[:, 1, 1] - diagonals[:, 0, 1] * diagonals[:, 1, 0])
     # narrower ones come of rounding
@@ -272,12 +272,11 @@ def rings(shape: Polygon) -> list[Array]:
 
 
 def turns(ring: Array) -> Array:
-    """Return by how much (rad) a ring turns to the left at each of its corners."""
-    after = np.roll(ring, -1, axis=0) - ring
-    before = np.roll(after, 1, axis=0)
-    crossed = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    turned: Array = np.arctan2(crossed, np.einsum("nd,nd->n", before, after))
-    return turned
+    """Return by how much (rad) rings (..., n, 2) turn to the left at each of their corners."""
+    after = np.roll(ring, -1, axis=-2) - ring
+    before = np.roll(after, 1, axis=-2)
+    crossed = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
+    return np.asarray(np.arctan2(crossed, (before * after).sum(axis=-1)))
 
 
 def _faces(shape: Polygon, exposed: BaseGeometry, depths: Array) -> list[Polygon]:
@@ -416,9 +415,27 @@ def _between(ring: Array, left: float, right: float) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def _quadrilaterals(cell: Polygon) -> list[Array]:
+def _quadrilaterals(cells: NDArray[np.object_]) -> Array:
+    """Return the corners (n, 4, 2) of quadrilaterals and triangles that make up cells."""
+    cells = shapely.simplify(cells, 10 * _GRID)
+    four = np.flatnonzero(
+        (shapely.get_num_coordinates(cells) == 5) & (shapely.get_num_interior_rings(cells) == 0)
+    )
+    around = shapely.get_coordinates(cells[four]).reshape(-1, 5, 2)[:, :4]
+    turned = turns(around)
+    around = np.where((turned.sum(axis=1) < 0)[:, None, None], around[:, [0, 3, 2, 1]], around)
+    # nearly all are such that nothing needs to be cut
+    convex = (np.abs(turned) > 1e-6).all(axis=1) & (np.ptp(np.sign(turned), axis=1) == 0)
+    whole = dict(zip(four[convex].tolist(), around[convex], strict=True))
+    every = (
+        [whole[number]] if number in whole else _cut_into_quadrilaterals(cell)
+        for number, cell in enumerate(cells)
+    )
+    return np.array([corners for some in every for corners in some]).reshape(-1, 4, 2)
+
+
+def _cut_into_quadrilaterals(cell: Polygon) -> list[Array]:
     """Return the corners (4, 2) of quadrilaterals and triangles that make up a cell."""
-    cell = cell.simplify(10 * _GRID)
     ring = rings(cell)[0]
     # a corner that turns by less is none
     ring = ring[np.abs(turns(ring)) > 1e-6]
