@@ -387,32 +387,39 @@ def _divided(piece: Polygon, size: Callable[[Array], Array]) -> list[Polygon]:
     count = 129
     at = np.linspace(low_u, high_u, count)
     middle = back(np.stack([at, np.full(count, (low_v + high_v) / 2)], axis=1))
-    boxes = []
-    for left, right in pairwise(divided(at, size(middle))):
-        bounds = _between(local, left, right)
-        centre = back(np.array([[(left + right) / 2, np.mean(bounds)]]))
-        count = max(1, int(np.ceil((bounds[1] - bounds[0]) / size(centre)[0] - 1e-6)))
-        across = np.linspace(*bounds, count + 1)
-        boxes += [(left, low, right, high) for low, high in pairwise(across)]
+    breaks = divided(at, size(middle))
+    low, high = _between(local, breaks)
+    centres = back(np.stack([(breaks[:-1] + breaks[1:]) / 2, (low + high) / 2], axis=1))
+    counts = np.maximum(1, np.ceil((high - low) / size(centres) - 1e-6)).astype(int)
+    boxes = [
+        (left, start, right, stop)
+        for (left, right), *ends in zip(pairwise(breaks), low, high, counts + 1, strict=True)
+        for start, stop in pairwise(np.linspace(*ends))
+    ]
     if len(boxes) == 1:
         return [piece]
     cells = shapely.intersection(shapely.box(*np.array(boxes).T), Polygon(local))
-    pieces = [part for cell in cells for part in parts(cell)]
-    return [
-        shapely.transform(part, back) for part in pieces if part.area > _NARROWEST * part.length
-    ]
+    # of collections the parts' parts
+    pieces = shapely.get_parts(shapely.get_parts(cells))
+    pieces = pieces[shapely.get_type_id(pieces) == shapely.GeometryType.POLYGON]
+    pieces = pieces[shapely.area(pieces) > _NARROWEST * shapely.length(pieces)]
+    return list(shapely.transform(pieces, back))
 
 
-def _between(ring: Array, left: float, right: float) -> tuple[float, float]:
-    """Return the least and the greatest ordinate of a convex ring between two abscissas."""
-    start, end = ring, np.roll(ring, -1, axis=0)
-    ordinates = [ring[(ring[:, 0] >= left) & (ring[:, 0] <= right), 1]]
-    for at in (left, right):
-        crossing = (start[:, 0] - at) * (end[:, 0] - at) < 0
-        share = (at - start[crossing, 0]) / (end[crossing, 0] - start[crossing, 0])
-        ordinates.append(start[crossing, 1] + share * (end[crossing, 1] - start[crossing, 1]))
-    values = np.concatenate(ordinates)
-    return float(values.min()), float(values.max())
+def _between(ring: Array, breaks: Array) -> tuple[Array, Array]:
+    """Return the least and the greatest ordinates of a convex ring from each break to the next."""
+    start, end = (each[:, :, None] for each in (ring, np.roll(ring, -1, axis=0)))
+    along = (breaks - start[:, 0]) / np.where(end == start, np.inf, end - start)[:, 0]
+    crossing = (start[:, 0] - breaks) * (end[:, 0] - breaks) < 0
+    at_breaks = start[:, 1] + along * (end - start)[:, 1]
+    inside = (start[:, 0] >= breaks[:-1]) & (start[:, 0] <= breaks[1:])
+    ends = []
+    for which, none in ((np.min, np.inf), (np.max, -np.inf)):
+        lines = which(np.where(crossing, at_breaks, none), axis=0)
+        corners = which(np.where(inside, start[:, 1], none), axis=0)
+        ends.append(which([lines[:-1], lines[1:], corners], axis=0))
+    low, high = ends
+    return low, high
 
 
 def _quadrilaterals(cells: NDArray[np.object_]) -> Array:
