@@ -135,3 +135,16 @@ def run(
         return status, captured.out, captured.err
 
     return call
+
+
+@pytest.fixture
+def refused(run: Callable[..., tuple[int, str, str]]) -> Callable[..., str]:
+    """Run a command line that is at fault: status 2, nothing printed; returns the one line."""
+
+    def call(*arguments: str) -> str:
+        status, out, err = run(*arguments)
+        assert (status, out) == (2, "")
+        (line,) = err.splitlines()
+        return line
+
+    return call
