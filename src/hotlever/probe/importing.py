@@ -243,12 +243,10 @@ def _terminals(best: _Silicon, sheet: Sheet, inferred: LayerInference) -> None:
     candidates: dict[str, Drawn] = {name: name for name in best.touching}
     if len(candidates) == 1:
         (only,) = candidates
-        rings = sheet.rings(sheet.layers[only], lines=True)
-        if len(rings) > 1:
-            # several contacts on one layer
-            candidates = {
-                f"polygon {n} of {only}": (ring,) for n, ring in enumerate(rings, start=1)
-            }
+        rings = enumerate(sheet.rings(sheet.layers[only], lines=True), start=1)
+        on_it: dict[str, Drawn] = {f"polygon {n} of {only}": (ring,) for n, ring in rings}
+        # several contacts on one layer
+        candidates = on_it if len(on_it) > 1 else candidates
     why = "it touches the outline along an edge"
     if len(candidates) < 2:
         heater = inferred.layers.get("heater")

@@ -63,11 +63,8 @@ def _in_rows(table: TextTable) -> list[Spectrum]:
 def _heading(name: str) -> float:
     """The Raman shift that a column is headed by, NaN if it is headed by anything else."""
     value, unit = quantity(name.strip())
-    return (
-        value
-        if value is not None and unit.strip() in ("", "cm-1", "cm^-1", "cm⁻¹", "1/cm")
-        else np.nan
-    )
+    is_shift = unit.strip() in ("", "cm-1", "cm^-1", "cm⁻¹", "1/cm")
+    return value if value is not None and is_shift else np.nan
 
 
 def _in_pairs(table: TextTable) -> list[Spectrum]:

@@ -341,8 +341,7 @@ def _to_one_width(
             fits = row.size >= width and bool(np.isnan(row[width:]).all())
             rows[index] = row[:width] if fits else None
     inside = [index for index, row in enumerate(rows) if row is not None]
-    odd = ""
-    count = 0
+    odd, count = "", 0
     for index in range(inside[0], inside[-1]):
         if rows[index] is None:
             cells = dialect.cells(lines[index][1]) or []

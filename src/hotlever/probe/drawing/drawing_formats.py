@@ -320,12 +320,9 @@ class _Drawing:
         kind = entity.dxftype()
         if kind in ("TEXT", "MTEXT"):
             if not unseen:
-                at = entity.dxf.insert
-                text, at = (
-                    (entity.dxf.text, entity.ocs().to_wcs(at))
-                    if kind == "TEXT"
-                    else (entity.plain_text(), at)
-                )
+                text, at = entity.plain_text(), entity.dxf.insert
+                if kind == "TEXT":
+                    text, at = entity.dxf.text, entity.ocs().to_wcs(at)
                 self.labels.append((name, text, at.x * self.unit_um, at.y * self.unit_um))
             return
         if unseen:

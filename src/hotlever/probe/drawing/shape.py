@@ -553,12 +553,8 @@ def _add_bias(layers: Mapping[str, dict[str, Any]], bias: Any, where: str) -> No
 
 def _cut_by(numbers: list[int]) -> str:
     """Say which polygons are holes."""
-    most = 10
-    first = [str(number) for number in numbers[:most]]
-    if len(numbers) > most:
-        first.append("…")
-    polygons_ = ", ".join(first)
-    return f"{counted(len(numbers), 'hole')}, cut by polygon{'s'[: len(numbers) - 1]} {polygons_}"
+    first = ", ".join([*map(str, numbers[:10]), *["…"] * (len(numbers) > 10)])
+    return f"{counted(len(numbers), 'hole')}, cut by polygon{'s'[: len(numbers) - 1]} {first}"
 
 
 def _check_unit(sheet: Sheet, body: DrawnLayer) -> None:
