@@ -63,9 +63,16 @@ class NewtonResult:
 
 
 def find_roots(
-    equations: Equations, x: Array, options: NewtonOptions, factors: Factors | None = None
+    equations: Equations,
+    x: Array,
+    options: NewtonOptions,
+    factors: Factors | None = None,
+    *,
+    fresh: bool = False,
 ) -> NewtonResult:
     """Find the roots of F near `x`, (unknowns, n), beginning with factors of nearby places.
+
+    They may be fresh: those of `x` itself.
 
     Raises
     ------
@@ -80,7 +87,7 @@ def find_roots(
     """
     x = x.copy()
     every = np.arange(x.shape[1])
-    fresh = np.full(every.size, factors is None)
+    is_fresh = np.full(every.size, fresh or factors is None)
     factors = factors or equations.factorised(x, every)
     last = np.full(every.size, np.inf)
     active = every
@@ -89,11 +96,11 @@ def find_roots(
         residual = equations.residual(here, active)
         step = -factors.solve(residual, active)
         length = _length(step / equations.scale)
-        slow = ~fresh[active] & ~(length < options.keep_while * last[active])
+        slow = ~is_fresh[active] & ~(length < options.keep_while * last[active])
         if slow.any():
             again = active[slow]
             factors = factors.replaced(again, equations.factorised(here[:, slow], again))
-            fresh[again] = True
+            is_fresh[again] = True
             step[:, slow] = -factors.solve(residual[:, slow], again)
             length = _length(step / equations.scale)
         if not np.isfinite(length).all():
@@ -103,9 +110,9 @@ def find_roots(
         # nothing is known yet of an old Jacobian's first step
         has_last = np.isfinite(last[active])
         old = np.where(has_last, length / np.where(has_last, last[active], 1.0), 1.0)
-        ratio = np.where(fresh[active], length, old)
+        ratio = np.where(is_fresh[active], length, old)
         done = (shortening == 1.0) & (length * ratio < options.tolerance)
-        fresh[active], last[active] = False, length
+        is_fresh[active], last[active] = False, length
         active = active[~done]
         if not active.size:
             return NewtonResult(x, factors)

@@ -151,7 +151,9 @@ class SimilarLevers:
             roots = solve_at(equations, u, guess, newton, near.factors, parametrisation)
             # one Jacobian serves a last step and the slopes along the branch and by parameters
             factors = equations.factorised(roots.x, parametrisation.constraint(u))
-            roots = solve_at(equations, u, roots.x, NewtonOptions(), factors, parametrisation)
+            roots = solve_at(
+                equations, u, roots.x, NewtonOptions(), factors, parametrisation, fresh=True
+            )
             branch = Branch.whole(equations, u, roots, parametrisation)
         return Linearised.of(probe, names, branch, reach, factors=factors)
 

@@ -113,10 +113,12 @@ def solve_at(
     options: NewtonOptions,
     factors: Factors | None = None,
     parametrisation: Parametrisation = NATURAL,
+    *,
+    fresh: bool = False,
 ) -> NewtonResult:
     """Find the states at some points u, (size + 1, n), from guesses of them.
 
-    The factors may be those of states nearby.
+    The factors may be those of states nearby, or fresh: those of the guesses.
 
     Raises
     ------
@@ -124,7 +126,7 @@ def solve_at(
         If a state was not found.
     """
     problem = Constrained(equations, parametrisation.constraint(u), parametrisation.values(u))
-    return find_roots(problem, guess, options, factors)
+    return find_roots(problem, guess, options, factors, fresh=fresh)
 
 
 def state_at_bias(
