@@ -18,6 +18,7 @@ from hotlever.estimate.power_law import EQ12, read_power_law
 from hotlever.estimate.summary import calibration_text
 from hotlever.estimate.tip_table import TABLE_COLUMNS
 from hotlever.lever import Lever
+from hotlever.lever.similar import SimilarLevers
 from hotlever.materials.departures import DEPARTURES
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import PriorUse, as_known, default_priors
@@ -38,6 +39,20 @@ def calibrated(reference):
     """The reference lever, measured with noise and calibrated as if unknown."""
     curve = measured_curve(reference, np.random.default_rng(0))
     return calibrate(measurement_of(curve))
+
+
+def test_the_lever_as_stated_is_solved_once_from_the_cold(reference, monkeypatch):
+    """It is compared with the data, and the search begins with it."""
+    from_the_cold, linearised = [], SimilarLevers.linearised
+
+    def noted(levers, probe, reach, near=None, names=None):
+        if near is None:
+            from_the_cold.append(probe)
+        return linearised(levers, probe, reach, near, names)
+
+    monkeypatch.setattr(SimilarLevers, "linearised", noted)
+    calibrate(measurement_of(measured_curve(reference, np.random.default_rng(0))))
+    assert len(from_the_cold) == 1
 
 
 def test_the_table_gives_the_true_temperature(calibrated, reference):

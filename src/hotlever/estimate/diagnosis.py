@@ -21,6 +21,7 @@ from hotlever.estimate.residuals import Residuals
 from hotlever.estimate.surrogate import CurveSurrogate, Rows
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.observables import Linearised
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials.parameters import parameter_named
 from hotlever.measurement import Measurement
@@ -486,19 +487,12 @@ class _Curve:
     powers: Array
 
     @classmethod
-    def of(cls, probe: Probe, priors: Mapping[str, Prior]) -> _Curve:
-        """Solve a probe as far as it goes."""
-        # the resistor is a hypothesis of its own; what is 0 has no logarithm
-        names = tuple(
-            name
-            for name in parameters_of(probe)
-            if name in priors and name != "series_resistance_ohm" and priors[name].value > 0
-        )
+    def of(cls, lever: Linearised, priors: Mapping[str, Prior]) -> _Curve:
+        """Return the curve of a lever that was solved as far as it goes."""
+        probe, names = lever.probe, _with_powers(lever.probe, priors)
         spreads = [priors[name].absolute / abs(priors[name].value) for name in names]
-        whole = Reach(probe.circuit, np.inf)
-        lever = SimilarLevers(Lever(probe, COARSE)).linearised(probe, whole, names=names)
-        rows = Rows(np.zeros(0))
-        surrogate = CurveSurrogate(probe, names, lever.branch, lever.output_slopes, rows)
+        by = lever.output_slopes[..., [lever.names.index(name) for name in names]]
+        surrogate = CurveSurrogate(probe, names, lever.branch, by, Rows(np.zeros(0)))
         u = np.linspace(float(lever.branch.u[1]), lever.branch.end_u, 240)
         outputs = np.maximum(lever.branch.curve(u)[:, :2], 1e-12)
         powers = surrogate.powers(u)[:, :2]
@@ -512,6 +506,16 @@ class _Curve:
         lever, current = np.exp(self.logarithms + self.powers @ (away - self.at)).T
         bias = np.maximum.accumulate(lever + rows.series_kohm * current)
         return np.interp(rows.bias_V, np.append(0.0, bias), np.append(0.0, current))
+
+
+def _with_powers(probe: Probe, priors: Mapping[str, Prior]) -> tuple[str, ...]:
+    """Return the parameters with whose powers the curve of a probe goes."""
+    # the resistor is a hypothesis of its own; what is 0 has no logarithm
+    return tuple(
+        name
+        for name in parameters_of(probe)
+        if name in priors and name != "series_resistance_ohm" and priors[name].value > 0
+    )
 
 
 @dataclass(frozen=True)
@@ -548,6 +552,8 @@ class Diagnosis:
     priors : mapping of str to Prior or str, optional
         In place of some of the usual ones.
     options : DiagnosisOptions, optional
+    names : sequence of str
+        What a search for the lever wants to know derivatives by; see `stated`.
     """
 
     def __init__(
@@ -556,13 +562,14 @@ class Diagnosis:
         probe: Probe,
         priors: Mapping[str, Prior | str] | None = None,
         options: DiagnosisOptions | None = None,
+        names: Sequence[str] = (),
     ) -> None:
         self.options = options or DiagnosisOptions()
         current = measured.current(probe.circuit)
         here = np.isfinite(current) & np.isfinite(measured.bias_V)
         data = measured.bias_V[here], current[here]
         self._rows = MeasuredRows(*data, probe.circuit.series_kohm, np.ones(here.sum(), dtype=bool))
-        self._probe, self._stated = probe, priors or None
+        self._probe, self._priors, self._names = probe, priors or None, names
 
     def named(self, fitted: bool = False) -> str:
         """Return the likeliest cause in words, or that there is no single one.
@@ -640,11 +647,22 @@ class Diagnosis:
         return self._estimated(Hypothesis(lambda _: ""), 0.0, self._curve)
 
     @cached_property
+    def stated(self) -> Linearised:
+        """The lever as it is stated, on a coarse mesh, as far as it goes."""
+        return self._linearised(self._probe, self._names)
+
+    @cached_property
     def _curve(self) -> _Curve:
-        return self._solved(self._probe)
+        return _Curve.of(self.stated, known_beforehand(self._probe, self._priors))
+
+    def _linearised(self, probe: Probe, names: Sequence[str] = ()) -> Linearised:
+        """Solve a probe as far as it goes."""
+        own = _with_powers(probe, known_beforehand(probe, self._priors))
+        every, whole = tuple(dict.fromkeys([*names, *own])), Reach(probe.circuit, np.inf)
+        return SimilarLevers(Lever(probe, COARSE)).linearised(probe, whole, names=every)
 
     def _solved(self, probe: Probe) -> _Curve:
-        return _Curve.of(probe, known_beforehand(probe, self._stated))
+        return _Curve.of(self._linearised(probe), known_beforehand(probe, self._priors))
 
     def _explains(self, explained: _Explanation) -> bool:
         return explained.squares < self._least_unexplained

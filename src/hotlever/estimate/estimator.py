@@ -185,14 +185,17 @@ def calibrate(
     def within(medium: Any) -> tuple[Solution, Estimate]:
         """Calibrate the lever in a medium."""
         problem = Problem.of(whole, origin, replace(options.of_lever, medium=medium))
-        causes = Diagnosis(problem.measurement, problem.probe, options.priors)
+        # the search begins with the lever that its data are compared with before
+        names = problem.experiment.names if fit is None else ()
+        causes = Diagnosis(problem.measurement, problem.probe, options.priors, names=names)
         check_plausible(problem, causes)
         check_in_range(options.at_V, *limits_of_range(problem.measurement, problem.probe))
         if fit is None:
             check_similar(problem, causes)
         try:
             if fit is None:
-                solution = solve(problem, progress)
+                alone = problem.probe.circuit.starts_cold
+                solution = solve(problem, progress, stated=causes.stated if alone else None)
             else:
                 solution = _beside_a_fit(problem, fit, options.priors, progress)
             converged, reason = verdict_on(solution)

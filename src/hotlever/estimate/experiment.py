@@ -300,6 +300,11 @@ class ExperimentAtRest:
         linearised = None if near is None else near.linearised
         if linearised is None or linearised.probe != probe:
             linearised = self.fast.linearised(probe, self.reach(probe), linearised, self.names)
+        return self.shown_by(linearised)
+
+    def shown_by(self, linearised: Linearised) -> PredictionAtRest:
+        """Return the prediction that is read from the fast lever of a probe."""
+        probe = linearised.probe
         branch, by_parameter = linearised.branch, linearised.output_slopes
         if self.correction:
             branch = self.correction.added(branch, probe.values(self.names))

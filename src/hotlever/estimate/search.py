@@ -31,6 +31,8 @@ from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.residuals import Residuals
 from hotlever.lever.branch import Branch
+from hotlever.lever.observables import Linearised
+from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, PriorUse, default_priors
 from hotlever.probe.probe_parameters import dimensions_of, parameters_of
@@ -87,6 +89,7 @@ def solve(
     problem: Problem,
     progress: Progress | None = None,
     seen: Callable[[Prediction], None] | None = None,
+    stated: Linearised | None = None,
 ) -> Solution:
     """Find the lever that priors and a measurement make most likely.
 
@@ -95,6 +98,8 @@ def solve(
     problem : Problem
     progress, seen : callable, optional
         See `hotlever.estimate.experiment.Predictor`.
+    stated : Linearised, optional
+        The lever as it is stated, on the coarse mesh, if it has been solved.
 
     Raises
     ------
@@ -103,7 +108,7 @@ def solve(
     """
     began = time.perf_counter()
     memory.give_back()  # what an earlier one used
-    search, experiment = Search(problem, progress, seen), problem.experiment
+    search, experiment = Search(problem, progress, seen, stated), problem.experiment
     if isinstance(experiment, ExperimentAtRest):
         optimum = search.from_anywhere(experiment)
     else:
@@ -113,11 +118,15 @@ def solve(
 
 @dataclass(frozen=True)
 class Search:
-    """The searches for the lever of a problem, of which ``progress`` and ``seen`` are told."""
+    """The searches for the lever of a problem, of which ``progress`` and ``seen`` are told.
+
+    The first may begin with the lever as `stated`; see `solve`.
+    """
 
     problem: Problem
     progress: Progress | None = None
     seen: Callable[[Prediction], None] | None = None
+    stated: Linearised | None = None
 
     def near(self, experiment: Experiment, start: Probe, before: int = 0) -> Optimum:
         """Search from a lever that is not far from the one that was measured.
@@ -139,7 +148,7 @@ class Search:
             If the lever cannot be solved at the start.
         """
         problem, ends = self.problem, list[Optimum]()
-        optimiser = self._optimiser(experiment, problem.start)
+        optimiser = self._optimiser(experiment, problem.start, near=self._as_stated(experiment))
         with suppress(ComputationError):
             if not _is_far(problem.residuals, optimiser.predictor.predict(problem.start)):
                 ends.append(optimiser.solve_and_confirm(problem.start, problem.options.robust))
@@ -163,11 +172,26 @@ class Search:
             before = ends[-1].predictor.evaluations
         return min(ends, key=lambda end: (not end.describes_data, end.misfit))
 
-    def _optimiser(self, experiment: Experiment, start: Probe, before: int = 0) -> Optimiser:
-        problem = self.problem
+    def _as_stated(self, experiment: ExperimentAtRest) -> PredictionAtRest | None:
+        """Return what is shown by the lever as stated, if it is one that an experiment solves."""
+        # rows over a sample belong to several levers, and a reduced one has other states
+        simple = type(experiment) is ExperimentAtRest and isinstance(experiment.fast, SimilarLevers)
+        if self.stated is None or not simple or self.stated.names != experiment.names:
+            return None
+        reach = experiment.reach(self.stated.probe)
+        return experiment.shown_by(self.stated.up_to(reach)) if reach.lowest_V is None else None
+
+    def _optimiser(
+        self,
+        experiment: Experiment,
+        start: Probe,
+        before: int = 0,
+        near: PredictionAtRest | None = None,
+    ) -> Optimiser:
+        problem, before = self.problem, before + (near is not None)
         residuals, varied = problem.residuals.afresh(), problem.options.varied
         objective = Objective(residuals, start, experiment.names, varied, problem.prior)
-        predictor = Predictor(experiment, self.progress, self.seen, before=before)
+        predictor = Predictor(experiment, self.progress, self.seen, near, before)
         return Optimiser(objective, predictor)
 
     def _grown(

@@ -287,3 +287,7 @@ class SparseFactors:
     def followed_by(self, other: SparseFactors) -> SparseFactors:
         """Return the same, and those of other states after them."""
         return SparseFactors(self._solvers + other._solvers)
+
+    def first(self, count: int) -> SparseFactors:
+        """Return those of the first states."""
+        return SparseFactors(self._solvers[:count])

@@ -9,11 +9,11 @@ and from the circuit; all that compares a lever with a measurement has them from
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hotlever.lever.branch import TIP_RISE, Branch
+from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.continuation import continued
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.space import TIP, Constraint, Factors
@@ -276,6 +276,20 @@ class Linearised:
             output_slopes = np.insert(output_slopes, cold, 0.0, axis=0)
             changes = np.insert(changes, cold, 0.0, axis=1) if changes.size else changes
         return cls(probe, names, longer, factors, changes, output_slopes)
+
+    def up_to(self, reach: Reach) -> Linearised:
+        """Return the same of no more states than a reach asks for."""
+        count, branch, factors = reach.count(self.branch.values), self.branch, self.factors
+        if count is None:
+            return self
+        solved = int(np.sum(branch.solved < count))
+        return replace(
+            self,
+            branch=branch.among(np.arange(count)),
+            factors=None if factors is None else factors.first(solved),
+            changes=self.changes[:, :count] if self.changes.size else self.changes,
+            output_slopes=self.output_slopes[:count],
+        )
 
     def states(self, probe: Probe) -> Array:
         """Return the states of a similar probe, (size + 1, k), to first order or roughly.

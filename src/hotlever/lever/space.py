@@ -41,6 +41,10 @@ class Factors(Protocol):
         """Return the same, and those of other states after them."""
         ...
 
+    def first(self, count: int) -> Any:
+        """Return those of the first states."""
+        ...
+
 
 @dataclass(frozen=True)
 class SurfaceTangent:

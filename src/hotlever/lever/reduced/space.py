@@ -298,3 +298,7 @@ class DenseFactors:
     def followed_by(self, other: DenseFactors) -> DenseFactors:
         """Return the same, and those of other states after them."""
         return DenseFactors(np.concatenate([self._inverses, other._inverses]))
+
+    def first(self, count: int) -> DenseFactors:
+        """Return those of the first states."""
+        return DenseFactors(self._inverses[:count])
