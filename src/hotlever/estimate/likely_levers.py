@@ -293,10 +293,11 @@ class LikelyLevers:
             by.reshape(4, -1, size),
             surrogate.names,
         ).reshape(-1, count, bias.size, size)
+        of_each = np.moveaxis(values, 1, 0), np.moveaxis(slopes, 1, 0)
+        if not surrogate.contact.there:
+            return of_each
         pairs = [
-            surrogate.contact.differentiated(
-                values[:, number], slopes[:, number], parameters[number]
-            )
-            for number in range(count)
+            surrogate.contact.differentiated(*each)
+            for each in zip(*of_each, parameters, strict=True)
         ]
         return np.stack([each for each, _ in pairs]), np.stack([each for _, each in pairs])

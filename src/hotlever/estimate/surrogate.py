@@ -189,6 +189,11 @@ class ContactTemperatures:
         self._origin = probe.values(self._names)
         self._of_base = np.array([float(name == "base_temperature_K") for name in self._names])
 
+    @property
+    def there(self) -> bool:
+        """Whether it is in contact."""
+        return self._law is not None
+
     def added(self, observables: Array, parameters: Array) -> Array:
         """Return the observables of levers, and behind them what contacts show, (all, n)."""
         return self.differentiated(
