@@ -61,9 +61,9 @@ class RowByRow:
             If they are of no lever like the probe.
         """
         problem = Problem.of(measurement, self._probe, self._options, model=self._experiment)
-        solution = None if self._at is None else self._searched_on(problem, self._at.probe)
+        solution = self._searched_on(problem, self._at.probe if self._at else problem.start)
         if solution is None:
-            # from afar, and with all that a calibration asks of the data
+            # from afar, and with all that is asked of data that no lever near by shows
             calibration = calibrate(measurement, probe=self._probe, priors=self._priors)
             if not calibration.describes_data:
                 raise InputError(calibration.reason)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from hotlever.errors import InputError, InstrumentError, excerpt
@@ -97,12 +98,9 @@ def open_line(resource: str, timeout_s: float) -> MessageBasedResource:
     InstrumentError
         If nobody answers.
     """
-    try:
-        import pyvisa
-    except ImportError:
-        raise InputError(
-            "measure: PyVISA is not installed; pip install 'hotlever[instruments]' brings it"
-        ) from None
+    managers = _managers()
+    import pyvisa
+
     try:
         pyvisa.rname.parse_resource_name(resource)
     except ValueError:
@@ -111,12 +109,9 @@ def open_line(resource: str, timeout_s: float) -> MessageBasedResource:
             "TCPIP0::192.168.0.5::5025::SOCKET, GPIB0::24::INSTR, USB0::…::INSTR, or twin"
         ) from None
     failure: Exception | None = None
-    # the maker's VISA where there is one, pyvisa-py where not
-    for library in ("", "@py"):
+    for manager in managers:
         try:
-            line: Any = pyvisa.ResourceManager(library).open_resource(
-                resource, open_timeout=int(1000 * timeout_s)
-            )
+            line: Any = manager.open_resource(resource, open_timeout=int(1000 * timeout_s))
             line.timeout = int(1000 * timeout_s)
             line.read_termination = line.write_termination = "\n"
             return cast("MessageBasedResource", line)
@@ -126,13 +121,25 @@ def open_line(resource: str, timeout_s: float) -> MessageBasedResource:
 
 
 def load_lines() -> None:
-    """Load what opens lines, which takes a second: for who may have to open one at once."""
-    with suppress(Exception):
-        import pyvisa
+    """Load what opens lines, which takes seconds: for who may have to open one at once."""
+    with suppress(InputError):
+        _managers()
 
-        for library in ("", "@py"):
-            with suppress(Exception):
-                pyvisa.ResourceManager(library)
+
+@lru_cache
+def _managers() -> list[Any]:
+    """Return what opens lines: the maker's VISA where there is one, pyvisa-py where not."""
+    try:
+        import pyvisa
+    except ImportError:
+        raise InputError(
+            "measure: PyVISA is not installed; pip install 'hotlever[instruments]' brings it"
+        ) from None
+    managers = []
+    for library in ("", "@py"):
+        with suppress(pyvisa.Error, OSError, ValueError):
+            managers.append(pyvisa.ResourceManager(library))
+    return managers
 
 
 def _reason(error: Exception | None) -> str:

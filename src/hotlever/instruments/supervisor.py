@@ -70,6 +70,8 @@ class Supervisor:
         self.identity = ""
 
     def __enter__(self) -> Supervisor:
+        # before anything is turned on that may have to be turned off from here
+        load_lines()
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=supervise, args=(theirs, self._supply), daemon=False)
@@ -101,7 +103,6 @@ class Supervisor:
 
         The measurement may be computing for seconds before it asks it for something again.
         """
-        load_lines()
         wait([self._process.sentinel])
         if not self._is_ending:
             self._is_off = _turned_off(None, self._supply)
