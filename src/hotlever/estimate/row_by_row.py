@@ -12,6 +12,7 @@ import time
 from collections.abc import Mapping
 
 from hotlever.errors import ComputationError, InputError
+from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.estimate.estimator import calibrate
 from hotlever.estimate.experiment import ExperimentAtRest, PredictionAtRest, Predictor
 from hotlever.estimate.next_measurement import LinearisedLever
@@ -20,7 +21,7 @@ from hotlever.estimate.optimiser import Optimiser
 from hotlever.estimate.options import CalibrationOptions
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import Solution
-from hotlever.estimate.verdict import verdict_on
+from hotlever.estimate.verdict import check_plausible, verdict_on
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
@@ -61,6 +62,9 @@ class RowByRow:
             If they are of no lever like the probe.
         """
         problem = Problem.of(measurement, self._probe, self._options, model=self._experiment)
+        if self._at is None:
+            # few rows are described by any lever with much noise
+            check_plausible(problem, Diagnosis(problem.measurement, problem.probe, self._priors))
         solution = self._searched_on(problem, self._at.probe if self._at else problem.start)
         if solution is None:
             # from afar, and with all that is asked of data that no lever near by shows
