@@ -184,11 +184,11 @@ def report(records: list[dict[str, Any]]) -> None:
 # --- ends -----------------------------------------------------------------------------------------
 
 
-def _prepare(small_files: bool) -> None:
+def _prepare(most_bytes: int | None) -> None:
     # what a shell starts in its background ignores Ctrl-C, and so would a command started by it
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    if small_files:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (450, 450))
+    if most_bytes is not None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
 
 
 def end(
@@ -202,20 +202,22 @@ def end(
     output = folder / "iv.csv"
     output.unlink(missing_ok=True)
     words = ["measure", "--source", twin.source, "--settle", "50ms", "-o", str(output)]
+    # the lines above the rows take some 250
+    most_bytes = int(rng.integers(200, 450))
     with subprocess.Popen(
         [sys.executable, "-m", "hotlever", *words, "--laws", "paper"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env=os.environ | {"PYTHONUNBUFFERED": "1"},
-        preexec_fn=partial(_prepare, small_files=kind == "disk"),
+        preexec_fn=partial(_prepare, most_bytes if kind == "disk" else None),
     ) as process:
         while not twin.output_on and process.poll() is None:
             time.sleep(0.01)
         if kind != "disk":
             time.sleep(rng.uniform(0.0, 15.0))
         elif process.poll() is None:
-            process.wait(300)
+            process.wait(1200)
         began = time.monotonic()
         if kind == "line":
             twin.break_lines()
