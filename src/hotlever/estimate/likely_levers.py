@@ -31,7 +31,9 @@ class DrawOptions:
     Attributes
     ----------
     count : int
-        So many; of as many the share of one in a hundred is off by a third of itself by chance.
+        So many; of as many the share of one in a hundred is off by a quarter of itself by chance.
+    count_of_priors : int
+        So many where there are no data, since priors alone cost next to nothing to draw from.
     seed : int
         The same levers are drawn each time, so that rows, not chance, move what is said.
     places : int
@@ -49,13 +51,14 @@ class DrawOptions:
         `hotlever.estimate.surrogate.Rows`.
     """
 
-    count: int = 1000
+    count: int = 2000
+    count_of_priors: int = 6000
     seed: int = 0
     places: int = 200
     together: int = 1_000_000
     rounds: int = 15
     accuracy: float = 0.05
-    fewest_effective: float = 200.0
+    fewest_effective: float = 400.0
     steepness: float = 0.03
 
 
@@ -163,14 +166,15 @@ class LikelyLevers:
         left -= jacobian @ np.linalg.solve(information, moved)
         # along these axes all that is unknown is independent, and of unit variance
         axes = np.linalg.cholesky(np.linalg.inv(information))
-        errors = np.random.default_rng(options.seed).standard_normal((options.count, size))
-        linear = (errors @ axes.T)[:, :count], np.ones(options.count)
+        many = options.count if values.size else options.count_of_priors
+        errors = np.random.default_rng(options.seed).standard_normal((many, size))
+        linear = (errors @ axes.T)[:, :count], np.ones(many)
         if not values.size:
             return linear
         each = max(1, options.together // jacobian.size)
         found = [
             self._found(errors[first : first + each], values, left, jacobian @ axes, axes)
-            for first in range(0, options.count, each)
+            for first in range(0, many, each)
         ]
         places, logarithms = (np.concatenate(parts) for parts in zip(*found, strict=True))
         if np.isneginf(logarithms).all():
