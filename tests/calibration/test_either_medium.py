@@ -71,8 +71,10 @@ def test_a_fit_in_either_medium_is_one_in_the_better(cold):
 
 @pytest.mark.slow
 def test_what_describes_the_data_is_the_answer(reference):
+    """By the laws of the paper, which its lever obeys: with others it may be one in air."""
     measured = measurement_of(measured_curve(reference, np.random.default_rng(0)))
-    calibration = calibrate(replace(measured, medium=None), medium="unknown")
+    unknown = replace(measured, medium=None)
+    calibration = calibrate(unknown, medium="unknown", priors={"laws": "paper"})
     assert calibration.describes_data
     assert calibration.medium == "vacuum"
     assert "in air a lever does not describe the data" in calibration.notes[0]

@@ -31,12 +31,14 @@ def test_priors_are_about_the_circuit_of_the_measurement(reference):
 
 @pytest.mark.slow
 def test_edges_that_are_off_together_are_known_by_one_prior():
-    """Each dimension by itself would have to be many times its tolerance away."""
+    """Each dimension by itself would have to be many times its tolerance away.
+
+    The lever obeys the laws of the paper: what others leave open hides edges as well.
+    """
     true = Lever(Probe.reference().with_(edge_bias_um=-0.12))
     curve = measured_curve(true.branch(), np.random.default_rng(0))
-    calibration = calibrate(
-        measurement_of(curve), priors={"dimensions": "± 1%", "edge_bias_um": "± 0.1"}
-    )
+    priors = {"dimensions": "± 1%", "edge_bias_um": "± 0.1", "laws": "paper"}
+    calibration = calibrate(measurement_of(curve), priors=priors)
     use = calibration.priors["edge_bias_um"]
     assert use.posterior_value == pytest.approx(-0.12, abs=2 * use.posterior_spread)
     assert use.posterior_spread < 0.7 * use.spread
