@@ -49,7 +49,7 @@ class SearchOptions:
         standard error.
     small_decrement : float
         The same where steps gain next to nothing: a third of a standard error. With priors that is
-        where no longer step than the `rough_region` gains anything, since values are not smooth
+        where no longer step than the ``rough_region`` gains anything, since values are not smooth
         there, as near a fold that moves past a row.
     rough_region : float
         See there; in units of `Coordinates.room`, as all regions.

@@ -106,7 +106,7 @@ class Shape(Record):
 class Parametric(Shape):
     """A shape made of dimensions, as drawn, and what etching makes of them.
 
-    No part is smaller than `smallest_um`, nor are two that do not touch nearer to each other.
+    No part is smaller than ``smallest_um``, nor are two that do not touch nearer to each other.
     """
 
     smallest_um: ClassVar[float] = 0.01
