@@ -230,7 +230,8 @@ class LikelyLevers:
         """
         surrogate = self._surrogate
         powers = np.tensordot(self._powers, surrogate.distance(values), (2, 1))
-        outputs = np.moveaxis(self._shown[..., None] * np.exp(powers), 1, 0)
+        # a step of the search that goes far too far shows something large, which is no nearer
+        outputs = np.moveaxis(self._shown[..., None] * np.exp(np.clip(powers, -50.0, 50.0)), 1, 0)
         columns = zip(surrogate.names, values.T, strict=True)
         own = {name: column for name, column in columns if name in Circuit.model_fields}
         circuit = surrogate.probe.circuit.model_copy(update=own)
