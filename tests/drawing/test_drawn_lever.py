@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import gdstk
 import numpy as np
 import pytest
@@ -226,7 +228,7 @@ def test_several_heaters_and_further_terminals():
 def test_a_fit_of_a_drawn_lever_finds_what_that_of_the_parametric_one_does(file):
     from hotlever.estimate import fit, read_measurement
 
-    data = read_measurement("src/hotlever/examples/lever-a.csv")
+    data = read_measurement(Path(__file__).parents[2] / "src/hotlever/examples/lever-a.csv")
     found, expected = fit(data, drawn(file)), fit(data, Probe.reference())
     for name, parameter in expected.parameters.items():
         assert found.parameters[name].value == pytest.approx(parameter.value, rel=2e-3)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+import hotlever
 from hotlever.estimate import read_measurement
 from hotlever.measurement import with_measured_circuit
 from hotlever.probe import Probe
+
+EXAMPLE = Path(hotlever.__file__).parent / "examples" / "lever-a.csv"
 
 
 @pytest.mark.parametrize(
@@ -25,7 +29,7 @@ from hotlever.probe import Probe
     ],
 )
 def test_medium_of_a_fit(option, in_file, in_probe, expected, noted):
-    measurement = replace(read_measurement("src/hotlever/examples/lever-a.csv"), medium=in_file)
+    measurement = replace(read_measurement(EXAMPLE), medium=in_file)
     probe, notes = with_measured_circuit(Probe.reference().in_medium(in_probe), measurement, option)
     assert probe.surroundings.medium == expected
     assert any("medium" in note for note in notes) == noted

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import nullcontext
+from pathlib import Path
 from types import SimpleNamespace
 from typing import ClassVar
 
@@ -31,7 +32,7 @@ from hotlever.probe.probe_parameters import parameters_of, usual_parameters
 from hotlever.studies.simulation_based_calibration import MinimosMaterial
 from of_materials import metal_film_probe
 
-BORON = "src/hotlever/examples/boron-lever.toml"
+BORON = Path(__file__).parents[2] / "src/hotlever/examples/boron-lever.toml"
 REFUSED = "follows laws of its own, those of the Python class .*, which no file holds"
 SCALE = Parameter(
     *("mobility_scale", "c_µ", "1", 1.0, 0.5, 2.0, "scale of the mobility"),

@@ -460,12 +460,12 @@ class _Node:
         Columns of matrices are as long as a column beside them, else as the longer side.
         """
         lengths = set(self.columns)
-        for name, unit, values in self.matrices:
+        for matrix, unit, values in self.matrices:
             rows, width = values.shape
             beside = (rows in lengths) - (width in lengths)
             lies = beside < 0 or (beside == 0 and rows < width)
             for number, column in enumerate(values if lies else values.T, start=1):
-                self.columns[column.size][_heading(f"{name} {number}", unit)] = column
+                self.columns[column.size][_heading(f"{matrix} {number}", unit)] = column
         return {
             name if len(self.columns) == 1 else f"{name} ({rows} rows)": partial(
                 self._lines, rows, where

@@ -79,8 +79,10 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
     if not np.any(row):
         raise ComputationError("without power nothing is held where the source holds the power")
     factors = InCircuit(equations.factorised(x, LEVER), row)
-    begin = np.where(equations.space.is_temperature, 1.0, 0.0)
-    times, modes = _modes(equations, x, factors, count, begin)
+    # one that is symmetric as the lever is would hold none of the modes that are not
+    uneven = np.random.default_rng(0).uniform(-1.0, 1.0, len(x)) / len(x) ** 0.5
+    uneven[~equations.space.is_temperature] = 0.0
+    times, modes = _modes(equations, x, factors, count, uneven)
     if not (air := equations.heat_in_air).size:
         return times, modes
     constants, changes = np.empty_like(times), np.empty_like(modes)
@@ -90,8 +92,8 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
             last = times[mode]
             rate = 1.0 / abs(last)
             bound = air.bound(rate) if last > 0.0 else air.taken_up(rate) / rate
-            # those with other air are nearly the same
-            begin = (modes / np.linalg.norm(modes, axis=0)).sum(axis=1)
+            # those with other air are nearly the same, if no other gets slower than they are
+            begin = (modes / np.linalg.norm(modes, axis=0)).sum(axis=1) + 0.01 * uneven
             times, modes = _modes(equations, x, factors, count, begin, air.coordinates, bound)
             if abs(times[mode] / last - 1.0) < 1e-4:
                 break
