@@ -101,7 +101,7 @@ class Estimate:
         What is predicted at the measured biases, and the standard error of the predicted tip
         temperature that follows from the covariance of the parameters: ``bias_V``, ``power_mW``,
         ``tip_K``, ``tip_stderr_K``, rising in bias; or, of what was measured in time, rising in
-        ``time_us``. None by the paper's rule.
+        ``time_us``. Empty by the paper's rule.
     evaluations, steps : int
         Solved sweeps, and steps of the search among them.
     seconds : float

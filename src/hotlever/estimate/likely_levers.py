@@ -46,9 +46,6 @@ class DrawOptions:
         Standard deviations within which one has to be found; else it does not count.
     fewest_effective : float
         Levers of equal weight that there have to be; otherwise the linearised ones are taken.
-    steepness : float
-        Near a fold a bias rises along the branch by this share of its mean slope at least, as in
-        `hotlever.estimate.surrogate.Rows`.
     """
 
     count: int = 2000
@@ -59,7 +56,6 @@ class DrawOptions:
     rounds: int = 15
     accuracy: float = 0.05
     fewest_effective: float = 400.0
-    steepness: float = 0.03
 
 
 @dataclass(frozen=True)
@@ -132,10 +128,9 @@ class LikelyLevers:
     @cached_property
     def _ramps(self) -> tuple[Array, Array]:
         """The bias (V) that a slow ramp has reached, and the tip (K), along all of them."""
-        outputs, ramp, circuit = self._curves(
-            self._coordinates.values(self._point + self._drawn[0])
-        )
-        return ramp, outputs[TIP_RISE] + circuit.base_temperature_K
+        values = self._coordinates.values(self._point + self._drawn[0])
+        outputs, ramp = self._curves(values)
+        return ramp, outputs[TIP_RISE] + self._circuit(values).base_temperature_K
 
     def quantiles(self, bias_V: Array, shares: Array) -> Array:
         """Return below what (K) shares (m,) of the tips lie at some biases (V), (m, n)."""
@@ -222,21 +217,24 @@ class LikelyLevers:
 
     # --- what they show ---------------------------------------------------------------------------
 
-    def _curves(self, values: Array) -> tuple[Array, Array, Circuit]:
-        """Return what levers with some parameters (n, p) show along their branches.
-
-        V_l, I_h, V_r and the rise of the tip, (4, places, n), the bias (V) that a slow ramp has
-        reached there, and the circuits, whose own parameters are columns, (n,).
-        """
+    def _circuit(self, values: Array) -> Circuit:
+        """Return the circuits of levers with some parameters (n, p): its own are columns, (n,)."""
         surrogate = self._surrogate
-        powers = np.tensordot(self._powers, surrogate.distance(values), (2, 1))
-        # a step of the search that goes far too far shows something large, which is no nearer
-        outputs = np.moveaxis(self._shown[..., None] * np.exp(np.clip(powers, -50.0, 50.0)), 1, 0)
         columns = zip(surrogate.names, values.T, strict=True)
         own = {name: column for name, column in columns if name in Circuit.model_fields}
-        circuit = surrogate.probe.circuit.model_copy(update=own)
-        ramp = np.maximum.accumulate(circuit.bias(outputs[0], outputs[1]), axis=0)
-        return outputs, ramp, circuit
+        return surrogate.probe.circuit.model_copy(update=own)
+
+    def _curves(self, values: Array) -> tuple[Array, Array]:
+        """Return what levers with some parameters (n, p) show along their branches.
+
+        V_l, I_h, V_r and the rise of the tip, (4, places, n), and the bias (V) that a slow ramp has
+        reached there.
+        """
+        powers = np.tensordot(self._powers, self._surrogate.distance(values), (2, 1))
+        # a step of the search that goes far too far shows something large, which is no nearer
+        outputs = np.moveaxis(self._shown[..., None] * np.exp(np.clip(powers, -50.0, 50.0)), 1, 0)
+        bias = self._circuit(values).bias(outputs[0], outputs[1])
+        return outputs, np.maximum.accumulate(bias, axis=0)
 
     def _residuals(self, x: Array) -> tuple[Array, Array]:
         """Return what data show of levers with unknowns (n, q), in standard deviations, (n, m).
@@ -262,12 +260,9 @@ class LikelyLevers:
 
         `hotlever.quantities.FITTED`, (n, observables, rows), and derivatives by the parameters.
         """
-        bias, (count, size), surrogate = (
-            np.abs(self._known.bias_V),
-            parameters.shape,
-            self._surrogate,
-        )
-        along_branch, ramp, circuit = self._curves(parameters)
+        surrogate, bias = self._surrogate, np.abs(self._known.bias_V)
+        count, size = parameters.shape
+        along_branch, ramp = self._curves(parameters)
         grid = np.arange(len(ramp), dtype=float)
         place = np.stack([np.interp(bias, reached, grid) for reached in ramp.T])
         low, lever = np.minimum(place.astype(int), grid.size - 2), np.arange(count)[:, None]
@@ -276,20 +271,15 @@ class LikelyLevers:
         along, outputs = end - start, start + part * (end - start)
         powers = self._powers[low] + part[..., None] * (self._powers[low + 1] - self._powers[low])
         by = outputs[..., None] * powers / surrogate.unit
-        series = np.reshape(circuit.series_kohm, (-1, 1))
+        series = np.reshape(self._circuit(parameters).series_kohm, (-1, 1))
         bias_by = by[..., 0, :] + series[..., None] * by[..., 1, :]
         if "series_resistance_ohm" in surrogate.names:
             bias_by[..., surrogate.names.index("series_resistance_ohm")] += 1e-3 * outputs[..., 1]
         # the circuit moves the state along its branch until the bias is what it was
-        least = self._options.steepness * bias / np.maximum(place, 1.0)
+        least = surrogate.rows.steepness * bias / np.maximum(place, 1.0)
         slope = np.maximum(along[..., 0] + series * along[..., 1], least)
         by -= along[..., None] * (bias_by / slope[..., None])[..., None, :]
-        each = {
-            name: getattr(circuit, name) for name in surrogate.names if name in Circuit.model_fields
-        }
-        flat = circuit.model_copy(
-            update={name: np.repeat(column, bias.size) for name, column in each.items()}
-        )
+        flat = self._circuit(np.repeat(parameters, bias.size, axis=0))
         outputs, by = np.moveaxis(outputs, -1, 0), np.moveaxis(by, 2, 0)
         values = observed(flat, outputs.reshape(4, -1)).reshape(-1, count, bias.size)
         slopes = observed_by(

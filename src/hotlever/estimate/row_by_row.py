@@ -14,13 +14,11 @@ from collections.abc import Mapping
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.estimate.estimator import calibrate
-from hotlever.estimate.experiment import ExperimentAtRest, PredictionAtRest, Predictor
+from hotlever.estimate.experiment import ExperimentAtRest, PredictionAtRest
 from hotlever.estimate.next_measurement import LinearisedLever
-from hotlever.estimate.objective import Objective
-from hotlever.estimate.optimiser import Optimiser
 from hotlever.estimate.options import CalibrationOptions
 from hotlever.estimate.problem import Problem
-from hotlever.estimate.search import Solution
+from hotlever.estimate.search import Search, Solution
 from hotlever.estimate.verdict import check_plausible, verdict_on
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
@@ -88,14 +86,7 @@ class RowByRow:
         experiment, began = problem.experiment, time.perf_counter()
         try:
             near = experiment.predict(start, self._at)
-            objective = Objective(
-                problem.residuals.afresh(),
-                start,
-                experiment.names,
-                problem.options.varied,
-                problem.prior,
-            )
-            optimiser = Optimiser(objective, Predictor(experiment, near=near))
+            optimiser = Search(problem).optimiser(experiment, start, near=near)
             optimum = optimiser.solve_and_confirm(start, problem.options.robust)
         except (InputError, ComputationError):
             return None

@@ -133,7 +133,7 @@ class Search:
 
         The levers that were solved `before` count.
         """
-        optimiser = self._optimiser(experiment, start, before)
+        optimiser = self.optimiser(experiment, start, before)
         return optimiser.solve_and_confirm(start, self.problem.options.robust)
 
     def from_anywhere(self, experiment: ExperimentAtRest) -> Optimum:
@@ -148,7 +148,8 @@ class Search:
             If the lever cannot be solved at the start.
         """
         problem, ends = self.problem, list[Optimum]()
-        optimiser = self._optimiser(experiment, problem.start, near=self._as_stated(experiment))
+        near = self._as_stated(experiment)
+        optimiser = self.optimiser(experiment, problem.start, int(near is not None), near)
         with suppress(ComputationError):
             if not _is_far(problem.residuals, optimiser.predictor.predict(problem.start)):
                 ends.append(optimiser.solve_and_confirm(problem.start, problem.options.robust))
@@ -181,14 +182,15 @@ class Search:
         reach = experiment.reach(self.stated.probe)
         return experiment.shown_by(self.stated.up_to(reach)) if reach.lowest_V is None else None
 
-    def _optimiser(
+    def optimiser(
         self,
         experiment: Experiment,
         start: Probe,
         before: int = 0,
-        near: PredictionAtRest | None = None,
+        near: Prediction | None = None,
     ) -> Optimiser:
-        problem, before = self.problem, before + (near is not None)
+        """Return what searches from a lever, which may be solved as `near`, after others."""
+        problem = self.problem
         residuals, varied = problem.residuals.afresh(), problem.options.varied
         objective = Objective(residuals, start, experiment.names, varied, problem.prior)
         predictor = Predictor(experiment, self.progress, self.seen, near, before)

@@ -50,10 +50,15 @@ class Rows:
     measured : ndarray, shape (observables, n), optional
         What was measured, `hotlever.quantities.OBSERVABLES`; NaN where nothing was. Without it the
         states are those of a slow ramp.
+    steepness : float
+        Near a fold the states at a bias move without limit as parameters change; their derivatives
+        count as if the bias rose along the branch by at least this share of its mean slope up to
+        there.
     """
 
     bias_V: Array
     measured: Array | None = None
+    steepness: float = 0.03
 
     def states(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return u of the states that the rows are compared with, and how far these fall short.
@@ -150,13 +155,9 @@ class Rows:
         return np.asarray(np.nansum(((values - measured[:, rows]) / largest) ** 2, axis=0))
 
     def _steepen(self, along: Array, circuit: Circuit, u: Array) -> None:
-        """Let the bias rise where it hardly does, in derivatives by u (n, 5) of what is shown.
-
-        Near a fold the states at a bias move without limit as parameters change; their derivatives
-        count as if the bias rose along the branch by at least 3 % of its mean slope up to there.
-        """
+        """Let the bias rise where it hardly does, in derivatives by u (n, 5) of what is shown."""
         slope = circuit.bias(along[:, 0], along[:, 1])
-        least = 0.03 * np.abs(self.bias_V) / np.maximum(np.abs(u), 1e-9)
+        least = self.steepness * np.abs(self.bias_V) / np.maximum(np.abs(u), 1e-9)
         flat = np.abs(slope) < least
         along[flat, 0] += (np.where(slope < 0, -least, least) - slope)[flat]
 

@@ -122,7 +122,7 @@ def open_line(resource: str, timeout_s: float) -> MessageBasedResource:
 
 def load_lines() -> None:
     """Load what opens lines, which takes seconds: for who may have to open one at once."""
-    with suppress(InputError):
+    with suppress(InputError, InstrumentError):
         _managers()
 
 
@@ -135,10 +135,14 @@ def _managers() -> list[Any]:
         raise InputError(
             "measure: PyVISA is not installed; pip install 'hotlever[instruments]' brings it"
         ) from None
-    managers = []
+    managers, failure = [], None
     for library in ("", "@py"):
-        with suppress(pyvisa.Error, OSError, ValueError):
+        try:
             managers.append(pyvisa.ResourceManager(library))
+        except (pyvisa.Error, OSError, ValueError) as error:
+            failure = error
+    if not managers:
+        raise InstrumentError(f"no instrument answers ({_reason(failure)})")
     return managers
 
 
