@@ -1,10 +1,16 @@
-"""Limits that tests set to what might never end."""
+"""Limits that tests set to what might never end, and signals that end it."""
 
 from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+
+def as_in_a_terminal() -> None:
+    """Let signals end a command even where these tests run under nohup or in the background."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 @contextmanager

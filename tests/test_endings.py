@@ -17,15 +17,10 @@ import pytest
 from hotlever.cli import main, output, running
 from hotlever.cli.output import note, progress
 from hotlever.tasks.commands import COMMANDS, command_line
+from limits import as_in_a_terminal
 
 COMMAND = [sys.executable, "-c", "from hotlever.cli import main; main()"]
 LONG = ("sweep", "--bias", "1:11:10000", "-o", "a.csv")
-
-
-def as_in_a_terminal() -> None:
-    """Let signals end a command even where these tests run under nohup or in the background."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
 
 
 def start(folder: Path, *arguments: str, **options) -> subprocess.Popen:

@@ -16,6 +16,7 @@ import pytest
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.processes import Patience, WorkerDiedError, local_executor, run_all
+from limits import as_in_a_terminal
 
 # --- tasks --------------------------------------------------------------------------------------
 
@@ -159,7 +160,12 @@ def test_workers_and_their_folder_end_with_their_parent(tmp_path, number):
     environment = {**os.environ, "HOTLEVER_CACHE": "", "TMPDIR": str(tmp_path / "tmp")}
     command = [sys.executable, str(tmp_path / "script.py")]
     with subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        command,
+        env=environment,
+        preexec_fn=as_in_a_terminal,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     ) as process:
         pids = [int(pid) for pid in process.stdout.readline().split()]
         process.send_signal(number)

@@ -16,6 +16,7 @@ from test_source_meter import resistor
 from hotlever.errors import InstrumentError
 from hotlever.instruments.supervisor import Supervisor, Supply
 from hotlever.instruments.twin import TwinBench
+from limits import as_in_a_terminal
 
 pytest.importorskip("pyvisa")
 
@@ -46,9 +47,8 @@ def measuring(twin, tmp_path) -> Iterator[tuple[subprocess.Popen[str], int]]:
     script = tmp_path / "measuring.py"
     script.write_text(SCRIPT)
     command = [sys.executable, str(script), twin.source]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, preexec_fn=as_in_a_terminal, **pipes) as process:
         try:
             assert process.stdout is not None
             supervisor = int(process.stdout.readline())
