@@ -186,6 +186,9 @@ async def test_each_drawing_has_a_probe_file_and_a_picture_of_its_own(
     await drop(user, "own.gds", OWN)
     await until(lambda: session.probe == "own.toml")
     await until(lambda: len(images(user)) == 2 and named(user, "layer 1/0 is made of"))
+    # a page that is opened anew, as another one beside it, says as well what the drawing holds
+    await user.open("/lever")
+    await until(lambda: len(images(user)) == 2 and named(user, "layer 1/0 is made of"))
     edited = "# mine\n" + (tmp_path / "own.toml").read_text()
     (tmp_path / "own.toml").write_text(edited)
     # the same again is proposed beside it

@@ -53,7 +53,6 @@ class LeverPage(TaskPage):
         self._sections: Sections = {}
         self._turn = 0
         self._opened_for: str | None = None
-        self._held_for: str | None = None
         with two_columns("live") as (left, right):
             with left:
                 drop_zone(
@@ -121,7 +120,7 @@ class LeverPage(TaskPage):
             self._name.set_value(f"{self.session.project.free(self.stem, '.toml')}.toml")
             self._picture.clear()
             self._fields.clear()
-            self._holds.set_visibility(probe == self._held_for)
+            self._show_drawing()
         with self.banner.caught():
             edited = self.chosen["edited"].get(probe)
             sections = edited or await self.session.ask("quick", probe_fields.opened, probe)
@@ -129,6 +128,23 @@ class LeverPage(TaskPage):
                 self._sections = sections
                 await self._draw()
             return
+
+    def _show_drawing(self) -> None:
+        """Show what the drawing holds that the lever was proposed for, whoever asked for it."""
+        jobs = [job for job in self.session.jobs.of(self.name) if job.standing == "done"]
+        job = next((job for job in jobs if job.task.options["output"] == self.probe), None)
+        self._holds.clear()
+        self._holds.set_visibility(False)
+        if job is None or not (plot := job.task.options.get("plot")):
+            return
+        outlines = self.session.project.path(plot)
+        if not outlines.is_file():  # it is the user's to delete
+            return
+        self._holds.set_visibility(True)
+        with self._holds:
+            ui.label(job.contents["result"]).classes("lines")
+            drawn = outlines.read_text(encoding="utf-8")
+            figure(drawn, "All outlines of the drawing, by layer")
 
     async def _edit(self, sections: Sections) -> None:
         """Take sections in which something was set."""
@@ -214,20 +230,13 @@ class LeverPage(TaskPage):
             self.chosen["awaited"] = self.session.jobs.of(self.name)[0].task.options["output"]
 
     async def _proposed(self, job: Job) -> None:
-        """Show what was proposed, if nothing else was chosen meanwhile, and what is drawn."""
-        name, plot = job.task.options["output"], job.task.options.get("plot")
+        """Show what was proposed, if nothing else was chosen meanwhile."""
+        name = job.task.options["output"]
         if job.standing != "done":
             return
         if self.chosen["awaited"] != name:
             ui.notify(f"{name} is written")
             return
-        if plot:
-            self._held_for = name
-            self._holds.clear()
-            with self._holds:
-                ui.label(job.contents["result"]).classes("lines")
-                outlines = self.session.project.path(plot).read_text(encoding="utf-8")
-                figure(outlines, "All outlines of the drawing, by layer")
         self._take(name)
 
     def _take_u_shape(self) -> None:
