@@ -26,7 +26,7 @@ from hotlever.probe.drawing import Drawing
 from hotlever.probe.layout import BorderTaper, Region
 from hotlever.spieser2017 import RAMP
 
-BIAS = RAMP
+BIAS = np.array(RAMP)
 EXAMPLE = Path(__file__).parents[1] / "src" / "hotlever" / "examples" / "lever-a.csv"
 PEER = Path(__file__).parent / "fenics" / "peer.py"
 DEBIAN_PYTHON = "/usr/bin/python3"

@@ -489,7 +489,7 @@ def _errors(layout: Layout) -> dict[str, float]:
         probe = layout.probe(option)
         similar = SimilarLevers(Lever(probe, COARSE))
         readings = Readings(similar.linearised(probe, Reach(probe.circuit, LAST_V), None, names))
-        values, slopes = readings.at_bias(paper.RAMP)
+        values, slopes = readings.at_bias(np.array(paper.RAMP))
         values[3] += readings.branch.base_temperature_K
         shown = np.concatenate([slopes[row] / values[row].max() for row in rows])
         covariance = np.linalg.inv(shown.T @ shown)

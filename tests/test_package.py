@@ -157,6 +157,13 @@ def test_what_is_estimated_or_in_time_imports_no_dask(tmp_path, words):
     assert "dask.base" not in imported_by(words, tmp_path)
 
 
+def test_the_help_waits_for_no_numpy(tmp_path):
+    """It computes nothing, and would take half as long again."""
+    modules = imported_by("--help", tmp_path)
+    assert "typer" in modules
+    assert not {"numpy", "scipy", "pydantic"} & set(modules)
+
+
 def test_a_fit_waits_for_no_xarray_nor_pandas(tmp_path):
     """Only who asks for a dataset does, for as long as a fifth of a fit."""
     modules = imported_by(f"fit {EXAMPLES}/lever-a.csv -o out.json", tmp_path)

@@ -10,9 +10,9 @@ as sets of parameters in `hotlever.materials.presets`.
 
 from __future__ import annotations
 
+import math
+import statistics
 from dataclasses import dataclass
-
-import numpy as np
 
 DOI = "10.1063/1.4981883"
 
@@ -20,8 +20,8 @@ DOI = "10.1063/1.4981883"
 
 #: Doping concentration of the wafer (cm⁻³), to which the "n_d fixed" rows are held.
 NOMINAL_DOPING = 3.3e17
-#: The ramp of the bias (V).
-RAMP = np.linspace(1.0, 11.0, 25)
+#: The ramp of the bias (V), 25 of them.
+RAMP = tuple(1.0 + row * (10.0 / 24.0) for row in range(25))
 #: Nominal thickness of the lever and length of its heater (µm).
 THICKNESS_UM, HEATER_LENGTH_UM = 0.4, 4.0
 #: Temperature of the leg ends, and room temperature of the thermometer (K).
@@ -117,11 +117,12 @@ def _scatter() -> dict[str, tuple[float, float]]:
     The scatter of those of Table II stands for that of any lever of unknown material; it is
     widened, as four levers of one wafer differ less than those of two makers.
     """
-    levers = (PUBLISHED_VALUES[f"lever {number}"] for number in (1, 2, 3, 4))
-    logarithms = np.log([list(lever.values()) for lever in levers])
-    means, spreads = logarithms.mean(axis=0), logarithms.std(axis=0, ddof=1)
-    rows = zip(np.exp(means).tolist(), (1.5 * spreads).tolist(), strict=True)
-    return dict(zip(PUBLISHED_VALUES["lever 1"], rows, strict=True))
+    scatter = {}
+    for name in PUBLISHED_VALUES["lever 1"]:
+        values = [PUBLISHED_VALUES[f"lever {number}"][name] for number in (1, 2, 3, 4)]
+        spread = statistics.stdev(map(math.log, values))
+        scatter[name] = statistics.geometric_mean(values), 1.5 * spread
+    return scatter
 
 
 #: What is known of the silicon of any lever, by parameter: geometric mean and relative spread of

@@ -84,17 +84,17 @@ def test_a_coefficient_of_a_law_is_a_suspect_of_one_standard_deviation():
 
 @pytest.mark.usefixtures("coarse_meshes")
 def test_the_covariance_of_a_fit_gives_the_knee_a_standard_error_that_goes_with_the_noise():
-    probe, noise = Probe.reference(), np.random.default_rng(0).normal(size=(2, RAMP.size))
+    probe, noise = Probe.reference(), np.random.default_rng(0).normal(size=(2, len(RAMP)))
     sweep = Lever(probe, COARSE).sweep(RAMP)
     errors = []
     for share in (1e-3, 2e-3):
         exact = Measurement.of_sweep(sweep)
         noisy = Measurement(
-            RAMP,
+            np.array(RAMP),
             exact.current_mA * (1 + share * noise[0]),
             exact.reader_V * (1 + share * noise[1]),
             exact.tip_K,
-            np.full(RAMP.size, 2.0),
+            np.full(len(RAMP), 2.0),
         )
         errors.append(by_covariance(fit(noisy, probe)))
     assert errors[0] > 0.0

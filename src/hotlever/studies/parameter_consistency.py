@@ -133,10 +133,10 @@ def twin_measurement(
         true = true.with_material("material", MinimosMaterial)
     lever = Lever(true, COARSE)
     highest = float(lever.branch().bias(HOTTEST_TIP_K, true.circuit))
-    sweep = lever.sweep(np.linspace(RAMP[0], highest, RAMP.size))
+    sweep = lever.sweep(np.linspace(RAMP[0], highest, len(RAMP)))
 
     def noisy(values: Array, share: float) -> Array:
-        return np.asarray(values * (1.0 + share * rng.standard_normal(RAMP.size)))
+        return np.asarray(values * (1.0 + share * rng.standard_normal(len(RAMP))))
 
     (alone, common), base = RAMAN, true.circuit.base_temperature_K
     scale = 1.0 + common * rng.standard_normal() * ("thermometer" in departures)
@@ -145,7 +145,7 @@ def twin_measurement(
         noisy(sweep.current_mA.values, NOISE),
         noisy(sweep.reader_V.values, NOISE),
         base + scale * noisy(sweep.tip_K.values - base, alone),
-        np.full(RAMP.size, np.nan),
+        np.full(len(RAMP), np.nan),
     )
 
 

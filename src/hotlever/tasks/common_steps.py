@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 from hotlever.errors import InputError, unknown_name
 from hotlever.tasks.arguments import LeverArguments, check_medium
 from hotlever.tasks.parsing import parse_settings
-from hotlever.types import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
 
     from hotlever.lever import Lever
     from hotlever.probe import Probe
+    from hotlever.types import Progress
 
 
 class Reporter(Protocol):

@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from typer import Option
 
 from hotlever.errors import ComputationError, InputError, counted, excerpt, quoted
@@ -141,6 +140,8 @@ def _instruments(
         raise InputError(f"--source: found {quoted(source)}, expected {TWIN} or {TWIN}:NUMBER")
     if reader not in (None, TWIN):
         raise InputError(f"--reader: found {quoted(reader)} at a twin, expected {TWIN}")
+    import numpy as np
+
     from hotlever.instruments.twin import RampCurve, TwinBench, drawn_from_priors
 
     seed = int(number) if number else secrets.randbelow(10_000)
@@ -161,6 +162,8 @@ def _row(number: int, reading: Reading, step: Step) -> str:
 
 def _rows(ramp: Ramp) -> dict[str, Any]:
     """Return the rows so far, what was foretold of each, and the tip by what is known now."""
+    import numpy as np
+
     shown: dict[str, Any] = {
         "bias_V": [reading.bias_V for reading in ramp.readings],
         "current_mA": [reading.current_mA for reading in ramp.readings],
@@ -179,6 +182,8 @@ def _rows(ramp: Ramp) -> dict[str, Any]:
 
 def _result(output: Path, ramp: Ramp) -> str:
     """Return what was measured, in words."""
+    import numpy as np
+
     readings = ramp.readings
     text = f"{len(readings)} rows in {output}: {ramp.reason}.\n"
     if ramp.tells:

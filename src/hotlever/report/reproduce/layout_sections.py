@@ -258,7 +258,7 @@ def next_section(page: Findings) -> None:
     (without, together), (spectrum, _), (finer, _), (drawing, _) = study.stderr_K.values
     page.say(
         "knee_next",
-        rows=paper.RAMP.size,
+        rows=len(paper.RAMP),
         iv=without,
         everything=together,
         scale=THERMOMETER * (paper.KNEE_PREDICTED_K - probe.circuit.base_temperature_K),

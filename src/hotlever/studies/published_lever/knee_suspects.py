@@ -102,7 +102,7 @@ def what_to_measure(probe: Probe, seed: int = 0) -> xr.Dataset:
     )
     tip_K = noisy(ramp.tip_K.values, error_K)
     everything = Measurement(ramp.bias_V.values, current, reader, tip_K, error_K)
-    nothing = np.full(paper.RAMP.size, np.nan)
+    nothing = np.full(len(paper.RAMP), np.nan)
     data = {
         "ramp without temperatures": replace(everything, tip_K=nothing, tip_error_K=nothing),
         "ramp with temperatures": everything,

@@ -173,7 +173,7 @@ HALF_DIGIT = 0.005
 #: A reading of the knee off the ramp: half of what its neighbours there are apart (K).
 KNEE_READ_K = 25.0
 #: The bias at which the tip is hottest (V).
-LAST_V = float(paper.RAMP[-1])
+LAST_V = paper.RAMP[-1]
 #: Power (mW) up to which Eq. 12 has data on the hot branch.
 WELL_COVERED_MW = 3.3
 #: Groups of parameters that are said to be decoupled.
@@ -259,7 +259,7 @@ def _beside_main(
     options: Mapping[str, Readings], option: str
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
     """Return what an option and the main one show at some biases of the ramp."""
-    bias_V = paper.RAMP[[4, 8, 12, 16, 18, 20, 22, 24]]
+    bias_V = np.array(paper.RAMP)[[4, 8, 12, 16, 18, 20, 22, 24]]
     return options[option].at_bias(bias_V), options[MAIN].at_bias(bias_V)
 
 
