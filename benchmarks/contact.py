@@ -60,6 +60,7 @@ from hotlever.lever import Lever
 from hotlever.lever.contact import sweep_in_contact
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
+from hotlever.measurement.data import as_attributes
 from hotlever.probe import Probe
 from hotlever.probe.mesh import face_of
 from hotlever.probe.priors import METERS
@@ -400,8 +401,7 @@ def twin(case: Case, number: int) -> tuple[float, float]:
             "surface_error_K": np.append(nothing, np.full(at.size, MELTING_ERROR)),
             "distance_um": np.append(case.distance, 0.0 * at),
         }
-        missing = dict.fromkeys(("reader_V", "tip_K", "tip_error_K"), np.append(nothing, empty))
-        measured = Measurement(**columns, **missing)
+        measured = Measurement(**as_attributes(columns))
     priors = {name: f"± {100 * share:g}%" for name, share in known.items()}
     result = fit(measured, probe, priors=priors | {INTERFACE: "×/ 10"}, model=model)
     of = result.parameters[INTERFACE]

@@ -1,7 +1,8 @@
 """Quantities: one table of what datasets, files and figures call each, and its unit.
 
-An observable of a lever is a row here with a symbol, under which files head its column, and a
-function in `hotlever.lever.observables` by which it follows from a state of the lever.
+An observable of a lever is a row here with a symbol, under which files head its column, and a row
+of its standard error; and what a lever does not show by itself has a function in
+`hotlever.lever.observables`, by which it follows from what it does.
 """
 
 from __future__ import annotations
@@ -32,8 +33,15 @@ class Quantity(NamedTuple):
     signed: bool = False
     #: Unit of differences between data and model, and how many of it make one of its own.
     small: tuple[str, float] = ("", 1.0)
+    #: Name of the error that all of its data have in common: the scale of its meter.
+    scale: str = ""
     #: What figures call it, if not by its meaning alone.
     label: str = ""
+
+    @property
+    def is_temperature(self) -> bool:
+        """Whether a thermometer shows it, whose scale is one of the rise above the base."""
+        return self.unit == "K"
 
     @property
     def typed_unit(self) -> str:
@@ -82,6 +90,7 @@ QUANTITIES = {
             "ih i current heatercurrent levercurrent strom heizstrom heizerstrom hebelstrom",
             (1e-9, 1e3),
             small=("µA", 1e3),
+            scale="current_scale",
             label="heater current I$_h$",
         ),
         Quantity(
@@ -92,6 +101,7 @@ QUANTITIES = {
             "vr ur vreader ureader reader readervoltage readerspannung",
             (1e-9, 1e3),
             small=("mV", 1e3),
+            scale="reader_scale",
             label="reader voltage V$_r$",
         ),
         Quantity(
@@ -104,6 +114,7 @@ QUANTITIES = {
             (1e-9, 1e3),
             True,
             ("mV", 1e3),
+            "bridge_scale",
             label="bridge voltage V$_{bridge}$",
         ),
         Quantity(
@@ -114,6 +125,7 @@ QUANTITIES = {
             "ttip tip tiptemperature spitzentemperatur",
             (0.0, 5e3),
             small=("K", 1.0),
+            scale="raman_scale",
         ),
         Quantity(
             "tip_error_K",
@@ -417,8 +429,7 @@ PLAIN = {
     "V_b": ("voltage", "spannung", "u", "source", "sourcevalue", "value", "reading"),
     "I_h": ("source", "sourcevalue", "value", "reading"),
 }
-#: What a lever shows, by the name that users give it. How each follows is said in
-#: `hotlever.lever.observables`.
+#: What a lever shows, by the name that users give it.
 OBSERVABLES = {
     "current": MEASURANDS["I_h"],
     "reader": MEASURANDS["V_r"],

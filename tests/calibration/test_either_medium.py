@@ -172,7 +172,7 @@ def test_a_left_out_datum_is_no_gain():
     outlying_current[7] += 0.1
     errors = np.full(20, 0.01)
     measured = Measurement(
-        bias, outlying_current, nothing, nothing, nothing, current_error_mA=errors
+        bias, outlying_current, nothing, nothing, nothing, further={"current_error_mA": errors}
     )
     residuals = Residuals(measured, ["current"], "errors")
     values = np.stack([current, nothing, nothing])

@@ -41,15 +41,15 @@ def measured(bridged, sweep):
     circuit, noise = bridged.circuit, np.random.default_rng(3).normal(0.0, NOISE, BIAS.size)
     current, errors = sweep.current_mA.values + noise, np.full(BIAS.size, NOISE)
     nothing = np.full(BIAS.size, np.nan)
-    by_current = Measurement(BIAS, current, nothing, nothing, nothing, current_error_mA=errors)
+    by_current = Measurement(
+        BIAS, current, nothing, nothing, nothing, further={"current_error_mA": errors}
+    )
     voltage = circuit.bridge_voltage(circuit.lever_voltage(BIAS, current), BIAS)
     gain = abs(circuit.bridge_change(circuit.series_kohm, 0.0))
     by_bridge = replace(
         by_current,
         current_mA=nothing,
-        current_error_mA=None,
-        bridge_output_V=voltage,
-        bridge_output_error_V=gain * errors,
+        further={"bridge_output_V": voltage, "bridge_output_error_V": gain * errors},
     )
     return by_current, by_bridge
 
@@ -161,7 +161,7 @@ def test_files_head_it_as_laboratories_do_and_it_has_either_sign(tmp_path, headi
     path = tmp_path / "measured.csv"
     path.write_text(f"V_b (V);{heading}\n1;-250\n2;-400\n-3;-120\n4;90\n", encoding="utf-8")
     data = read_measurement(path)
-    assert data.bridge_output_V.tolist() == [-0.25, -0.4, 0.12, 0.09]
+    assert data.further["bridge_output_V"].tolist() == [-0.25, -0.4, 0.12, 0.09]
     assert data.observables == ("bridge",)
     assert not any("negative" in note and "V_bridge is" in note for note in data.notes)
 

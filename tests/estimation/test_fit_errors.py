@@ -17,13 +17,12 @@ def with_errors(measurement, current=None, reader=None, tip=None):
     size = measurement.bias_V.size
 
     def column(value):
-        return None if value is None else np.full(size, value)
+        return np.full(size, np.nan if value is None else value)
 
     return dataclasses.replace(
         measurement,
-        current_error_mA=column(current),
-        reader_error_V=column(reader),
-        tip_error_K=np.full(size, np.nan) if tip is None else column(tip),
+        further={"current_error_mA": column(current), "reader_error_V": column(reader)},
+        tip_error_K=column(tip),
     )
 
 

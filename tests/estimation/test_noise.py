@@ -143,7 +143,8 @@ def test_no_data_are_better_than_the_model(stated):
     nothing = np.full(count, np.nan)
     measurement = Measurement(np.arange(1.0, 41.0), current, nothing, nothing, nothing)
     if stated is not None:
-        measurement = replace(measurement, current_error_mA=np.full(count, stated * TRUTH[-1]))
+        stated_mA = np.full(count, stated * TRUTH[-1])
+        measurement = replace(measurement, further={"current_error_mA": stated_mA})
     measurement = replace(measurement, rows=np.full(count, 100))
     residuals = Residuals(measurement, ("current",), "errors")
     residuals.take_scatter(np.stack([TRUTH, TRUTH, TRUTH]), discrepancy=5e-4)

@@ -26,6 +26,7 @@ from hotlever.lever.contact import out_of_contact, sweep_in_contact
 from hotlever.lever.lever import COARSE
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import read_measurement
+from hotlever.measurement.data import as_attributes
 from hotlever.measurement.rows import averaged
 from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import FITTED
@@ -61,8 +62,10 @@ def measured(touching) -> Measurement:
         bias,
         current * (1.0 + 1e-4 * random.normal(size=bias.size)),
         *(nothing, nothing, nothing),
-        surface_K=melts,
-        surface_error_K=np.where(np.isfinite(melts), 1.0, np.nan),
+        further={
+            "surface_K": melts,
+            "surface_error_K": np.where(np.isfinite(melts), 1.0, np.nan),
+        },
         distance_um=np.repeat([0.0, 0.5, 0.0], (13, 13, 3)),
     )
 
@@ -202,7 +205,7 @@ def test_melting_points_are_read(tmp_path):
     path.write_text("V_b (V),I_h (mA),T_melt (°C),dT_melt (K)\n5,0.7,,\n6,0.8,60,2\n")
     data = read_measurement(path)
     assert data.observables == ("current", "melting")
-    assert data.surface_K[1] == pytest.approx(333.15)
+    assert data.further["surface_K"][1] == pytest.approx(333.15)
     assert data.distance_um is None
 
 
@@ -229,17 +232,18 @@ def test_a_probe_that_cannot_show_it_is_refused(probe, measured, changes, messag
     ],
 )
 def test_melting_points_that_cannot_be(probe, measured, changes, message):
-    columns = {name: getattr(measured, name).copy() for name in changes}
+    columns = {name: values.copy() for name, values in measured.columns.items()}
     for name, value in changes.items():
         columns[name][-1] = value
     with pytest.raises(InputError, match=message):
-        fit(replace(measured, **columns), probe)
+        fit(replace(measured, **as_attributes(columns)), probe)
 
 
 def test_melting_points_that_contradict_each_other_are_no_estimate(probe, measured, monkeypatch):
     # what may be behind it is not what is asked here
     monkeypatch.setattr(Diagnosis, "named", lambda _: "")
-    other = replace(measured, surface_K=measured.surface_K + 40.0 * (measured.bias_V == BIAS[6]))
+    surface_K = measured.columns["surface_K"] + 40.0 * (measured.bias_V == BIAS[6])
+    other = replace(measured, further={**measured.further, "surface_K": surface_K})
     known = {"fixed": dict.fromkeys(usual_parameters(probe)), "priors": {INTERFACE: "×/ 10"}}
     with on_coarse_meshes():
         result = fit(other, probe, **known)

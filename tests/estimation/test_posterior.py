@@ -233,7 +233,7 @@ def informed(coarse):
     error = 3e-3 * exact.current_mA
     noisy = exact.current_mA + error * np.random.default_rng(1).normal(size=BIAS.size)
     nothing = np.full(BIAS.size, np.nan)
-    data = Measurement(BIAS, noisy, nothing, nothing, nothing, current_error_mA=error)
+    data = Measurement(BIAS, noisy, nothing, nothing, nothing, further={"current_error_mA": error})
     stated = ("n_d", "c_kappa", "heater_length_um", "series_resistance_ohm")
     priors = {name: default_priors(coarse.probe)[name] for name in stated}
     return fit(data, coarse.probe, priors=priors, fixed={"a0": None, "a1": None})

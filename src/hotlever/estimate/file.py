@@ -51,12 +51,12 @@ from hotlever.estimate.uncertainty_budget import (
 from hotlever.files import read_json, without_nan
 from hotlever.lever.transient.waveform import Polyline, Sine
 from hotlever.measurement import MEASURED, Measurement
-from hotlever.measurement.data import OPTIONAL
+from hotlever.measurement.data import as_attributes
 from hotlever.probe import Probe
 from hotlever.probe.priors import SCALES, PriorUse, priors_of
 from hotlever.probe.probe_parameters import parameter_of, parameters_of
 from hotlever.probe.surroundings import Medium
-from hotlever.quantities import FITTED, Observable
+from hotlever.quantities import FITTED, QUANTITIES, Observable
 from hotlever.records import Number, StandardError, explained, stored_as
 from hotlever.text import value_with_error, with_unit
 from hotlever.types import Array
@@ -199,11 +199,7 @@ class MeasurementSection(Section):
     @classmethod
     def of(cls, measurement: Measurement) -> Self:
         """Return the section of a measurement."""
-        columns = {
-            column.symbol: values
-            for column in MEASURED
-            if (values := getattr(measurement, column.name)) is not None
-        }
+        columns = {QUANTITIES[name].symbol: values for name, values in measurement.columns.items()}
         return cls.holding(measurement, columns=columns)
 
     @model_validator(mode="after")
@@ -232,12 +228,12 @@ class MeasurementSection(Section):
 
     def measurement(self) -> Measurement:
         """Return the measurement."""
-        nothing, columns = np.full(self.columns["V_b"].size, np.nan), dict[str, Any]()
-        for column in MEASURED:
-            columns[column.name] = None if column.name in OPTIONAL else nothing
-            if column.symbol in self.columns:
-                columns[column.name] = self.columns[column.symbol]
-        return Measurement(**self.attributes_of(Measurement), **columns)
+        columns = {
+            column.name: self.columns[column.symbol]
+            for column in MEASURED
+            if column.symbol in self.columns
+        }
+        return Measurement(**as_attributes(columns), **self.attributes_of(Measurement))
 
 
 class CorrelationSection(Section):

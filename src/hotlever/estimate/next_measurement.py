@@ -38,7 +38,7 @@ from hotlever.lever.observables import knee_by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
-from hotlever.probe.priors import METERS, SCALES, THERMOMETER, Prior, as_known, known_beforehand
+from hotlever.probe.priors import SCALES, USUAL_SCALES, Prior, as_known, known_beforehand
 from hotlever.probe.probe_parameters import dimensions_of
 from hotlever.quantities import FITTED
 from hotlever.spieser2017 import RAMAN_ERROR_K
@@ -197,7 +197,7 @@ class NoiseLaw:
 def _usual_scales(measured: Iterable[str]) -> dict[str, Prior]:
     """Return the priors of scales of what was not measured yet, by their names."""
     return {
-        scale: Prior(1.0, THERMOMETER if observable == "tip" else METERS)
+        scale: Prior(1.0, USUAL_SCALES[scale])
         for scale, observable in SCALES.items()
         if observable not in measured
     }
@@ -374,9 +374,9 @@ class LinearisedLever:
         return values, np.concatenate([of_parameters, of_scales], axis=-1)
 
     def _size(self, observable: str, values: Array) -> Array:
-        """Return what a scale is one of, of values (observables, n): of the tip, its rise."""
-        observable_values = values[list(FITTED).index(observable)]
-        return observable_values - self.probe.circuit.base_temperature_K * (observable == "tip")
+        """Return what a scale is one of, of values (observables, n): of a temperature, its rise."""
+        base_K = self.probe.circuit.base_temperature_K * FITTED[observable].is_temperature
+        return values[list(FITTED).index(observable)] - base_K
 
     def dimensions(self, share: float) -> dict[str, Array]:
         """Return derivatives (q,) of the uncertain dimensions over errors that are a share of each.
@@ -467,7 +467,8 @@ class LinearisedLever:
         and no smaller than what models are off by.
         """
         size = self._size(observable, values)
-        law = NoiseLaw(RAMAN_ERROR_K, 0.0) if observable == "tip" else NoiseLaw(0.0, 1e-3)
+        of_a_tip = FITTED[observable].is_temperature
+        law = NoiseLaw(RAMAN_ERROR_K, 0.0) if of_a_tip else NoiseLaw(0.0, 1e-3)
         if share is not None:
             law = NoiseLaw(0.0, share)
         elif (counts := self.weights.get(observable, np.empty(0)) > 0).any():

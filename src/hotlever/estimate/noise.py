@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from hotlever.measurement import Measurement
 from hotlever.measurement.data import noise_about_neighbours
-from hotlever.probe.priors import METERS, SCALES, THERMOMETER, Prior, PriorShift
+from hotlever.probe.priors import SCALES, USUAL_SCALES, Prior, PriorShift
+from hotlever.quantities import OBSERVABLES
 from hotlever.types import Array
 
 
@@ -345,12 +346,11 @@ def errors_of_scales(
     for name, observable in SCALES.items():
         if observable not in observables:
             continue
-        magnitudes = np.abs(measurement.observable(observable))
-        share = METERS
-        if observable == "tip":
+        magnitudes, share = np.abs(measurement.observable(observable)), USUAL_SCALES[name]
+        if OBSERVABLES[observable].is_temperature:
             magnitudes = np.abs(magnitudes - base_temperature_K)
-            stated = measurement.raman_scale
-            share = THERMOMETER if stated is None else stated
+        if observable == "tip" and measurement.raman_scale is not None:
+            share = measurement.raman_scale
         if name in priors:
             share = priors[name].spread
         errors.append(CommonError(name, observable, share, share * magnitudes))

@@ -238,7 +238,7 @@ class Residuals:
     def drifting_zeros(self, values: Array, slopes: Array) -> list[str]:
         """Say of which observables the zeros seem to drift, beyond the scatter.
 
-        Current, reader and bridge have a zero, which gets a straight line over the rows. Residuals
+        What no thermometer shows has a zero, which gets a straight line over the rows. Residuals
         at the optimum without lines tell it, less what the parameters could take up instead.
         """
         if self.size <= slopes.shape[2] + 2 * len(self.rows):
@@ -246,7 +246,7 @@ class Residuals:
         order = np.linspace(-1.0, 1.0, self.present.shape[1])
         zeros = np.zeros((*self.present.shape, 2 * len(self.observables)))
         for row, name in enumerate(self.observables):
-            if name in ("current", "reader", "bridge"):
+            if not FITTED[name].is_temperature:
                 zeros[row, :, 2 * row] = 1.0
                 zeros[row, :, 2 * row + 1] = order
         zeros = zeros[:, :, np.any(zeros, axis=(0, 1))]

@@ -32,7 +32,7 @@ from hotlever.lever.equations import (
     balance_slopes,
 )
 from hotlever.lever.monitors import MonitorMap, with_meanings
-from hotlever.lever.observables import with_bridge
+from hotlever.lever.observables import with_following
 from hotlever.materials import Kind
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.parts import SECTIONS
@@ -118,7 +118,7 @@ def _dataset(
         *("ground_current_mA", "end_heat_mW", "air_heat_mW", "radiated_mW", "into_tip_mW"),
     )
     every = dict.fromkeys((*SWEEP_COLUMNS, *at_terminals, *more, *outputs))
-    ordered_columns = with_bridge(probe.circuit, {name: columns[name] for name in every})
+    ordered_columns = with_following(probe, {name: columns[name] for name in every})
     variables, coordinates = with_meanings(probe, ordered_columns, "bias")
     coordinates["bias"] = columns["bias_V"]
     if sensitivities is not None:

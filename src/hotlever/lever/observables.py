@@ -17,11 +17,42 @@ from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.continuation import continued
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.space import TIP, Constraint, Factors
+from hotlever.materials.laws import Evaluated
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
 from hotlever.probe.circuit import Circuit
 from hotlever.quantities import OBSERVABLES
 from hotlever.types import Array
+
+# What a lever shows by itself, by the names of `hotlever.quantities`, (n,) each: V_b, V_l, I_h, V_r
+# and T_tip; or how that changes with parameters, (n, p).
+Shown = Mapping[str, Array]
+
+
+def _bridge_voltage(circuit: Circuit, shown: Shown, names: Sequence[str] = ()) -> Evaluated:
+    """Return V_bridge (V), NaN without a bridge; see `FOLLOWING`."""
+    bias_V = shown["bias_V"]
+    by = {name: circuit.bridge_by(name, bias_V) for name in names}
+    return circuit.bridge_voltage(shown["lever_V"], bias_V), {
+        "lever_V": circuit.bridge_change(1.0, 0.0),
+        **by,
+    }
+
+
+#: Of observables that a lever does not show by itself, how they follow from what it shows and its
+#: circuit; with derivatives by what it shows and by some parameters, the bias being the same.
+FOLLOWING = {"bridge": _bridge_voltage}
+
+
+def _shown(circuit: Circuit, outputs: Array) -> dict[str, Array]:
+    lever_V, current_mA, reader_V, rise_K = outputs
+    return {
+        "bias_V": circuit.bias(lever_V, current_mA),
+        "lever_V": lever_V,
+        "current_mA": current_mA,
+        "reader_V": reader_V,
+        "tip_K": circuit.base_temperature_K + rise_K,
+    }
 
 
 def observed(circuit: Circuit, outputs: Array) -> Array:
@@ -38,22 +69,23 @@ def observed(circuit: Circuit, outputs: Array) -> Array:
     ndarray
         NaN of what probe or circuit do not have.
     """
-    lever_V, current_mA, reader_V, rise_K = outputs
-    values = {
-        "current": current_mA,
-        "reader": reader_V,
-        "bridge": circuit.bridge_voltage(lever_V, circuit.bias(lever_V, current_mA)),
-        "tip": circuit.base_temperature_K + rise_K,
+    shown = _shown(circuit, outputs)
+    return np.stack(
+        [
+            FOLLOWING[name](circuit, shown)[0] if name in FOLLOWING else shown[row.name]
+            for name, row in OBSERVABLES.items()
+        ]
+    )
+
+
+def with_following(probe: Probe, columns: Shown) -> dict[str, Array]:
+    """Return columns of a sweep or a history with the observables of a probe that follow."""
+    following = {
+        OBSERVABLES[name].name: follow(probe.circuit, columns)[0]
+        for name, follow in FOLLOWING.items()
+        if name in probe.observables
     }
-    return np.stack([values[name] for name in OBSERVABLES])
-
-
-def with_bridge(circuit: Circuit, columns: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the columns of a sweep or a history with the bridge voltage, if there is a bridge."""
-    if not circuit.has_bridge:
-        return dict(columns)
-    bridge_V = circuit.bridge_voltage(columns["lever_V"], columns["bias_V"])
-    return {**columns, OBSERVABLES["bridge"].name: bridge_V}
+    return {**columns, **following}
 
 
 def observed_by(circuit: Circuit, outputs: Array, slopes: Array, names: Sequence[str]) -> Array:
@@ -70,15 +102,28 @@ def observed_by(circuit: Circuit, outputs: Array, slopes: Array, names: Sequence
         The parameters, those of the circuit among them.
     """
     lever_V, current_mA, reader_V, rise_K = slopes
-    bias = circuit.bias(outputs[0], outputs[1])
-    of_divider = np.stack([circuit.bridge_by(name, bias) for name in names], axis=-1)
-    values = {
-        "current": current_mA,
-        "reader": reader_V,
-        "bridge": circuit.bridge_change(lever_V, 0.0) + of_divider,
-        "tip": rise_K + [float(name == "base_temperature_K") for name in names],
+    shown = _shown(circuit, outputs)
+    of_base = [float(name == "base_temperature_K") for name in names]
+    changes = {
+        "lever_V": lever_V,
+        "current_mA": current_mA,
+        "reader_V": reader_V,
+        "tip_K": rise_K + of_base,
     }
-    return np.stack([values[name] for name in OBSERVABLES])
+
+    def change(follow: Callable[..., Evaluated]) -> Array:
+        nothing = np.zeros(outputs.shape[1:])
+        _, by = follow(circuit, shown, names)
+        of_circuit = np.stack([by.get(name, nothing) for name in names], axis=-1)
+        moved = (np.reshape(by[own], (-1, 1)) * changes[own] for own in changes if own in by)
+        return sum(moved, start=of_circuit)
+
+    return np.stack(
+        [
+            change(FOLLOWING[name]) if name in FOLLOWING else changes[row.name]
+            for name, row in OBSERVABLES.items()
+        ]
+    )
 
 
 def at_fixed_bias(

@@ -129,9 +129,10 @@ def _columns(measurement: Measurement, circuit: Circuit | None) -> Iterator[_Col
     if ohm:
         lever = Circuit(series_resistance_ohm=ohm).lever_voltage(bias, current)
         yield _Column("V_l", lever, "I_h", current, of_source=True)
-    for name in ("reader", "bridge"):
-        symbol = OBSERVABLES[name].symbol
-        yield _Column(symbol, measurement.observable(name), "V_b", bias, of_source=False)
+    for name, meter in OBSERVABLES.items():
+        if meter.unit == "V":
+            shown = measurement.observable(name)
+            yield _Column(meter.symbol, shown, "V_b", bias, of_source=False)
 
 
 def _at_limit(measurement: Measurement, column: _Column, options: ComplianceOptions) -> Mask:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,18 @@ if TYPE_CHECKING:
 MEASURED = [measurand for symbol, measurand in MEASURANDS.items() if symbol not in ("t", "V_l")]
 
 
+def as_attributes(columns: Mapping[str, Array]) -> dict[str, Any]:
+    """Return the attributes of a `Measurement` that hold columns, (n,) each, of these names.
+
+    What has no column has no data.
+    """
+    nothing = np.full(columns["bias_V"].shape, np.nan)
+    always = ("bias_V", "current_mA", "reader_V", "tip_K", "tip_error_K")
+    own: dict[str, Any] = {name: columns.get(name, nothing) for name in always}
+    own["distance_um"] = columns.get("distance_um")
+    return own | {"further": {name: columns[name] for name in columns if name not in own}}
+
+
 @dataclass(frozen=True)
 class Measurement:
     """One lever's data, row by row as in the file; NaN where a cell was empty.
@@ -33,15 +46,11 @@ class Measurement:
     ----------
     bias_V, current_mA, reader_V, tip_K, tip_error_K : ndarray, shape (n,)
         The last is the standard error of each tip temperature, independent of the others'.
-    current_error_mA, reader_error_V : ndarray, shape (n,), or None
-        Standard errors of the others.
-    bridge_output_V, bridge_output_error_V : ndarray, shape (n,), or None
-        Of a Wheatstone bridge, with its standard error.
-    apex_K, surface_K : ndarray, shape (n,), or None
-        Temperatures of the apex and of the sample's surface under it, of a tip in contact: where a
-        sample begins to melt, the latter is its melting temperature.
-    apex_error_K, surface_error_K : ndarray, shape (n,), or None
-        Their standard errors.
+    further : dict of str to ndarray, shape (n,)
+        What else was measured, by the names of `hotlever.quantities`: standard errors, as
+        ``current_error_mA``, the voltage of a bridge, ``bridge_output_V``, and of a tip in contact
+        ``apex_K`` and ``surface_K``, the temperature of the sample under it. Where a sample begins
+        to melt, that is its melting temperature.
     distance_um : ndarray, shape (n,), or None
         From the apex to the sample; the tip touches it at 0 or less, and where nothing is said.
     series_resistance_ohm, base_temperature_K : float or None
@@ -79,12 +88,7 @@ class Measurement:
     path: str = ""
     sha256: str = ""
     notes: tuple[str, ...] = ()
-    current_error_mA: Array | None = None
-    reader_error_V: Array | None = None
-    apex_K: Array | None = None
-    apex_error_K: Array | None = None
-    surface_K: Array | None = None
-    surface_error_K: Array | None = None
+    further: dict[str, Array] = field(default_factory=dict)
     distance_um: Array | None = None
     gas_conductivity: float | None = None
     pressure_mbar: float | None = None
@@ -94,8 +98,13 @@ class Measurement:
     rows: Array | None = None
     time_us: Array | None = None
     waveform: Waveform | None = None
-    bridge_output_V: Array | None = None
-    bridge_output_error_V: Array | None = None
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """All that was measured, by name."""
+        own = {each.name: getattr(self, each.name) for each in fields(self)} | self.further
+        every = {column.name: own.get(column.name) for column in MEASURED}
+        return {name: values for name, values in every.items() if values is not None}
 
     @classmethod
     def in_time(
@@ -166,10 +175,9 @@ class Measurement:
         """
         circuit = circuit_of(sweep)
         names = ["bias_V", *(measurand.name for measurand in OBSERVABLES.values())]
-        columns: dict[str, Any] = {name: sweep[name].values for name in names if name in sweep}
+        columns = {name: sweep[name].values for name in names if name in sweep}
         return cls(
-            **columns,
-            tip_error_K=np.full(sweep.bias_V.size, np.nan),
+            **as_attributes(columns),
             series_resistance_ohm=circuit.series_resistance_ohm,
             base_temperature_K=circuit.base_temperature_K,
             medium=sweep.attrs["medium"],
@@ -180,8 +188,7 @@ class Measurement:
 
         Rising in bias, or in time; the current as in `current`.
         """
-        named = ((column.name, getattr(self, column.name)) for column in MEASURED)
-        columns = {name: values for name, values in named if values is not None}
+        columns = self.columns
         current = columns["current_mA"] = self.current(circuit)
         columns["lever_V"] = circuit.lever_voltage(self.bias_V, current)
         columns["power_mW"] = circuit.power(self.bias_V, current)
@@ -202,7 +209,7 @@ class Measurement:
         if name not in FITTED:
             raise unknown_name("observable", name, FITTED)
         symbol = f"{'d' * error}{FITTED[name].symbol}"
-        values: Array | None = getattr(self, MEASURANDS[symbol].name)
+        values = self.columns.get(MEASURANDS[symbol].name)
         return np.full(self.bias_V.shape, np.nan) if values is None else values
 
     def current(self, circuit: Circuit) -> Array:
@@ -221,18 +228,13 @@ class Measurement:
         """Return some rows, (n,) of bool, as a measurement."""
         own = {each.name: getattr(self, each.name) for each in fields(self)}
         columns: Any = {name: v[rows] for name, v in own.items() if isinstance(v, np.ndarray)}
-        return replace(self, **columns)
+        further = {name: values[rows] for name, values in self.further.items()}
+        return replace(self, **columns, further=further)
 
     @property
     def observables(self) -> tuple[str, ...]:
         """Names of the observables that have any data."""
         return tuple(name for name in FITTED if np.isfinite(self.observable(name)).any())
-
-
-#: Columns that a measurement may be without; of the others it has NaN where nothing was measured.
-OPTIONAL = [
-    column.name for column in MEASURED if getattr(Measurement, column.name, MEASURED) is None
-]
 
 
 def with_measured_circuit(

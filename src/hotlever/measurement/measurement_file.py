@@ -30,8 +30,8 @@ from hotlever.measurement.columns import (
 from hotlever.measurement.compliance import without_rows_at_compliance
 from hotlever.measurement.data import (
     MEASURED,
-    OPTIONAL,
     Measurement,
+    as_attributes,
     colder_than_base,
     noise_about_neighbours,
 )
@@ -719,10 +719,9 @@ def read_measurement(
     more = len(notes) - most
     if more > 0:
         notes[most:] = [f"{path}: {more} more such notes"]
-    rows: dict[str, Any] = {column.name: contents.values[column.symbol] for column in MEASURED}
-    rows |= {name: None for name in OPTIONAL if np.isnan(rows[name]).all()}
+    every = {column.name: contents.values[column.symbol] for column in MEASURED}
     measurement = Measurement(
-        **rows,
+        **as_attributes({name: own for name, own in every.items() if not np.isnan(own).all()}),
         **contents.settings,
         time_us=contents.values["t"] if "t" in quantities else None,
         waveform=waveform,

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from hotlever.measurement.data import MEASURED, Measurement
+from hotlever.measurement.data import Measurement, as_attributes
 from hotlever.quantities import FITTED
 from hotlever.types import Array, Index, Mask
 
@@ -143,8 +142,7 @@ def averaged(measurement: Measurement, robust: bool = False, many: int = 2000) -
     few = measurement.bias_V.size <= many
     if few or measurement.rows is not None or measurement.time_us is not None:
         return measurement
-    columns = {column.name: getattr(measurement, column.name) for column in MEASURED}
-    columns = {name: values for name, values in columns.items() if values is not None}
+    columns = measurement.columns
     step = _steps(measurement.bias_V, many // 2)
     if measurement.distance_um is not None:
         # other distances from a sample are other states of the lever
@@ -166,11 +164,11 @@ def averaged(measurement: Measurement, robust: bool = False, many: int = 2000) -
     def mean(values: Array) -> Array:
         return np.asarray(np.bincount(group, values)[order] / rows)
 
-    means: Any = {
+    means = {
         name: np.sqrt(mean(values**2) / rows) if "error" in name else mean(values)
         for name, values in used.items()
     }
-    return replace(measurement, **means, rows=rows)
+    return replace(measurement, **as_attributes(means), rows=rows)
 
 
 def note_on_averages(whole: Measurement, used: Measurement) -> list[str]:

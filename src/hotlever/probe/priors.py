@@ -31,6 +31,7 @@ from hotlever.probe.chip import on_usual_chip
 from hotlever.probe.parts import ProbeParts, ProbesParts
 from hotlever.probe.probe_parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.shapes import EDGE_BIAS
+from hotlever.quantities import OBSERVABLES
 from hotlever.records import StandardError
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 from hotlever.text import with_unit
@@ -43,15 +44,14 @@ LAWS = {law: tuple(departure.names) for law, departure in DEPARTURES.items()} | 
     "heat_capacity": ("heat_capacity_scale",),
 }
 #: Scales of what is shown, and the observable that each belongs to.
-SCALES = {
-    "current_scale": "current",
-    "reader_scale": "reader",
-    "bridge_scale": "bridge",
-    "raman_scale": "tip",
-}
+SCALES = {row.scale: observable for observable, row in OBSERVABLES.items() if row.scale}
 #: Their standard deviations where nothing is said, relative: of a meter, and of a thermometer, by
 #: the rise above the base (the hot plate's own accuracy, gradients in the laser's spot).
 METERS, THERMOMETER = 1e-3, 0.015
+USUAL_SCALES = {
+    scale: THERMOMETER if OBSERVABLES[observable].is_temperature else METERS
+    for scale, observable in SCALES.items()
+}
 #: How a spread is written: in the parameter's unit, as a share of its value, or as a factor.
 Written = Literal["unit", "share", "factor"]
 

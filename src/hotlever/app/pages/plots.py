@@ -133,7 +133,7 @@ class MeasuredPlots:
         self._plots: dict[str, tuple[ui.element, ui.plotly]] = {}
         # once for all measurements: a browser takes long to make them
         with side_by_side():
-            for name in ("current", "reader", "bridge", "tip"):
+            for name in OBSERVABLES:
                 with ui.element("div") as around:
                     layout = axes("", title_of(OBSERVABLES[name].name), 240, normal="xy")
                     plot = plotted([data, model], layout, f"Measured {name}, and the lever fitted")

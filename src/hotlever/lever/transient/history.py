@@ -15,7 +15,7 @@ from hotlever.errors import ComputationError, HistoryEndError, InputError
 from hotlever.lever.dataset import in_a_file, probe_attributes, range_notes
 from hotlever.lever.lever import State
 from hotlever.lever.monitors import MonitorMap, with_meanings
-from hotlever.lever.observables import with_bridge
+from hotlever.lever.observables import with_following
 from hotlever.lever.transient.problem import MONITORED, TransientProblem
 from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
 from hotlever.lever.transient.waveform import Piece, Waveform
@@ -293,7 +293,7 @@ def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Datase
 
 def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Array]) -> xr.Dataset:
     """Return the dataset of a history of its columns, with notes on what it leaves out."""
-    time, columns = columns["time_us"], with_bridge(lever.circuit, columns)
+    time, columns = columns["time_us"], with_following(lever.probe, columns)
     at_rest = lever.medium == "air" and not lever.equations.heat_in_air.size
     air_note = (
         "the air of this lever answers at once, as if it were at rest at every moment: what it "
