@@ -121,7 +121,7 @@ class LeverEquations:
         self.circuit, self.base_temperature_K = circuit, circuit.base_temperature_K
         self.terminals = Terminals(space, circuit)
         self.laws = laws(space, materials, self.base_temperature_K, physics, self.motions)
-        self.rim = space.rim if physics.radiation else Rim.nothing(space.size)
+        self.rim = space.rim if physics.at_surface else Rim.nothing(space.size)
         self.contact = contact
         self.footprint = Rim.nothing(space.size) if contact is None else space.footprint
         self._polarity = 1.0

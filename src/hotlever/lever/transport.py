@@ -149,7 +149,7 @@ class Properties:
         """Return those of nothing, with the effects that count."""
         names = ["kappa", "sigma"]
         names += ["beta", "gamma"] if physics.thermoelectric else []
-        names += ["emission"] if physics.radiation else []
+        names += ["emission"] if physics.at_surface else []
         return cls(**{name: np.zeros(shape) for name in names})
 
     def reversed(self) -> Properties:
@@ -194,7 +194,7 @@ def weights_of_properties(
     if physics.thermoelectric:
         beta = along_V[0] - tests.T * (grad_T * grad_V).sum(axis=0) + T * along_T[1]
         found = replace(found, beta=at * beta, gamma=at * T * along_T[0])
-    return replace(found, emission=at * tests.T) if physics.radiation else found
+    return replace(found, emission=at * tests.T) if physics.at_surface else found
 
 
 def tangent_of(fields: Fields, properties: Properties, by_T: Properties) -> Tangent:

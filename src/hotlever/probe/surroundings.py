@@ -117,6 +117,11 @@ class Physics(Record):
         return cls(**dict.fromkeys(effects, True))
 
     @property
+    def at_surface(self) -> bool:
+        """Whether heat leaves a lever by itself at its surface, as it does by radiation."""
+        return self.radiation
+
+    @property
     def effects(self) -> tuple[str, ...]:
         """Those that are on."""
         return tuple(name for name, on in self if on)
