@@ -60,10 +60,10 @@ class AirLoss:
         size: int,
         add_losses: Callable[[Array, Array], None] | None = None,
     ) -> None:
-        self._take(operator)
-        self._nothing_around = HeatInAir.nothing(size)
         held = unknowns < 0
         self._held = np.where(held, shares, 0.0).sum(axis=1)
+        self._take(operator)
+        self._nothing_around = HeatInAir.nothing(size)
         rows = np.broadcast_to(np.arange(len(unknowns))[:, None], unknowns.shape)
         self.sampling = csr_matrix(
             (shares[~held], (rows[~held], unknowns[~held])), shape=(len(unknowns), size)
@@ -74,6 +74,8 @@ class AirLoss:
     def _take(self, operator: Any) -> None:
         self.operator, self.filling = operator, operator.filling
         self._local = operator.matrix @ np.ones(len(operator.sites))
+        # the matrix is symmetric: these rows tell all of the heat, and what leg ends have of it
+        self._heats = np.stack([self._local, operator.matrix @ self._held])
         self.rest = operator.less(self._local)
 
     @classmethod
@@ -121,8 +123,8 @@ class AirLoss:
 
     def heat(self, theta: Array) -> tuple[Array, Array]:
         """Return the heat lost (mW) by each state, and its part that is tested at the leg ends."""
-        heat = self.operator.matrix @ theta
-        return np.asarray(heat.sum(axis=0)), np.asarray(self._held @ heat)
+        whole, at_ends = self._heats @ theta
+        return np.asarray(whole), np.asarray(at_ends)
 
     def add_local_loss(self, element_matrices: Array, kappa: Array) -> None:
         """Add a loss ∝ the temperature at each site to the matrices of elements.
@@ -132,9 +134,14 @@ class AirLoss:
         if self._add_losses is not None:
             self._add_losses(element_matrices, self._local * kappa)
 
-    def solver(self, factors: LinearSolver, kappa: Array, taken_up: Array | None) -> LinearSolver:
-        """Return what solves the whole linear system, of the factors of its local part."""
-        return AirSolver(factors, self, kappa, taken_up) if len(kappa) else factors
+    def solver(
+        self, factors: LinearSolver, kappa: Array, taken_up: Array | None, left: float
+    ) -> LinearSolver:
+        """Return what solves the whole linear system, of the factors of its local part.
+
+        A share of a right-hand side may be left.
+        """
+        return AirSolver(factors, self, kappa, taken_up, left) if len(kappa) else factors
 
 
 class ReducedAir:
@@ -194,7 +201,12 @@ class AirSolver:
     """
 
     def __init__(
-        self, factors: LinearSolver, air: AirLoss, kappa: Array, taken_up: Array | None = None
+        self,
+        factors: LinearSolver,
+        air: AirLoss,
+        kappa: Array,
+        taken_up: Array | None = None,
+        left: float = 1e-5,
     ) -> None:
         sites = len(kappa)
 
@@ -217,8 +229,8 @@ class AirSolver:
             return spread(kappa * (air.rest @ t[:sites].astype(air.rest.dtype)), t)
 
         self._ways = {
-            False: _Directions(lambda b: factors.solve(b), lost, sampled),
-            True: _Directions(lambda b: factors.solve(b, True), lost_transposed, sampled),
+            False: _Directions(lambda b: factors.solve(b), lost, sampled, left),
+            True: _Directions(lambda b: factors.solve(b, True), lost_transposed, sampled, left),
         }
 
     def solve(self, right_hand_side: Array, transposed: bool = False) -> Array:
@@ -238,7 +250,7 @@ class AirSolver:
 class _Directions:
     """Generalised conjugate residuals between the sites, for one of the two systems.
 
-    At most `most` directions are stored.
+    A share of the right-hand side may be left. At most `most` directions are stored.
     """
 
     def __init__(
@@ -246,10 +258,11 @@ class _Directions:
         near: Callable[[Array], Array],
         lost: Callable[[Array], Array],
         sampled: Callable[[Array], Array],
+        left: float,
         most: int = 200,
     ) -> None:
         self._near, self._lost, self._sampled = near, lost, sampled
-        self._most = most
+        self._left, self._most = left, most
         # per direction: its image between the sites (orthonormal), and the change of x
         self._images = self._changes = np.empty((0, 0))
         self._count = 0
@@ -258,9 +271,7 @@ class _Directions:
         """Solve for one right-hand side."""
         x = self._near(right_hand_side)
         residual = self._sampled(x)
-        # what is left is small beside that of a kept Jacobian, and both are removed by the next
-        # step
-        goal = 1e-5 * np.linalg.norm(residual)
+        goal = self._left * np.linalg.norm(residual)
         used = restarts = 0
         while True:
             if self._count:
@@ -279,7 +290,9 @@ class _Directions:
                     f"a linear system in air was not solved with {restarts} times "
                     f"{self._most} directions"
                 )
-            self._add(residual)
+            # of unit length: single precision has no digits left of next to nothing, and the
+            # direction would stay for others
+            self._add(residual / np.linalg.norm(residual))
 
     def _add(self, direction: Array) -> None:
         count = self._count

@@ -285,11 +285,18 @@ class LeverEquations:
         balance[-1] = circuit.bias(x[-1], balance[-1]) - bias_V
         return balance
 
-    def factorised(self, x: Array, constraint: Constraint = TIP, per_us: float = 0.0) -> Factors:
+    def factorised(
+        self,
+        x: Array,
+        constraint: Constraint = TIP,
+        per_us: float = 0.0,
+        left: float = 1e-5,
+    ) -> Factors:
         """Return the factorised Jacobians of states, with the row of a constraint last.
 
         They are those of `balance` and so many times (1/µs) that of the heat stored, with what the
-        air takes up where things change so fast.
+        air takes up where things change so fast. In air a solve may leave a share of its right-hand
+        side: by default so little that what is found with the factors is as good as exact.
         """
         tangent = self.tangent(x)
         if per_us:
@@ -297,7 +304,7 @@ class LeverEquations:
             tangent = replace(tangent, heat_source_T=tangent.heat_source_T + stored)
         taken_up = self.heat_in_air.taken_up(per_us) if per_us else None
         slopes = {points: by["T"] for points, (_, by) in self.losses(x).items()}
-        surface = SurfaceTangent(self.kirchhoff(x)[1], taken_up, slopes)
+        surface = SurfaceTangent(self.kirchhoff(x)[1], taken_up, slopes, left)
         return self.space.factorised(tangent, surface, constraint, self.terminals.behind)
 
     # --- derivatives --------------------------------------------------------------------------

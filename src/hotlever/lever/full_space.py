@@ -247,7 +247,7 @@ class FullSpace(Space):
                 self._losses_at(name).add_to(matrices, slopes[:, state])
             own_constraint = constraint.among(state)
             factors = self._jacobian.factorised(matrices, conductance, own_constraint)
-            solvers.append(self.air.solver(factors, kappa, surface.taken_up))
+            solvers.append(self.air.solver(factors, kappa, surface.taken_up, surface.left))
         return SparseFactors(solvers)
 
 

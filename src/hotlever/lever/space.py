@@ -58,11 +58,14 @@ class SurfaceTangent:
         What the air takes up itself, see `hotlever.air.stores`; None at rest.
     at_points : dict of str to ndarray, shape (points, n)
         Slopes of what leaves at each point of ``rim`` or ``footprint`` (mW/K); those that count.
+    left : float
+        Share of a right-hand side that solves with the air may leave.
     """
 
     kappa: Array
     taken_up: Array | None
     at_points: Mapping[str, Array]
+    left: float
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from hotlever.air.operator import PanelledAir
 from hotlever.air.stores import HeatInAir
 from hotlever.lever import Lever
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.lever import COARSE
+from hotlever.lever.lever import COARSE, State
 from hotlever.lever.transient import pulse, simulate, sine, step
 from hotlever.lever.transient.frequency_domain import harmonics, spectrum
 from hotlever.lever.transient.history import integrate
@@ -87,6 +87,14 @@ def all_panels(state):
 
 def answer(data):
     return data.tip_per_bias_K_per_V * np.exp(1j * np.radians(data.tip_per_bias_deg))
+
+
+def test_a_lever_that_has_cooled_has_the_time_constants_of_a_cold_one(state):
+    scale = np.where(state.lever.space.is_temperature, 1e-4, 1e-42)[:, None]
+    times, _ = slowest_modes(State(state.lever, scale * state.x))
+
+    cold, _ = slowest_modes(State(state.lever, np.zeros_like(state.x)))
+    np.testing.assert_allclose(times, cold, rtol=1e-4)
 
 
 def test_small_signals_are_those_of_all_panels(state, all_panels, answering_at_once):

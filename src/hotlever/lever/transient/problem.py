@@ -102,8 +102,9 @@ class TransientProblem:
         self, equations: LeverEquations, circuit: Circuit, bias: Callable[[float], float]
     ) -> None:
         self.equations, self._circuit, self._bias = equations, circuit, bias
+        # the rows of the stores are linear: a correction leaves nothing there
         self._air, self._own = equations.heat_in_air, len(equations.scale)
-        self.scale = np.concatenate([equations.scale, np.ones((self._air.size, 1))])
+        self.scale = np.concatenate([equations.scale, np.full((self._air.size, 1), np.inf)])
 
     def begin(self, state: State) -> Array:
         """Return the unknowns at a state."""
@@ -164,7 +165,9 @@ class TransientProblem:
     def factorised(self, x: Array, rate: float) -> InCircuit | WithStores:
         """Return the factorised Jacobian of ``rate × storage + residual``."""
         lever, _ = self.parts(x)
-        factors = self.equations.factorised(lever, LEVER, rate)
+        # Newton's method and refinement remove what solves leave, which is less than what a kept
+        # Jacobian does
+        factors = self.equations.factorised(lever, LEVER, rate, left=1e-3)
         gradient = self.equations.observed_gradient(lever)
         driven = InCircuit(factors, self._circuit.bias(gradient[..., 0], gradient[..., 1]))
         return WithStores(driven, self._air, rate) if self._air.size else driven

@@ -200,7 +200,8 @@ class Problem(Protocol):
     Attributes
     ----------
     scale : ndarray, shape (size + 1, 1)
-        Size of one unit of each unknown, by which kelvin and volts compare.
+        Size of one unit of each unknown, by which kelvin and volts compare; infinite of one whose
+        row is linear, and whose size does not matter.
     """
 
     scale: Array
