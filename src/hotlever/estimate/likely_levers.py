@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,7 +46,8 @@ class DrawOptions:
     accuracy : float
         Standard deviations within which one has to be found; else it does not count.
     fewest_effective : float
-        Levers of equal weight that there have to be; otherwise the linearised ones are taken.
+        Levers of equal weight that there have to be; otherwise the linearised ones are taken, and
+        `LikelyLevers.first_order` says so.
     """
 
     count: int = 2000
@@ -53,7 +55,7 @@ class DrawOptions:
     seed: int = 0
     places: int = 200
     together: int = 1_000_000
-    rounds: int = 15
+    rounds: int = 60
     accuracy: float = 0.05
     fewest_effective: float = 400.0
 
@@ -84,6 +86,17 @@ class Knowledge:
     measured: Array
     weights: Array
     scales: Array
+
+
+class Drawn(NamedTuple):
+    """Levers that were drawn: their points, (count, p), and weights, (count,).
+
+    To first order these are normal where data say something.
+    """
+
+    points: Array
+    weights: Array
+    first_order: bool
 
 
 class LikelyLevers:
@@ -128,13 +141,13 @@ class LikelyLevers:
     @cached_property
     def _ramps(self) -> tuple[Array, Array]:
         """The bias (V) that a slow ramp has reached, and the tip (K), along all of them."""
-        values = self._coordinates.values(self._point + self._drawn[0])
+        values = self._coordinates.values(self._point + self._drawn.points)
         outputs, ramp = self._curves(values)
         return ramp, outputs[TIP_RISE] + self._circuit(values).base_temperature_K
 
     def quantiles(self, bias_V: Array, shares: Array) -> Array:
         """Return below what (K) shares (m,) of the tips lie at some biases (V), (m, n)."""
-        tips, weights = self.tips(bias_V), self._drawn[1]
+        tips, weights = self.tips(bias_V), self._drawn.weights
         order = np.argsort(tips, axis=0)
         share = np.cumsum(weights[order], axis=0) / weights.sum()
         rows = [np.searchsorted(column, shares).clip(max=len(tips) - 1) for column in share.T]
@@ -144,12 +157,17 @@ class LikelyLevers:
         """Return below what (K) 2.5, 50 and 97.5 % of the tips lie at some biases (V), (3, n)."""
         return self.quantiles(bias_V, np.array([0.025, 0.5, 0.975]))
 
+    @property
+    def first_order(self) -> bool:
+        """Whether they are likely to first order alone, since too few of those drawn counted."""
+        return self._drawn.first_order
+
     # --- drawing ----------------------------------------------------------------------------------
 
     @cached_property
     @one_blas_thread
-    def _drawn(self) -> tuple[Array, Array]:
-        """The points of all levers, (count, p), and their weights, (count,)."""
+    def _drawn(self) -> Drawn:
+        """The levers."""
         options, known, count = self._options, self._known, self._point.size
         size = known.before.shape[1]
         (values,), (jacobian,) = self._residuals(np.zeros((1, size)))
@@ -163,7 +181,7 @@ class LikelyLevers:
         axes = np.linalg.cholesky(np.linalg.inv(information))
         many = options.count if values.size else options.count_of_priors
         errors = np.random.default_rng(options.seed).standard_normal((many, size))
-        linear = (errors @ axes.T)[:, :count], np.ones(many)
+        linear = Drawn((errors @ axes.T)[:, :count], np.ones(many), bool(values.size))
         if not values.size:
             return linear
         each = max(1, options.together // jacobian.size)
@@ -177,7 +195,7 @@ class LikelyLevers:
         weights = np.exp(logarithms - logarithms.max())
         if weights.sum() ** 2 < options.fewest_effective * float(weights @ weights):
             return linear
-        return (places @ axes.T)[:, :count], weights
+        return Drawn((places @ axes.T)[:, :count], weights, False)
 
     def _found(
         self, errors: Array, values: Array, left: Array, jacobian: Array, axes: Array
@@ -263,15 +281,14 @@ class LikelyLevers:
         surrogate, bias = self._surrogate, np.abs(self._known.bias_V)
         count, size = parameters.shape
         along_branch, ramp = self._curves(parameters)
+        series = np.reshape(self._circuit(parameters).series_kohm, (-1, 1))
         grid = np.arange(len(ramp), dtype=float)
         place = np.stack([np.interp(bias, reached, grid) for reached in ramp.T])
-        low, lever = np.minimum(place.astype(int), grid.size - 2), np.arange(count)[:, None]
-        part = (place - low)[..., None]
-        start, end = (np.moveaxis(along_branch[:, low + one, lever], 0, -1) for one in (0, 1))
-        along, outputs = end - start, start + part * (end - start)
-        powers = self._powers[low] + part[..., None] * (self._powers[low + 1] - self._powers[low])
+        low = np.minimum(place.astype(int), grid.size - 2)
+        part, outputs, along = _reached(along_branch, low, bias, series)
+        part = part[..., None, None]
+        powers = (1.0 - part) * self._powers[low] + part * self._powers[low + 1]
         by = outputs[..., None] * powers / surrogate.unit
-        series = np.reshape(self._circuit(parameters).series_kohm, (-1, 1))
         bias_by = by[..., 0, :] + series[..., None] * by[..., 1, :]
         if "series_resistance_ohm" in surrogate.names:
             bias_by[..., surrogate.names.index("series_resistance_ohm")] += 1e-3 * outputs[..., 1]
@@ -296,3 +313,56 @@ class LikelyLevers:
             for each in zip(*of_each, parameters, strict=True)
         ]
         return np.stack([each for each, _ in pairs]), np.stack([each for _, each in pairs])
+
+
+def _reached(
+    curves: Array, low: Array, bias_V: Array, series_kohm: Array
+) -> tuple[Array, Array, Array]:
+    """Return where between two places levers reach biases, what is shown there, and its slope.
+
+    By the cubic through four places: where chords meet, the search for levers stuck.
+
+    Parameters
+    ----------
+    curves : ndarray, shape (4, places, n)
+        What levers show, V_l and I_h first.
+    low : ndarray of int, shape (n, m)
+        The places behind which, and before the next, they reach the biases.
+    bias_V : ndarray, shape (m,)
+    series_kohm : ndarray, shape (n, 1) or (1, 1)
+
+    Returns
+    -------
+    part : ndarray, shape (n, m)
+        How far behind the lower place, of the distance to the next.
+    shown, along : ndarray, shape (n, m, 4)
+        What is shown, and its change by one place.
+    """
+    first = np.clip(low - 1, 0, curves.shape[1] - 4)
+    lever = np.arange(len(low))[:, None]
+    differences, rest = [], np.stack([curves[:, first + place, lever] for place in range(4)])
+    for _ in range(4):
+        differences.append(rest[0])
+        rest = np.diff(rest, axis=0)
+
+    def cubic(away: Array) -> tuple[Array, Array]:
+        value, once, twice, thrice = differences
+        return (
+            value + away * (once + (away - 1.0) / 2.0 * (twice + (away - 2.0) / 3.0 * thrice)),
+            once + (away - 0.5) * twice + (away * (away / 2.0 - 1.0) + 1.0 / 3.0) * thrice,
+        )
+
+    def bias(shown: Array) -> Array:
+        return np.asarray(shown[0] + series_kohm * shown[1])
+
+    start = low - first
+    lower, upper = (bias(curves[:, low + one, lever]) for one in (0, 1))
+    rise = np.maximum(upper - lower, np.finfo(float).eps)
+    part = np.clip((bias_V - lower) / rise, 0.0, 1.0)
+    for _ in range(3):
+        shown, along = cubic(start + part)
+        # the cubic may be flat near a fold, where the chord is not
+        steepness = np.maximum(bias(along), 0.1 * rise)
+        part = np.clip(part - (bias(shown) - bias_V) / steepness, 0.0, 1.0)
+    shown, along = cubic(start + part)
+    return part, np.moveaxis(shown, 0, -1), np.moveaxis(along, 0, -1)

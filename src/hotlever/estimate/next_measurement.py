@@ -491,6 +491,8 @@ Aim = Literal["tip", "knee"]
 KINDS = {"bias": (), "reader": ("reader",), "spectra": ("tip",), "dimensions": ()}
 #: With this probability the tip is no hotter than is said.
 SURE = 0.99
+#: What is said where levers were not found otherwise.
+FIRST_ORDER = "how hot the tip may get is known to first order alone; take small steps"
 
 
 @dataclass(frozen=True)
@@ -708,6 +710,8 @@ def plan_next(
     each = (candidates[number].rows for number in chosen)
     after = list(accumulate(each, Information.with_rows, initial=lever.information))
     stays, notes = _errors_that_stay(lever, calibration, np.append(bias, aim_V))
+    if lever.likely.first_order:
+        notes.append(FIRST_ORDER)
     of_aim = np.array([information.stderr(gradient) for information in after])
     stderr = np.hypot(of_aim, stays[-1])
     proposed = [candidates[number] for number in chosen]
@@ -806,9 +810,12 @@ def hottest_tips(lever: LinearisedLever, bias: Array, likely: LikelyLevers) -> A
     likely : LikelyLevers
         Drawn from what is known of it.
     """
-    (highest,), tip_K = likely.quantiles(bias, np.array([SURE])), lever.tip(bias)[0]
-    away = np.maximum(highest - tip_K, 0.0)
-    highest = tip_K + np.hypot(away, float(ndtri(SURE)) * _error_of_model(lever, bias))
+    (highest,), (tip_K, slopes) = likely.quantiles(bias, np.array([SURE])), lever.tip(bias)
+    away, sure = np.maximum(highest - tip_K, 0.0), float(ndtri(SURE))
+    if likely.first_order:
+        # neither the levers nor the tangent are sure to be the hotter ones
+        away = np.maximum(away, sure * lever.information.stderr(slopes))
+    highest = tip_K + np.hypot(away, sure * _error_of_model(lever, bias))
     return np.where(highest < lever.hottest_K, highest, np.inf)
 
 

@@ -73,11 +73,15 @@ class RampOptions:
 
 @dataclass(frozen=True)
 class Step:
-    """A bias to take, with the tip temperature expected there, and one not exceeded with 99 %."""
+    """A bias to take, with the tip temperature expected there, and one not exceeded with 99 %.
+
+    The latter may be known to first order alone, `hotlever.estimate.likely_levers`.
+    """
 
     bias_V: float
     tip_K: float
     tip_limit_K: float
+    first_order: bool = False
 
 
 class Ramp:
@@ -228,8 +232,9 @@ class Ramp:
         )
         if bias is None:
             return None
-        at = np.array([bias])
-        return Step(bias, self.known.tip(at)[0].item(), self._tip_limits(at).item())
+        at, known = np.array([bias]), self.known
+        limit = self._tip_limits(at).item()
+        return Step(bias, known.tip(at)[0].item(), limit, known.likely.first_order)
 
     @property
     def tells(self) -> bool:

@@ -156,7 +156,7 @@ def _row(number: int, reading: Reading, step: Step) -> str:
     """Return a row in words."""
     return (
         f"{number:3d}  {reading.bias_V:7.4g} V  {reading.current_mA:8.5g} mA   tip expected at "
-        f"{step.tip_K:.0f} K, below {step.tip_limit_K:.0f} K"
+        f"{step.tip_K:.0f} K, below {step.tip_limit_K:.0f} K{' to first order' * step.first_order}"
     )
 
 
