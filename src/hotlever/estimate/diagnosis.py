@@ -638,8 +638,19 @@ class Diagnosis:
 
     @cached_property
     def _without(self) -> _Explanation:
-        """What is left unexplained without a hypothesis."""
-        return self._again(self._as_stated)
+        """What is left unexplained without a hypothesis.
+
+        All rows at once may lead away from a lever of which little is known. Its colder half tells
+        its doping, as the search has it that begins afar, and the rest goes on from there.
+        """
+        explained = self._again(self._as_stated)
+        if self._is_near(explained):
+            return explained
+        cold = self._rows.bias_V <= np.median(self._rows.bias_V)
+        colder = Hypothesis(lambda _: "", lambda rows, _: replace(rows, included=cold))
+        grown = self._again(self._estimated(colder, 0.0, self._curve))
+        grown = self._again(replace(grown, hypothesis=explained.hypothesis, squares=np.inf))
+        return _likeliest_first([explained, grown])[0]
 
     @cached_property
     def _as_stated(self) -> _Explanation:
@@ -690,10 +701,13 @@ class Diagnosis:
     def _again(self, explained: _Explanation) -> _Explanation:
         """Solve the lever where a search has led, and go on from there."""
         curve = explained.curve
-        values = curve.probe.values(curve.names) * np.exp(explained.away)
+        stated, every = curve.probe.values(curve.names), parameters_of(curve.probe)
+        # no lever is where a search went beyond what a parameter may be: the nearest one serves
+        bounds = np.array([every[name].bounds for name in curve.names]).T
+        values = np.clip(stated * np.exp(explained.away), *bounds)
         try:
             estimate = curve.probe.with_(**dict(zip(curve.names, values.tolist(), strict=True)))
-            curve = replace(self._solved(estimate), probe=curve.probe, at=explained.away)
+            curve = replace(self._solved(estimate), probe=curve.probe, at=np.log(values / stated))
         except (InputError, ComputationError):
             return explained
         again = self._estimated(explained.hypothesis, explained.unknown, curve)

@@ -54,11 +54,16 @@ class Rows:
         Near a fold the states at a bias move without limit as parameters change; their derivatives
         count as if the bias rose along the branch by at least this share of its mean slope up to
         there.
+    shortfall : float
+        Where a branch ends below a bias, what its end shows counts less by this much for each
+        percent of the bias that is beyond it (%). At one per cent, levers without a state at the
+        last rows described currents that fall there.
     """
 
     bias_V: Array
     measured: Array | None = None
     steepness: float = 0.03
+    shortfall: float = 3.0
 
     def states(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return u of the states that the rows are compared with, and how far these fall short.
@@ -80,7 +85,7 @@ class Rows:
     def values(self, branch: Branch, circuit: Circuit) -> Array:
         """Return the observables of the states, (observables, n); see `states`."""
         u, short = self.states(branch, circuit)
-        return observed(circuit, _shown(branch, u, short))
+        return observed(circuit, self._shown(branch, u, short))
 
     def differentiated(
         self, branch: Branch, by_parameter: Array, circuit: Circuit, names: Sequence[str]
@@ -108,12 +113,22 @@ class Rows:
         if ends.size:
             # the end of a branch stays where it is, to first order; what it lacks in bias changes
             bias_by = circuit.bias(by_state[ends, 0], by_state[ends, 1]) + of_circuit[ends]
-            less = (short[ends] ** 2 / self.bias_V[ends])[:, None] * bias_by
+            less = self.shortfall * (short[ends] ** 2 / self.bias_V[ends])[:, None] * bias_by
             slopes[:, ends] = np.moveaxis(by_state[ends], 1, 0)
-            slopes[:TIP_RISE, ends] *= (2.0 - short[ends])[:, None]
+            slopes[:TIP_RISE, ends] *= self._left(short[ends])[:, None]
             slopes[:TIP_RISE, ends] += outputs[:TIP_RISE, ends, None] * less
-        outputs = _shown(branch, u, short)
+        outputs = self._shown(branch, u, short)
         return observed(circuit, outputs), observed_by(circuit, outputs, slopes, names)
+
+    def _shown(self, branch: Branch, u: Array, short: Array) -> Array:
+        """Return V_l, I_h, V_r and the tip's rise at some u, (4, n), less where they fall short."""
+        outputs = branch.curve(u).T.copy()
+        outputs[:TIP_RISE] *= self._left(short)
+        return outputs
+
+    def _left(self, short: Array) -> Array:
+        """Return the share of what the end of a branch shows that counts beyond it."""
+        return 1.0 - self.shortfall * (short - 1.0)
 
     def _nearest(self, branch: Branch, circuit: Circuit) -> tuple[Array, Array]:
         """Return the states nearest to what was measured; see `states`."""
@@ -160,16 +175,6 @@ class Rows:
         least = self.steepness * np.abs(self.bias_V) / np.maximum(np.abs(u), 1e-9)
         flat = np.abs(slope) < least
         along[flat, 0] += (np.where(slope < 0, -least, least) - slope)[flat]
-
-
-def _shown(branch: Branch, u: Array, short: Array) -> Array:
-    """Return V_l, I_h, V_r and the rise of the tip at some u, (4, n), less where they fall short.
-
-    Each percent of the bias that is beyond an end takes one away.
-    """
-    outputs = branch.curve(u).T.copy()
-    outputs[:TIP_RISE] *= 2.0 - short
-    return outputs
 
 
 class ContactTemperatures:
