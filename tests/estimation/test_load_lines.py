@@ -50,12 +50,12 @@ def test_rows_stay_on_their_part_of_a_branch_that_folds(folded):
 def test_beyond_its_highest_bias_a_lever_shows_less_than_at_its_end(folded):
     circuit = folded.equations.circuit
     highest = float(circuit.bias(*folded.curve(np.linspace(0, folded.end_u, 4000))[:, :2].T).max())
-    rows = Rows(np.array([1.1, 1.3]) * highest, current_alone(np.array([0.9, 1.0])))
+    rows = Rows(np.array([1.02, 1.1]) * highest, current_alone(np.array([0.9, 1.0])))
     u, short = rows.states(folded, circuit)
-    assert np.allclose(short, [1.1, 1.3], rtol=1e-6)
+    assert np.allclose(short, [1.02, 1.1], rtol=1e-6)
     assert u[0] == u[1]
     end = folded.curve(u[0])[1]
-    assert np.allclose(rows.values(folded, circuit)[0], [0.9 * end, 0.7 * end], rtol=1e-6)
+    assert np.allclose(rows.values(folded, circuit)[0], [0.94 * end, 0.7 * end], rtol=1e-6)
 
 
 @pytest.mark.parametrize("highest", [0.9, 1.25])

@@ -257,6 +257,8 @@ class Hypothesis:
         Whether the unknown takes other values than those.
     far_fetched : bool
         Whether others that explain the data as well come first.
+    partial : bool
+        Whether it leaves rows out, and is not asked where another one explains all as well.
     """
 
     asks: Callable[[float], str]
@@ -266,6 +268,7 @@ class Hypothesis:
     parameter: str = ""
     free: bool = False
     far_fetched: bool = False
+    partial: bool = False
 
 
 def hypotheses_of(rows: MeasuredRows, probe: Probe, names: Sequence[str]) -> list[Hypothesis]:
@@ -392,7 +395,11 @@ def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:
         # where the bias goes back, or else at some quarter
         turn = [int(np.argmax(bias[: np.argmax(falls)])) + 1] if falls.any() else []
         cuts = [*turn, *(quarter * number.size // 4 for quarter in (1, 2, 3))]
-    both = [Hypothesis(asks, partial(part, first), starts=cuts) for first in (True, False) if cuts]
+    both = [
+        Hypothesis(asks, partial(part, first), starts=cuts, partial=True)
+        for first in (True, False)
+        if cuts
+    ]
     return [*clipped, *both]
 
 
@@ -609,9 +616,12 @@ class Diagnosis:
         explanations = self._searched([drawing])
         if explanations and self._explains(explanations[0]):
             explanations += self._searched(others)
-            if question := self._questions(_likeliest_first(explanations)):
-                return question
-        return self.likeliest() or (
+        nothing, explanations = self._from_cold_rows, _likeliest_first(explanations)
+        least = min((explained.squares for explained in explanations), default=np.inf)
+        if self._explains(nothing) and nothing.squares < least + self.options.as_likely_difference:
+            return ""
+        question = self._questions(explanations) or self.likeliest()
+        return question or (
             "is it another lever, or in another medium, or known less well than its priors say?"
         )
 
@@ -632,25 +642,29 @@ class Diagnosis:
             return ""
         limit = max(options.as_likely_factor * squares, squares + options.as_likely_difference)
         as_likely = [explained for explained in explanations if explained.squares <= limit]
+        # what explains all rows displaces what leaves some out
+        whole = [explained for explained in as_likely if not explained.hypothesis.partial]
+        as_likely = whole or as_likely
         as_likely.sort(key=lambda explained: explained.hypothesis.far_fetched)
         questions = dict.fromkeys(explained.question for explained in as_likely)
         return " or: ".join(list(questions)[:2])
 
     @cached_property
     def _without(self) -> _Explanation:
-        """What is left unexplained without a hypothesis.
+        """What is left unexplained without a hypothesis."""
+        return self._again(self._as_stated)
 
-        All rows at once may lead away from a lever of which little is known. Its colder half tells
-        its doping, as the search has it that begins afar, and the rest goes on from there.
+    @cached_property
+    def _from_cold_rows(self) -> _Explanation:
+        """The same, from what the colder half of the rows makes of the lever.
+
+        All rows at once lead away from a lever of which little is known; cold ones tell its doping.
         """
-        explained = self._again(self._as_stated)
-        if self._is_near(explained):
-            return explained
         cold = self._rows.bias_V <= np.median(self._rows.bias_V)
         colder = Hypothesis(lambda _: "", lambda rows, _: replace(rows, included=cold))
-        grown = self._again(self._estimated(colder, 0.0, self._curve))
-        grown = self._again(replace(grown, hypothesis=explained.hypothesis, squares=np.inf))
-        return _likeliest_first([explained, grown])[0]
+        of_cold_rows = self._again(self._estimated(colder, 0.0, self._curve))
+        nothing = self._as_stated.hypothesis
+        return self._again(replace(of_cold_rows, hypothesis=nothing, squares=np.inf))
 
     @cached_property
     def _as_stated(self) -> _Explanation:

@@ -32,7 +32,7 @@ from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import FITTED
 from hotlever.threads import one_blas_thread
-from hotlever.types import Array, Progress
+from hotlever.types import Array, Mask, Progress
 from hotlever.units import MOST_BIAS
 
 #: Where predictions have the tip temperature.
@@ -71,6 +71,11 @@ class Prediction:
     def light(self) -> Self:
         """The same without factorised matrices, which only the next lever is solved with."""
         return self
+
+    @property
+    def without_state(self) -> Mask:
+        """Which rows, (n,), the lever has no state for, so that the nearest one stands there."""
+        return np.zeros(self.values.shape[1], dtype=bool)
 
 
 def named(values: Array) -> dict[str, Array]:
@@ -216,6 +221,13 @@ class PredictionAtRest(Prediction):
         """See `Prediction`."""
         away = tuple(each.light for each in self.away)
         return replace(self, linearised=replace(self.linearised, factors=None), away=away)
+
+    @property
+    def without_state(self) -> Mask:
+        """See `Prediction`."""
+        if self.away:  # rows over a sample are weighted sums of what several levers show
+            return super().without_state
+        return self.surrogate.rows.states(self.surrogate.branch, self.probe.circuit)[1] > 1.0
 
 
 @dataclass(frozen=True)

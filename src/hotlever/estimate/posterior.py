@@ -14,6 +14,7 @@ changes by g x + ½ xᵀ H x. Along the axis where that bends most it is solved 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -44,7 +45,9 @@ class Posterior:
     """
 
     def __init__(self, objective: Objective, at: Prediction) -> None:
-        self.objective, self.at = objective, at
+        # a row at whose bias there is no state tells that the lever is colder, and not by how much
+        slopes = np.where(at.without_state, 0.0, at.slopes.transpose(2, 0, 1)).transpose(1, 2, 0)
+        self.objective, self.at = objective, replace(at, slopes=slopes)
         self._point = objective.point(at.probe)
         self._rates = objective.coordinates.rates(self._point)
 
