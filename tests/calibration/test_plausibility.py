@@ -23,6 +23,7 @@ from hotlever.measurement import read_measurement
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior
 from synthetic_curves import measured_curve, measurement_of
+from twins import little_known_lever
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 
@@ -153,6 +154,13 @@ def test_no_right_lever_is_taken_for_another(curve, long_u_shape):
     right = Probe.u_shape().with_(length_um=120.0)
     assert Diagnosis(long_u_shape, right).of_another_lever() == ""
     assert Diagnosis(altered_measurement(curve), Probe.reference()).of_another_lever() == ""
+
+
+@pytest.mark.slow
+def test_a_lever_of_which_little_is_known_is_looked_for_from_its_cold_rows():
+    """Three times less doping than stated: all rows at once led away, and it was refused."""
+    unknown = little_known_lever(114, obey=True)
+    assert Diagnosis(unknown.measurement, unknown.nominal).of_another_lever() == ""
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 
 from hotlever.estimate.experiment import experiment_of
+from hotlever.estimate.objective import Objective
+from hotlever.estimate.posterior import Posterior
+from hotlever.estimate.prior_density import PriorDensity
+from hotlever.estimate.residuals import Residuals
 from hotlever.estimate.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
+from hotlever.measurement import Measurement
 from hotlever.probe import Probe
+from hotlever.probe.priors import Prior
 from hotlever.quantities import OBSERVABLES
 
 NAMES = ("n_d", "heater_width_um", "series_resistance_ohm")
@@ -75,3 +81,27 @@ def test_derivatives_by_parameters_are_those_of_the_values(highest):
         misses.append(np.abs(values - expected)[0].max())
     assert misses[0] < 0.02 * at.values[0].max()
     assert misses[1] < 0.35 * misses[0] + 1e-9
+
+
+def test_a_row_without_a_state_narrows_no_posterior():
+    """It ended a lever at a melting tip, which was then stated to 7 K, 110 K off."""
+    probe = Probe.reference().with_(series_resistance_ohm=300.0)
+    names = NAMES[:2]
+    prior = PriorDensity.of_priors(
+        {name: Prior(value, 0.2) for name, value in zip(names, probe.values(names), strict=True)}
+    )
+
+    def covariance(bias):
+        rows = bias, np.minimum(0.3 * bias, 0.9), *np.full((3, bias.size), np.nan)
+        residuals = Residuals(Measurement(*rows), ["current"])
+        model = experiment_of(probe, bias, names=names).measuring(*residuals.at_rest)
+        prediction = model.predict(probe)
+        objective = Objective(residuals, probe, names, list(names), prior)
+        return prediction.without_state, Posterior(objective, prediction).covariance
+
+    bias = np.array([0.5, 1.5, 2.5, 3.0])
+    every, of_states = covariance(bias)
+    there, with_end = covariance(np.append(bias, 4.5))
+    assert not every.any()
+    assert there.tolist() == [False, False, False, False, True]
+    assert np.allclose(with_end, of_states, rtol=1e-6)
