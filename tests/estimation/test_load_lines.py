@@ -104,4 +104,4 @@ def test_a_row_without_a_state_narrows_no_posterior():
     there, with_end = covariance(np.append(bias, 4.5))
     assert not every.any()
     assert there.tolist() == [False, False, False, False, True]
-    assert np.allclose(with_end, of_states, rtol=1e-6)
+    assert np.allclose(with_end, of_states, rtol=1e-4)
