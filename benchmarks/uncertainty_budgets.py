@@ -29,8 +29,8 @@ from hotlever.estimate import Estimate, FitOptions
 from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.experiment import TIP, Predictor
 from hotlever.estimate.objective import Objective
-from hotlever.estimate.optimiser import Optimiser, SearchOptions
-from hotlever.estimate.options import CalibrationOptions
+from hotlever.estimate.optimiser import Optimiser
+from hotlever.estimate.options import CalibrationOptions, SearchOptions
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import Solution, solve
 from hotlever.estimate.verdict import verdict_on

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 
 import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimate import calibrate, estimator, read_calibration
+from hotlever.estimate import calibrate, read_calibration
+from hotlever.estimate.options import Numerics, PulseOptions
 from hotlever.estimate.power_law import EQ12
-from hotlever.estimate.pulses import PulseOptions, pulse_calibration
 from hotlever.estimate.summary import calibration_text
 from hotlever.estimate.tip_table import PULSE_COLUMNS, PulseTiming
 from hotlever.lever import Lever
@@ -30,10 +29,9 @@ def measured(reference):
 @pytest.fixture(scope="module")
 def calibrated(measured):
     """The reference lever, measured with noise; few heights, and laws that are no unknowns."""
-    with pytest.MonkeyPatch.context() as patch:
-        few = partial(pulse_calibration, options=PulseOptions(heights=7, chosen=(6, 3)))
-        patch.setattr(estimator, "pulse_calibration", few)
-        return calibrate(measured, priors={"laws": "paper"}, pulse=PulseTiming(5.0))
+    few = Numerics(pulses=PulseOptions(heights=7, chosen=(6, 3)))
+    priors = {"laws": "paper"}
+    return calibrate(measured, priors=priors, pulse=PulseTiming(5.0), numerics=few)
 
 
 @pytest.mark.slow

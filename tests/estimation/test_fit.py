@@ -12,8 +12,9 @@ from fit_twins import BIAS, TRUTH, twin
 
 from experiments import on_coarse_meshes
 from hotlever.errors import BranchEndError, ComputationError, InputError
-from hotlever.estimate import Measurement, fit, read_measurement
+from hotlever.estimate import Measurement, fit, read_fit, read_measurement
 from hotlever.estimate.diagnosis import Diagnosis, outlier_notes
+from hotlever.estimate.options import Numerics, SearchOptions
 from hotlever.estimate.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -139,6 +140,7 @@ def test_the_measured_circuit_wins_and_a_note_says_so(coarse):
     [
         ({"observables": ["tipp"]}, "did you mean 'tip'"),
         ({"observables": []}, "no observables"),
+        ({"numeric": Numerics()}, "did you mean 'numerics'"),
         ({"fixed": {"ckappa": 1.0}}, "did you mean 'c_kappa'"),
         ({"fixed": {"p": -1.0}}, "p = -1: expected at least 0.5"),
         ({"fixed": dict.fromkeys(PARAMETERS)}, "nothing is left to fit"),
@@ -209,6 +211,18 @@ def test_fit_file_has_the_keys_of_the_contract(exact_fit, tmp_path):
     } <= set(content)
     assert {"path", "sha256"} <= set(content["data"])
     assert Probe.from_sections(content["probe"], "fit") == exact_fit.probe
+
+
+def test_numbers_that_steer_a_fit_are_told_to_it_and_stand_in_its_file(
+    exact_fit, coarse, coarse_model, tmp_path
+):
+    few = Numerics(search=SearchOptions(most_branches=1))
+    result = fit(twin(coarse), model=coarse_model, numerics=few)
+    assert exact_fit.describes_data
+    assert result.describes_data is None
+    result.write(tmp_path / "fit.json")
+    assert read_fit(tmp_path / "fit.json").options.numerics == few
+    assert "numerics" not in exact_fit.content()["options"]
 
 
 def test_reduced_and_full_lever_give_the_same_fit(coarse, coarse_model, coarse_fast):

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from hotlever.estimate import Measurement
-from hotlever.estimate.diagnosis import DiagnosisOptions, lack_of_fit_text, run_of_outliers
+from hotlever.estimate.diagnosis import lack_of_fit_text, run_of_outliers
+from hotlever.estimate.options import DiagnosisOptions, Numerics
 from hotlever.estimate.residuals import Residuals
 
 COUNT = 40
@@ -18,14 +19,18 @@ MODEL = np.stack([0.1 * BIAS, np.full(COUNT, np.nan), 293.0 + 5.0 * BIAS**2])
 ALONG = np.linspace(-1.0, 1.0, COUNT)
 
 
-def compared(off: np.ndarray, bias: np.ndarray = BIAS, tip: bool = False) -> Residuals:
+def compared(
+    off: np.ndarray, bias: np.ndarray = BIAS, tip: bool = False, **diagnosis: float
+) -> Residuals:
     """Compare the model with data that are off from it, and have some noise."""
     noise = 1e-3 * np.random.default_rng(0).standard_normal(bias.size)
     nothing = np.full(bias.size, np.nan)
     current = 0.1 * bias + (0.0 if tip else off) + noise
     tips = 293.0 + 5.0 * bias**2 + 1e3 * off if tip else nothing
     observables = ["current", "tip"] if tip else ["current"]
-    return Residuals(Measurement(bias, current, nothing, tips, nothing), observables)
+    numerics = Numerics(diagnosis=DiagnosisOptions(**diagnosis))
+    measured = Measurement(bias, current, nothing, tips, nothing)
+    return Residuals(measured, observables, numerics=numerics)
 
 
 def test_noise_is_described():
@@ -125,7 +130,6 @@ def test_a_fit_says_first_that_its_data_are_not_described(run, tmp_path):
 
 
 def test_what_counts_as_described_is_an_option():
-    residuals = compared(0.05 * ALONG**3)
-    assert lack_of_fit_text(residuals, MODEL, DiagnosisOptions(held_scatter=0.017)).endswith(" V")
-    wide = DiagnosisOptions(held_scatter=0.02, usual_scatter=0.02)
-    assert lack_of_fit_text(residuals, MODEL, wide) == ""
+    off = 0.05 * ALONG**3
+    assert lack_of_fit_text(compared(off, held_scatter=0.017), MODEL).endswith(" V")
+    assert lack_of_fit_text(compared(off, held_scatter=0.02, usual_scatter=0.02), MODEL) == ""

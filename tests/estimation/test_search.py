@@ -19,8 +19,8 @@ from hotlever.estimate import Measurement, calibrate, fit
 from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.estimate.experiment import ExperimentAtRest, Predictor
 from hotlever.estimate.objective import Objective
-from hotlever.estimate.optimiser import Optimiser, SearchOptions
-from hotlever.estimate.options import FitOptions
+from hotlever.estimate.optimiser import Optimiser
+from hotlever.estimate.options import FitOptions, SearchOptions
 from hotlever.estimate.posterior import standard_errors
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.residuals import Residuals

@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
 from hotlever.errors import ComputationError, InputError
+from hotlever.estimate.options import DiagnosisOptions
 from hotlever.estimate.residuals import Residuals
 from hotlever.estimate.surrogate import CurveSurrogate, Rows
 from hotlever.lever.branch import Reach
@@ -34,99 +35,16 @@ from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.text import with_unit
 from hotlever.types import Array, Mask
 
-
-@dataclass(frozen=True)
-class DiagnosisOptions:
-    """When data are not described, and when a hypothesis explains them.
-
-    Attributes
-    ----------
-    usual_scatter, held_scatter : float
-        The largest difference of data that are described (rms), as a share of the largest value of
-        an observable; the second where weights are no errors: such fits hold dimensions and
-        whatever else is fixed.
-    correlation : float
-        Data beyond it are not described if neighbours differ together: if the product of two is
-        this share of the square, which of white noise is 0.
-    run : int
-        Neither are data of which so many neighbours differ by three times the usual scatter in
-        their median.
-    run_of_noise : float
-        Of noisier data they differ by chance by up to so many times their scatter.
-    fewest_rows : int
-        Fewer tell nothing of their neighbours.
-    outlier : float
-        Standard deviations beyond which a datum is an outlier.
-    run_of_outliers : int
-        Outliers stand alone: so many neighbours are none; nor are one fewer at the end, with
-        nothing beyond.
-    contact_probability : float
-        Temperatures of a contact are off where by chance this share of levers is.
-    cold_factor : float
-        The resistance of a cold lever is within this factor of its model's.
-    fewest_biases : int
-        Different ones that a calibration needs.
-    shift : float
-        Data are not described where they, with all other priors, are so many standard deviations
-        from one prior: of the nearly twenty of a lever one is, by chance, in one lever of 500.
-    shift_probability : float
-        The same of all parameters together.
-    error, error_of_largest : float
-        What a coarse lever may differ by from what was measured: of each current and of the
-        largest.
-    robust_beyond : float
-        Differences beyond this many of those count less and less, so that no single datum decides.
-    excluded_row, unknown : float
-        Sum of squares as which each row that a hypothesis leaves out counts, and each unknown that
-        it finds.
-    improvement, squares_per_row, squares : float
-        A hypothesis has to lower the sum of squares to this share of what it is without, and to no
-        more than so much for each row and altogether.
-    another_lever : float
-        Data that leave so many times that, with all that is known of a lever, are those of another:
-        of right levers of which little is known the farthest left twice.
-    as_likely_factor, as_likely_difference : float
-        Hypotheses within a factor or a difference of the best are as likely.
-    """
-
-    usual_scatter: float = 0.004
-    held_scatter: float = 0.01
-    correlation: float = 0.4
-    run: int = 4
-    run_of_noise: float = 2.5
-    fewest_rows: int = 7
-    outlier: float = 8.0
-    run_of_outliers: int = 3
-    contact_probability: float = 2e-4
-    cold_factor: float = 2.5
-    fewest_biases: int = 3
-    shift: float = 3.85
-    shift_probability: float = 2e-3
-    error: float = 3e-3
-    error_of_largest: float = 1e-3
-    robust_beyond: float = 3.0
-    excluded_row: float = 1.2
-    unknown: float = 2.0
-    improvement: float = 0.5
-    squares_per_row: float = 2.0
-    squares: float = 10.0
-    another_lever: float = 4.0
-    as_likely_factor: float = 1.3
-    as_likely_difference: float = 4.0
-
-
 # --- whether data are described -----------------------------------------------------------------
 
 
-def lack_of_fit_text(
-    residuals: Residuals, values: Array, options: DiagnosisOptions | None = None
-) -> str:
+def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
     """Return where data are not described by predicted values (m, n); empty if they are.
 
     Temperatures are left out: a thermometer's scale may be off by more than its readings
     scatter.
     """
-    options = options or DiagnosisOptions()
+    options = residuals.numerics.diagnosis
     usual, run = options.usual_scatter, options.run
     scatter = usual if residuals.errors.measured else options.held_scatter
     difference = residuals.difference(values) / residuals.largest
@@ -135,7 +53,7 @@ def lack_of_fit_text(
         residuals.observables, difference, residuals.errors.down, strict=True
     ):
         present = np.isfinite(whole)
-        if FITTED[name].unit == "K" or present.sum() < options.fewest_rows:
+        if FITTED[name].unit == "K" or present.sum() < max(options.fewest_rows, run):
             continue
         # what a robust fit has forgotten stands alone, or is seen as a run
         squares = float(np.sum((down * whole)[present] ** 2))
@@ -180,11 +98,9 @@ def _contradiction(residuals: Residuals, values: Array, probability: float) -> s
     return ""
 
 
-def run_of_outliers(
-    residuals: Residuals, values: Array, options: DiagnosisOptions | None = None
-) -> str:
+def run_of_outliers(residuals: Residuals, values: Array) -> str:
     """Return where neighbouring data are off together, as no outliers are; empty if none are."""
-    options = options or DiagnosisOptions()
+    options = residuals.numerics.diagnosis
     run = options.run_of_outliers
     in_order = np.argsort(residuals.along, kind="stable")
     along = residuals.along[in_order]
@@ -206,10 +122,9 @@ def outlier_notes(
     values: Array,
     robust: bool,
     most: int = 10,
-    options: DiagnosisOptions | None = None,
 ) -> list[str]:
     """Name the points that lie far outside the scatter of the others, and no more than `most`."""
-    options = options or DiagnosisOptions()
+    options = residuals.numerics.diagnosis
     advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
     size = np.abs(residuals.deviations(values))
     outliers = np.argwhere(size > options.outlier)

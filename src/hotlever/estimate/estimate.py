@@ -390,7 +390,13 @@ class Estimate:
         if priors:
             common = errors_of_scales(self.measurement, self.observables, priors, base)
         weights = np.stack([self.weights[name] for name in self.observables])
-        return Residuals(self.measurement, self.observables, data_weights=weights, common=common)
+        return Residuals(
+            self.measurement,
+            self.observables,
+            data_weights=weights,
+            common=common,
+            numerics=self.options.numerics,
+        )
 
     def objective(self, names: Sequence[str]) -> Objective:
         """Return what the search has made small, by derivatives by some parameters."""

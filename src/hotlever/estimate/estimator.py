@@ -111,7 +111,8 @@ def fit(
     problem, values = solution.problem, solution.prediction.values
     if problem.options.robust or not outlier_notes(solution.residuals, values, robust=False):
         priors = problem.options.priors or None
-        cause = Diagnosis(problem.measurement, problem.probe, priors).named()
+        diagnosis = options.numerics.diagnosis
+        cause = Diagnosis(problem.measurement, problem.probe, priors, diagnosis).named()
     else:
         cause = "are the points far from the fit wrong ones? a robust fit (--robust) forgets them"
     return replace(result, reason=f"{result.reason}; {cause}")
@@ -187,7 +188,8 @@ def calibrate(
         problem = Problem.of(whole, origin, replace(options.of_lever, medium=medium))
         # the search begins with the lever that its data are compared with before
         names = problem.experiment.names if fit is None else ()
-        causes = Diagnosis(problem.measurement, problem.probe, options.priors, names=names)
+        diagnosis = options.numerics.diagnosis
+        causes = Diagnosis(problem.measurement, problem.probe, options.priors, diagnosis, names)
         check_plausible(problem, causes)
         check_in_range(options.at_V, *limits_of_range(problem.measurement, problem.probe))
         if fit is None:
@@ -263,6 +265,7 @@ def _beside_a_fit(
         fixed=fixed,
         priors=before,
         medium=fit.probe.surroundings.medium,
+        numerics=problem.options.numerics,
     )
     fitted = solve(Problem.of(fit.measurement, fit.probe, options), progress)
     if _same_data(fit.measurement, problem.measurement):
@@ -281,7 +284,7 @@ def _beside_a_fit(
     }
     free = tuple(name for name in own if name not in usual_parameters(probe))
     medium = problem.probe.surroundings.medium
-    again = FitOptions(fixed=fixed, priors=theirs, free=free, medium=medium)
+    again = replace(options, observables=None, priors=theirs, free=free, medium=medium)
     together = Problem.of(problem.measurement, probe, again, before=left)
     try:
         return solve(replace(together, known={**before, **theirs}), progress)

@@ -24,8 +24,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP
 from hotlever.estimate.likely_levers import Knowledge, LikelyLevers
-from hotlever.estimate.optimiser import SearchOptions
-from hotlever.estimate.options import FitOptions
+from hotlever.estimate.options import FitOptions, SearchOptions
 from hotlever.estimate.posterior import standard_errors
 from hotlever.estimate.prior_density import Coordinates, PriorDensity
 from hotlever.estimate.search import Solution

@@ -16,54 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hotlever.estimate.options import NoiseOptions
 from hotlever.measurement import Measurement
 from hotlever.measurement.data import noise_about_neighbours
 from hotlever.probe.priors import SCALES, USUAL_SCALES, Prior, PriorShift
 from hotlever.quantities import OBSERVABLES
 from hotlever.types import Array
-
-
-@dataclass(frozen=True)
-class NoiseOptions:
-    """How data tell their noise, and when they are outliers.
-
-    Attributes
-    ----------
-    shares : sequence of float
-        Of the variance that may be in proportion to the square of what is shown; of all of it, data
-        near zero would count infinitely.
-    freedom : float
-        Degrees of freedom of the t distribution by which residuals tell the shares: with few of
-        them it does not matter how far off outliers are (Lange, Little and Taylor, J. Am. Stat.
-        Assoc. 84, 881 (1989), who take 4).
-    rounds : int
-        In which the scale of it is found.
-    least_free : float
-        A datum that alone decides a parameter says nothing of its noise: at least this share of its
-        square is taken for free.
-    huber : float
-        Huber's weights lessen from so many standard deviations on.
-    full_weight, no_weight : float
-        Other weights are full up to, and nothing beyond, so many: data without outliers keep nearly
-        all of theirs, and their scatter.
-    most_of_noise, most_of_discrepancy : float
-        What is smooth is no noise: data scatter by so many times as much as about their neighbours,
-        or as a model is off, at most, or a search would be content with a wrong lever and noisy
-        data.
-    fewest_neighbours : int
-        So many data tell how they scatter about their neighbours.
-    """
-
-    shares: Sequence[float] = (0.0, 0.5, 0.8, 0.95, 0.99)
-    freedom: float = 4.0
-    rounds: int = 20
-    least_free: float = 0.05
-    huber: float = 1.345
-    full_weight: float = 3.5
-    no_weight: float = 6.0
-    most_of_noise: float = 4.0
-    most_of_discrepancy: float = 2.0
-    fewest_neighbours: int = 7
 
 
 def relative_noise(

@@ -16,93 +16,11 @@ from hotlever.errors import HotleverError, InputError
 from hotlever.estimate.diagnosis import lack_of_fit_text
 from hotlever.estimate.experiment import Prediction, Predictor
 from hotlever.estimate.objective import Objective, Subproblem
+from hotlever.estimate.options import SearchOptions
 from hotlever.estimate.residuals import Residuals
 from hotlever.probe import Probe
 from hotlever.text import with_unit
 from hotlever.types import Array
-
-
-@dataclass(frozen=True)
-class SearchOptions:
-    """What steers a search.
-
-    Attributes
-    ----------
-    most_branches : int
-        Levers solved for one choice of weights, after which it ends where it is. Good data take 6
-        to 15; those of levers of which little is known up to 30.
-    most_in_all : int
-        Levers solved for all choices of weights together, in one search with priors, after which it
-        ends where it is.
-    most_in_estimate : int
-        Levers solved for one estimate, in all of its searches. With priors it is never reached. A
-        robust one without priors, which begins anew with each choice of weights, takes twice as
-        many.
-    first_region, largest_region : float
-        How far a step goes, in units of `Coordinates.room`: logarithms, where parameters are
-        positive. Beyond a factor of two neighbours say little.
-    decrement : float
-        Sum of squares that Gauss and Newton's step would still take away at an optimum, where
-        squares count standard deviations (with priors): a tenth of a standard error.
-    relative_decrement : float
-        The same in units of the noise, where weights count no standard deviations: a thirtieth of a
-        standard error.
-    small_decrement : float
-        The same where steps gain next to nothing: a third of a standard error. With priors that is
-        where no longer step than the ``rough_region`` gains anything, since values are not smooth
-        there, as near a fold that moves past a row.
-    rough_region : float
-        See there; in units of `Coordinates.room`, as all regions.
-    smallest_region : float
-        One in which only rounding errors are left.
-    negligible, negligible_of_misfit, misfit : float
-        A decrement as a share of the sum of squares; the second where that is so many times what
-        noise explains that no such lever shows the data.
-    precision : float
-        Differences, as shares of the largest value of an observable, of which only rounding errors
-        are left.
-    gentle_rounds, robust_rounds : int
-        Most reweightings by Huber's weights, with which there is one optimum; then by those that
-        forget outliers.
-    settled, settled_relative : float
-        A confirmation by the full lever that moves no parameter by more than these shares of its
-        standard error and of its value ends the fit: the confirmed model is exact to first order.
-    confirmations : int
-        Most of them.
-    discrepancy : float
-        By how much a model is off that describes the data, a share of an observable's largest
-        value, where something was known of the lever beforehand (Kennedy and O'Hagan, J. R. Stat.
-        Soc. B 63, 425 (2001)).
-    scatter_rounds : int
-        Rounds in which an observable without measurement errors finds its scatter.
-    creeping_steps : int
-        Steps in succession of which none promises a third of a standard error, after which a search
-        without priors has come to its end: data leave a curved valley open, as those of a current
-        below the knee, along which it would creep on.
-    """
-
-    most_branches: int = 25
-    most_in_all: int = 40
-    most_in_estimate: int = 120
-    first_region: float = 0.5
-    largest_region: float = 0.7
-    decrement: float = 1e-2
-    relative_decrement: float = 1e-3
-    small_decrement: float = 0.1
-    rough_region: float = 1e-3
-    smallest_region: float = 1e-6
-    negligible: float = 1e-6
-    negligible_of_misfit: float = 1e-3
-    misfit: float = 10.0
-    precision: float = 1e-7
-    gentle_rounds: int = 6
-    robust_rounds: int = 14
-    settled: float = 0.5
-    settled_relative: float = 0.03
-    confirmations: int = 5
-    discrepancy: float = 5e-4
-    scatter_rounds: int = 3
-    creeping_steps: int = 5
 
 
 @dataclass(frozen=True)
@@ -175,6 +93,7 @@ class Optimiser:
     objective : Objective
     predictor : Predictor
     options : SearchOptions, optional
+        In place of those of the residuals.
 
     Attributes
     ----------
@@ -189,7 +108,7 @@ class Optimiser:
         options: SearchOptions | None = None,
     ) -> None:
         self.objective, self.residuals, self.predictor = objective, objective.residuals, predictor
-        self._options, self.steps = options or SearchOptions(), 0
+        self._options, self.steps = options or self.residuals.numerics.search, 0
         self._most = self._options.most_in_estimate
         if objective.informed:
             self._most = min(self._most, predictor.evaluations + self._options.most_in_all)

@@ -1,7 +1,8 @@
-"""What users ask of a fit, and of a calibration."""
+"""What users ask of a fit, and of a calibration, and the numbers that steer how it is found."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, TypeVar, get_args
@@ -24,6 +25,322 @@ from hotlever.quantities import FITTED
 Weights = Literal["maximum", "errors"]
 #: Of what there are uncertainty budgets: a tip, or its apex that touches a sample.
 BudgetOf = Literal["tip", "apex"]
+
+
+# --- the numbers that steer an estimate -----------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class NoiseOptions:
+    """How data tell their noise, and when they are outliers.
+
+    Attributes
+    ----------
+    shares : sequence of float
+        Of the variance that may be in proportion to the square of what is shown; of all of it, data
+        near zero would count infinitely.
+    freedom : float
+        Degrees of freedom of the t distribution by which residuals tell the shares: with few of
+        them it does not matter how far off outliers are (Lange, Little and Taylor, J. Am. Stat.
+        Assoc. 84, 881 (1989), who take 4).
+    rounds : int
+        In which the scale of it is found.
+    least_free : float
+        A datum that alone decides a parameter says nothing of its noise: at least this share of its
+        square is taken for free.
+    huber : float
+        Huber's weights lessen from so many standard deviations on.
+    full_weight, no_weight : float
+        Other weights are full up to, and nothing beyond, so many: data without outliers keep nearly
+        all of theirs, and their scatter.
+    most_of_noise, most_of_discrepancy : float
+        What is smooth is no noise: data scatter by so many times as much as about their neighbours,
+        or as a model is off, at most, or a search would be content with a wrong lever and noisy
+        data.
+    fewest_neighbours : int
+        So many data tell how they scatter about their neighbours.
+    """
+
+    shares: Sequence[float] = (0.0, 0.5, 0.8, 0.95, 0.99)
+    freedom: float = 4.0
+    rounds: int = 20
+    least_free: float = 0.05
+    huber: float = 1.345
+    full_weight: float = 3.5
+    no_weight: float = 6.0
+    most_of_noise: float = 4.0
+    most_of_discrepancy: float = 2.0
+    fewest_neighbours: int = 7
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """What steers a search.
+
+    Attributes
+    ----------
+    most_branches : int
+        Levers solved for one choice of weights, after which it ends where it is. Good data take 6
+        to 15; those of levers of which little is known up to 30.
+    most_in_all : int
+        Levers solved for all choices of weights together, in one search with priors, after which it
+        ends where it is.
+    most_in_estimate : int
+        Levers solved for one estimate, in all of its searches. With priors it is never reached. A
+        robust one without priors, which begins anew with each choice of weights, takes twice as
+        many.
+    first_region, largest_region : float
+        How far a step goes, in units of `Coordinates.room`: logarithms, where parameters are
+        positive. Beyond a factor of two neighbours say little.
+    decrement : float
+        Sum of squares that Gauss and Newton's step would still take away at an optimum, where
+        squares count standard deviations (with priors): a tenth of a standard error.
+    relative_decrement : float
+        The same in units of the noise, where weights count no standard deviations: a thirtieth of a
+        standard error.
+    small_decrement : float
+        The same where steps gain next to nothing: a third of a standard error. With priors that is
+        where no longer step than the ``rough_region`` gains anything, since values are not smooth
+        there, as near a fold that moves past a row.
+    rough_region : float
+        See there; in units of `Coordinates.room`, as all regions.
+    smallest_region : float
+        One in which only rounding errors are left.
+    negligible, negligible_of_misfit, misfit : float
+        A decrement as a share of the sum of squares; the second where that is so many times what
+        noise explains that no such lever shows the data.
+    precision : float
+        Differences, as shares of the largest value of an observable, of which only rounding errors
+        are left.
+    gentle_rounds, robust_rounds : int
+        Most reweightings by Huber's weights, with which there is one optimum; then by those that
+        forget outliers.
+    settled, settled_relative : float
+        A confirmation by the full lever that moves no parameter by more than these shares of its
+        standard error and of its value ends the fit: the confirmed model is exact to first order.
+    confirmations : int
+        Most of them.
+    discrepancy : float
+        By how much a model is off that describes the data, a share of an observable's largest
+        value, where something was known of the lever beforehand (Kennedy and O'Hagan, J. R. Stat.
+        Soc. B 63, 425 (2001)).
+    scatter_rounds : int
+        Rounds in which an observable without measurement errors finds its scatter.
+    creeping_steps : int
+        Steps in succession of which none promises a third of a standard error, after which a search
+        without priors has come to its end: data leave a curved valley open, as those of a current
+        below the knee, along which it would creep on.
+    """
+
+    most_branches: int = 25
+    most_in_all: int = 40
+    most_in_estimate: int = 120
+    first_region: float = 0.5
+    largest_region: float = 0.7
+    decrement: float = 1e-2
+    relative_decrement: float = 1e-3
+    small_decrement: float = 0.1
+    rough_region: float = 1e-3
+    smallest_region: float = 1e-6
+    negligible: float = 1e-6
+    negligible_of_misfit: float = 1e-3
+    misfit: float = 10.0
+    precision: float = 1e-7
+    gentle_rounds: int = 6
+    robust_rounds: int = 14
+    settled: float = 0.5
+    settled_relative: float = 0.03
+    confirmations: int = 5
+    discrepancy: float = 5e-4
+    scatter_rounds: int = 3
+    creeping_steps: int = 5
+
+
+@dataclass(frozen=True)
+class DiagnosisOptions:
+    """When data are not described, and when a hypothesis explains them.
+
+    Attributes
+    ----------
+    usual_scatter, held_scatter : float
+        The largest difference of data that are described (rms), as a share of the largest value of
+        an observable; the second where weights are no errors: such fits hold dimensions and
+        whatever else is fixed.
+    correlation : float
+        Data beyond it are not described if neighbours differ together: if the product of two is
+        this share of the square, which of white noise is 0.
+    run : int
+        Neither are data of which so many neighbours differ by three times the usual scatter in
+        their median.
+    run_of_noise : float
+        Of noisier data they differ by chance by up to so many times their scatter.
+    fewest_rows : int
+        Fewer tell nothing of their neighbours.
+    outlier : float
+        Standard deviations beyond which a datum is an outlier.
+    run_of_outliers : int
+        Outliers stand alone: so many neighbours are none; nor are one fewer at the end, with
+        nothing beyond.
+    contact_probability : float
+        Temperatures of a contact are off where by chance this share of levers is.
+    cold_factor : float
+        The resistance of a cold lever is within this factor of its model's.
+    fewest_biases : int
+        Different ones that a calibration needs.
+    shift : float
+        Data are not described where they, with all other priors, are so many standard deviations
+        from one prior: of the nearly twenty of a lever one is, by chance, in one lever of 500.
+    shift_probability : float
+        The same of all parameters together.
+    error, error_of_largest : float
+        What a coarse lever may differ by from what was measured: of each current and of the
+        largest.
+    robust_beyond : float
+        Differences beyond this many of those count less and less, so that no single datum decides.
+    excluded_row, unknown : float
+        Sum of squares as which each row that a hypothesis leaves out counts, and each unknown that
+        it finds.
+    improvement, squares_per_row, squares : float
+        A hypothesis has to lower the sum of squares to this share of what it is without, and to no
+        more than so much for each row and altogether.
+    another_lever : float
+        Data that leave so many times that, with all that is known of a lever, are those of another:
+        of right levers of which little is known the farthest left twice.
+    as_likely_factor, as_likely_difference : float
+        Hypotheses within a factor or a difference of the best are as likely.
+    """
+
+    usual_scatter: float = 0.004
+    held_scatter: float = 0.01
+    correlation: float = 0.4
+    run: int = 4
+    run_of_noise: float = 2.5
+    fewest_rows: int = 7
+    outlier: float = 8.0
+    run_of_outliers: int = 3
+    contact_probability: float = 2e-4
+    cold_factor: float = 2.5
+    fewest_biases: int = 3
+    shift: float = 3.85
+    shift_probability: float = 2e-3
+    error: float = 3e-3
+    error_of_largest: float = 1e-3
+    robust_beyond: float = 3.0
+    excluded_row: float = 1.2
+    unknown: float = 2.0
+    improvement: float = 0.5
+    squares_per_row: float = 2.0
+    squares: float = 10.0
+    another_lever: float = 4.0
+    as_likely_factor: float = 1.3
+    as_likely_difference: float = 4.0
+
+
+@dataclass(frozen=True)
+class TrialOptions:
+    """How trials are made.
+
+    Attributes
+    ----------
+    tails : float
+        Degrees of freedom of the Student's t that errors are drawn from.
+    accuracy : float
+        Standard errors within which a trial finds its estimate; otherwise it counts for nothing.
+    most_evaluations : int
+        Levers that a trial looks at.
+    rounds : int
+        Estimates by which noise and optimum settle that follow from each other.
+    block : int
+        Trials that a process makes at a time.
+    fewest_effective : int
+        Independent samples that quantiles take at least (Vehtari et al., Bayesian Analysis 16
+        (2021) 667).
+    """
+
+    tails: float = 10.0
+    accuracy: float = 0.03
+    most_evaluations: int = 20
+    rounds: int = 10
+    block: int = 100
+    fewest_effective: int = 400
+
+
+@dataclass(frozen=True)
+class PulseOptions:
+    """How pulses are followed, and what is uncertain in them alone.
+
+    Attributes
+    ----------
+    heat_capacity_spread : float
+        Standard deviation of the heat capacity: tables of pure silicon differ by 1 to 2 %, and
+        doping, oxides and metal on a lever are not in them.
+    heat_in_air_spread : float
+        The same of what air takes up, by the properties of cold air: 7 % too much at a rise of
+        600 K.
+    heights : int
+        That are followed with the coarse mesh.
+    chosen : sequence of int
+        Which of them are followed with the fine one and for moved levers, falling.
+    per_step : int
+        Points of a history for each step.
+    distance : float
+        How far directions of the covariance are followed, in standard errors.
+    least_variance, neglected : float
+        Directions that matter: share of the variance of a parameter that they have, and of that of
+        the highest pulse that may be left out at others.
+    """
+
+    heat_capacity_spread: float = 0.03
+    heat_in_air_spread: float = 0.1
+    heights: int = 13
+    chosen: Sequence[int] = (12, 9, 6, 3)
+    per_step: int = 8
+    distance: float = 0.5
+    least_variance: float = 1e-3
+    neglected: float = 2e-3
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """The numbers that steer an estimate; hardly anybody has to change one.
+
+    Attributes
+    ----------
+    noise : NoiseOptions
+    search : SearchOptions
+    diagnosis : DiagnosisOptions
+    trials : TrialOptions
+    pulses : PulseOptions
+
+    Raises
+    ------
+    InputError
+        If a number is negative or not finite.
+
+    Examples
+    --------
+    >>> Numerics(search=SearchOptions(most_in_all=80)).search.most_in_all
+    80
+    """
+
+    noise: NoiseOptions = NoiseOptions()
+    search: SearchOptions = SearchOptions()
+    diagnosis: DiagnosisOptions = DiagnosisOptions()
+    trials: TrialOptions = TrialOptions()
+    pulses: PulseOptions = PulseOptions()
+
+    def __post_init__(self) -> None:
+        for part, options in asdict(self).items():
+            for name, value in options.items():
+                for number in value if isinstance(value, list | tuple) else (value,):
+                    if not 0.0 <= number < math.inf:
+                        raise InputError(
+                            f"{part}: found {name} = {number:g}, expected a finite number of 0 or "
+                            "more"
+                        )
+
+
+# --- what users ask -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -59,6 +376,8 @@ class FitOptions:
         What usually is: by default the six parameters of the paper's lever. A fit takes what its
         probe is made of (`hotlever.probe.probe_parameters.usual_parameters`), and one of what was
         measured in time the scales of the heat capacities.
+    numerics : Numerics
+        What steers how the estimate is found.
 
     Raises
     ------
@@ -75,6 +394,7 @@ class FitOptions:
     usual_priors: bool = False
     free: Sequence[str] = ()
     usual: Sequence[str] = tuple(PARAMETERS)
+    numerics: Numerics = Numerics()
 
     def __post_init__(self) -> None:
         for name in self.fixed:
@@ -139,7 +459,7 @@ class FitOptions:
             del values["usual_priors"]
         if tuple(values.pop("usual")) != tuple(PARAMETERS):
             values["usual"] = list(self.usual)
-        return values
+        return values | _unusual(values.pop("numerics"))
 
 
 @dataclass(frozen=True)
@@ -168,6 +488,8 @@ class CalibrationOptions:
         Bias of the uncertainty budget; that of the hottest tip by default.
     budget_of : {"tip", "apex"}
         What the uncertainty budget is of: the tip, or its apex that touches a sample.
+    numerics : Numerics
+        What steers how the estimate is found.
 
     Raises
     ------
@@ -182,6 +504,7 @@ class CalibrationOptions:
     samples: int = 0
     at_V: float | None = None
     budget_of: BudgetOf = "tip"
+    numerics: Numerics = Numerics()
 
     def __post_init__(self) -> None:
         if self.law is not None and self.medium not in (None, "vacuum"):
@@ -199,7 +522,12 @@ class CalibrationOptions:
     def of_lever(self) -> FitOptions:
         """What of the lever is estimated, and beside which priors."""
         usual = self.priors is None or bool(self.priors)
-        return FitOptions(priors=self.priors or {}, usual_priors=usual, medium=self.medium)
+        return FitOptions(
+            priors=self.priors or {},
+            usual_priors=usual,
+            medium=self.medium,
+            numerics=self.numerics,
+        )
 
     def need_none_of_the_rule(self) -> None:
         """Raise an error if something is asked that the paper's rule has not."""
@@ -221,7 +549,13 @@ class CalibrationOptions:
             "pulse": None if self.pulse is None else asdict(self.pulse),
             "samples": self.samples,
             "budget_of": self.budget_of,
+            **_unusual(asdict(self.numerics)),
         }
+
+
+def _unusual(numerics: dict[str, Any]) -> dict[str, Any]:
+    """Return what steers an estimate as plain values, if it is not what usually does."""
+    return {} if numerics == asdict(Numerics()) else {"numerics": numerics}
 
 
 Options = TypeVar("Options", FitOptions, CalibrationOptions)

@@ -22,7 +22,6 @@ from scipy import optimize
 from scipy.interpolate import PchipInterpolator
 
 from hotlever.estimate.experiment import Prediction
-from hotlever.estimate.noise import NoiseOptions
 from hotlever.estimate.objective import Objective, Quantity, Subproblem, inverse_or_nan
 from hotlever.estimate.surrogate import Surrogate
 from hotlever.probe.priors import PriorShift
@@ -75,9 +74,8 @@ class Posterior:
         if residual.size <= self._point.size:
             return np.full_like(jacobian.T, np.nan)
         leverage = np.einsum("ij,jk,ik->i", jacobian, inverse, jacobian)
-        influence = (
-            inverse @ jacobian.T * (residual / np.maximum(1.0 - leverage, NoiseOptions.least_free))
-        )
+        free = np.maximum(1.0 - leverage, objective.residuals.numerics.noise.least_free)
+        influence = inverse @ jacobian.T * (residual / free)
         return np.asarray(self._rates[:, None] * influence)
 
     @cached_property

@@ -127,7 +127,8 @@ class Problem:
         weights = "errors" if informed else options.weights
         base = probe.circuit.base_temperature_K
         common = errors_of_scales(measurement, observables, priors, base) if informed else []
-        residuals = Residuals(measurement, observables, weights, common=common)
+        numerics = options.numerics
+        residuals = Residuals(measurement, observables, weights, common=common, numerics=numerics)
         if not informed and residuals.different < len(options.varied):
             raise InputError(
                 f"{measurement.path or 'measurement'}: {residuals.different} different data for "

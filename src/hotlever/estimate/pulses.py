@@ -9,13 +9,11 @@ is that of a shorter one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from hotlever.errors import ComputationError
+from hotlever.estimate.options import PulseOptions
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import (
     MOMENTS,
@@ -38,46 +36,10 @@ from hotlever.text import BAND
 from hotlever.types import Array, Index, Progress
 
 
-@dataclass(frozen=True)
-class PulseOptions:
-    """How pulses are followed, and what is uncertain in them alone.
-
-    Attributes
-    ----------
-    heat_capacity_spread : float
-        Standard deviation of the heat capacity: tables of pure silicon differ by 1 to 2 %, and
-        doping, oxides and metal on a lever are not in them.
-    heat_in_air_spread : float
-        The same of what air takes up, by the properties of cold air: 7 % too much at a rise of
-        600 K.
-    heights : int
-        That are followed with the coarse mesh.
-    chosen : sequence of int
-        Which of them are followed with the fine one and for moved levers, falling.
-    per_step : int
-        Points of a history for each step.
-    distance : float
-        How far directions of the covariance are followed, in standard errors.
-    least_variance, neglected : float
-        Directions that matter: share of the variance of a parameter that they have, and of that of
-        the highest pulse that may be left out at others.
-    """
-
-    heat_capacity_spread: float = 0.03
-    heat_in_air_spread: float = 0.1
-    heights: int = 13
-    chosen: Sequence[int] = (12, 9, 6, 3)
-    per_step: int = 8
-    distance: float = 0.5
-    least_variance: float = 1e-3
-    neglected: float = 2e-3
-
-
 def pulse_calibration(
     solution: Solution,
     timing: PulseTiming,
     progress: Progress | None = None,
-    options: PulseOptions | None = None,
 ) -> PulseCalibration:
     """Return what an estimated lever does in a pulse, over the heights of its measured range.
 
@@ -87,14 +49,13 @@ def pulse_calibration(
     timing : PulseTiming
     progress : callable, optional
         Called with the pulses followed and how many there are, about.
-    options : PulseOptions, optional
 
     Raises
     ------
     ComputationError
         If the lever cannot be followed in time.
     """
-    bias, options = measured_range(solution), options or PulseOptions()
+    bias, options = measured_range(solution), solution.problem.options.numerics.pulses
     pulses = _Pulses(solution, bias, timing, progress, options)
     directions = solution.posterior.principal_steps(options.least_variance)
     axes: Index = np.arange(len(directions))

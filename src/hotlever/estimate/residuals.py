@@ -14,7 +14,7 @@ import numpy as np
 
 from hotlever.errors import InputError
 from hotlever.estimate.noise import CommonCovariance, CommonError, DataErrors
-from hotlever.estimate.options import Weights
+from hotlever.estimate.options import Numerics, Weights
 from hotlever.measurement import Measurement
 from hotlever.probe.priors import PriorShift
 from hotlever.quantities import FITTED
@@ -36,6 +36,7 @@ class Residuals:
         What differences are multiplied by instead, as an earlier fit found it; 0 leaves out.
     common : sequence of CommonError, optional
         Errors that data have in common.
+    numerics : Numerics, optional
 
     Attributes
     ----------
@@ -53,6 +54,8 @@ class Residuals:
     errors : DataErrors
         What the data may be off by, each by itself.
     common : sequence of CommonError
+    numerics : Numerics
+        What steers an estimate by these data.
 
     Raises
     ------
@@ -67,7 +70,9 @@ class Residuals:
         weights: Weights = "maximum",
         data_weights: Array | None = None,
         common: Sequence[CommonError] = (),
+        numerics: Numerics | None = None,
     ) -> None:
+        self.numerics = numerics or Numerics()
         self._measurement = measurement
         self._where = measurement.path or "measurement"
         self.observables = tuple(observables)
@@ -87,7 +92,8 @@ class Residuals:
         rows = measurement.rows
         root = np.ones(self.bias.size) if rows is None else np.sqrt(rows[self._used])
         measured = self._measured_errors() if weights == "errors" and data_weights is None else None
-        self.errors = DataErrors(self.present, self.largest, self.along, root, measured)
+        of_noise = self.numerics.noise
+        self.errors = DataErrors(self.present, self.largest, self.along, root, measured, of_noise)
         if data_weights is not None:
             self.errors.fix(data_weights[:, self._used])
             self.present = self.errors.present

@@ -22,7 +22,7 @@ from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.posterior import Posterior
 from hotlever.estimate.profile import ErrorProfile, hotter_rows
 from hotlever.estimate.surrogate import ReducedSurrogate
-from hotlever.estimate.trials import Noise, Samples, TrialOptions, Trials, draw_samples
+from hotlever.estimate.trials import Noise, Samples, Trials, draw_samples
 from hotlever.lever.reduced.lever import ReducedLever
 from hotlever.materials import full_name
 from hotlever.probe import Probe
@@ -93,15 +93,18 @@ class SampledTip:
     profile : ErrorProfile
         From the quantiles of 2.5 and 97.5 %.
     effective_samples : float
+    fewest : int
+        So many are expected.
     """
 
     profile: ErrorProfile
     effective_samples: float
+    fewest: int
 
     @property
     def enough(self) -> bool:
         """Whether the quantiles can be trusted."""
-        return self.effective_samples >= TrialOptions.fewest_effective
+        return self.effective_samples >= self.fewest
 
     @property
     def note(self) -> str:
@@ -112,8 +115,8 @@ class SampledTip:
                 f"95 % of the tip temperatures lie between quantiles of posterior samples, {worth}"
             )
         return (
-            f"too few posterior samples: {worth}, where {TrialOptions.fewest_effective} are "
-            "expected; the limits are those without samples, take more"
+            f"too few posterior samples: {worth}, where {self.fewest} are expected; the limits are "
+            "those without samples, take more"
         )
 
 
@@ -132,7 +135,8 @@ def sample_tip(
     objective, at = posterior.objective, posterior.at
     # a solved lever that far away tells of those that samples reach
     near = Subproblem(objective, at, predictor.others(at), least=1.0)
-    drawn, rows = draw_samples(Trials(near), samples, progress=progress), hotter_rows(at)
+    trials, rows = Trials(near, options=objective.residuals.numerics.trials), hotter_rows(at)
+    drawn = draw_samples(trials, samples, progress=progress)
     # one that counts for much is there several times
     different, index = np.unique(drawn.points, axis=0, return_inverse=True)
     tips = np.array([near.values_at(point)[TIP, rows] for point in different])[index]
@@ -141,6 +145,7 @@ def sample_tip(
     return SampledTip(
         ErrorProfile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),
         drawn.effective,
+        trials.options.fewest_effective,
     )
 
 
@@ -214,7 +219,8 @@ def _trials_at(
     """Return trials with the lever of a probe, and that lever."""
     residuals = objective.residuals
     lever = SampledLever.of_fit(fit, probe, residuals.bias, residuals.distance_um)
-    return Trials(Subproblem(objective, lever.at.light), noise), lever
+    near = Subproblem(objective, lever.at.light)
+    return Trials(near, noise, residuals.numerics.trials), lever
 
 
 def _outermost(points: Array) -> list[int]:

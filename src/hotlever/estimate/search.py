@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,7 @@ from hotlever.estimate.experiment import (
     Predictor,
 )
 from hotlever.estimate.objective import Objective
-from hotlever.estimate.optimiser import Optimiser, Optimum, SearchOptions
+from hotlever.estimate.optimiser import Optimiser, Optimum
 from hotlever.estimate.posterior import Posterior
 from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.problem import Problem
@@ -213,8 +213,14 @@ class Search:
         current = measurement.current(start.circuit)
         heated = np.unique(bias[np.isfinite(current) & (bias > 0)])
         # each is to be met within some per cent: the next moves the lever anyway
-        options = SearchOptions(
-            most_branches=4, decrement=2.0, scatter_rounds=0, first_region=0.7, largest_region=1.2
+        numerics = problem.options.numerics
+        options = replace(
+            numerics.search,
+            most_branches=4,
+            decrement=2.0,
+            scatter_rounds=0,
+            first_region=0.7,
+            largest_region=1.2,
         )
         for portion in range(1, portions):
             count = max(3, -(-heated.size * portion // portions))
@@ -226,6 +232,7 @@ class Search:
                 part,
                 [name for name in problem.residuals.observables if name in with_data],
                 "errors",
+                numerics=numerics,
             )
             if _has_moved(experiment.fast.drawn, start):
                 experiment = experiment.drawn_anew(start)

@@ -25,40 +25,12 @@ from scipy import optimize
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.objective import Subproblem
+from hotlever.estimate.options import TrialOptions
 from hotlever.processes import local_processes
 from hotlever.types import Array, Progress
 
 #: One unknown noise scale for each observable, or one for all.
 Noise = Literal["each", "common"]
-
-
-@dataclass(frozen=True)
-class TrialOptions:
-    """How trials are made.
-
-    Attributes
-    ----------
-    tails : float
-        Degrees of freedom of the Student's t that errors are drawn from.
-    accuracy : float
-        Standard errors within which a trial finds its estimate; otherwise it counts for nothing.
-    most_evaluations : int
-        Levers that a trial looks at.
-    rounds : int
-        Estimates by which noise and optimum settle that follow from each other.
-    block : int
-        Trials that a process makes at a time.
-    fewest_effective : int
-        Independent samples that quantiles take at least (Vehtari et al., Bayesian Analysis 16
-        (2021) 667).
-    """
-
-    tails: float = 10.0
-    accuracy: float = 0.03
-    most_evaluations: int = 20
-    rounds: int = 10
-    block: int = 100
-    fewest_effective: int = 400
 
 
 @dataclass(frozen=True)

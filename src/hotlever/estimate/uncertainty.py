@@ -15,7 +15,6 @@ import xarray as xr
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.profile import profile_likelihood
 from hotlever.estimate.sampling import BAND_QUANTILES, predictive_band, sample_posterior
-from hotlever.estimate.trials import TrialOptions
 from hotlever.files import json_text
 from hotlever.materials.parameters import heading, scale_of
 from hotlever.probe.probe_parameters import parameters_of
@@ -46,7 +45,8 @@ class Uncertainty:
         """Say in words what the data leave open, and what that means for the tip temperature."""
         texts = []
         if self.posterior is not None:
-            texts += _unsettled(self.posterior)
+            fewest = self.fit.options.numerics.trials.fewest_effective
+            texts += _unsettled(self.posterior, fewest)
             error = self.posterior.attrs["surrogate_error_K"]
             if error > 1.0:
                 texts.append(
@@ -194,9 +194,9 @@ def examine(
     return Uncertainty(fit, posterior, band, curves)
 
 
-def _unsettled(posterior: xr.Dataset) -> list[str]:
+def _unsettled(posterior: xr.Dataset, fewest: int) -> list[str]:
     """Say that samples say too little, if they do."""
-    effective, fewest = posterior.effective_sample_size.item(), TrialOptions.fewest_effective
+    effective = posterior.effective_sample_size.item()
     if effective >= fewest:
         return []
     return [

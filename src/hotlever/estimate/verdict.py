@@ -14,7 +14,6 @@ from scipy.special import chdtrc
 from hotlever.errors import InputError
 from hotlever.estimate.diagnosis import (
     Diagnosis,
-    DiagnosisOptions,
     lack_of_fit_text,
     run_of_outliers,
 )
@@ -134,13 +133,13 @@ def _check_temperatures(measured: Measurement, probe: Probe, where: str) -> None
 # --- after it -----------------------------------------------------------------------------------
 
 
-def verdict_on(solution: Solution, options: DiagnosisOptions | None = None) -> tuple[bool, str]:
+def verdict_on(solution: Solution) -> tuple[bool, str]:
     """Return whether the search came to an end, and why the data are not described, if so.
 
     One that was ended far from describing the data, where another step would take less than half of
     the sum of squares away, has found that no such lever shows them.
     """
-    reason = _misfit(solution, options or DiagnosisOptions())
+    reason = _misfit(solution)
     share = solution.decrement / max(solution.objective.squares(solution.prediction), 1e-300)
     if solution.converged or (reason and share < 0.5):
         return True, reason
@@ -162,12 +161,13 @@ def no_ramp(solution: Solution) -> str:
     return ""
 
 
-def _misfit(solution: Solution, options: DiagnosisOptions) -> str:
+def _misfit(solution: Solution) -> str:
     """Return why data are not described by what was fitted to them; empty if they are.
 
     Without priors outliers stand for themselves: there is nothing that they contradict.
     """
-    of_data = solution.residuals, solution.prediction.values, options
+    options = solution.residuals.numerics.diagnosis
+    of_data = solution.residuals, solution.prediction.values
     reason = lack_of_fit_text(*of_data)
     if reason or not solution.problem.informed:
         return reason
