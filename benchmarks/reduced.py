@@ -18,9 +18,8 @@ from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimate import fit, read_measurement
 from hotlever.estimate.experiment import ExperimentAtRest, experiment_of
 from hotlever.estimate.objective import Subproblem
-from hotlever.estimate.sampling import SampledLever
+from hotlever.estimate.sampling import SampledLever, Trials, draw_samples
 from hotlever.estimate.surrogate import Rows
-from hotlever.estimate.trials import Trials, draw_samples
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE

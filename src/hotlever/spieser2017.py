@@ -67,8 +67,6 @@ RAMAN_ERROR_K, RAMAN_ERROR_SHARE = 5.0, 0.02
 RAMAN_CALIBRATED_TO_K = 900.0
 #: Shift by stress (cm⁻¹ MPa⁻¹), an order of magnitude, after Ganesan et al. (1970).
 STRESS_SHIFT = 1e-3
-#: Upper bound of the stress in the heater (MPa), from thermo-mechanical simulation.
-HEATER_STRESS_MPA = 20.0
 #: Share of the laser light that the cantilever absorbs.
 ABSORBED_SHARE = 0.10
 

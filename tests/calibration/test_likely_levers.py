@@ -14,9 +14,9 @@ from hotlever.estimate.next_measurement import LinearisedLever, hottest_tips
 from hotlever.estimate.objective import Subproblem
 from hotlever.estimate.options import CalibrationOptions
 from hotlever.estimate.problem import Problem
+from hotlever.estimate.sampling import Trials, draw_samples
 from hotlever.estimate.search import solve
 from hotlever.estimate.surrogate import Rows
-from hotlever.estimate.trials import Trials, draw_samples
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement

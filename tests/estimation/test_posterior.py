@@ -14,8 +14,13 @@ from hotlever.estimate import Measurement, fit, uncertainty
 from hotlever.estimate.experiment import experiment_of
 from hotlever.estimate.objective import inverse_or_nan
 from hotlever.estimate.profile import profile_likelihood
-from hotlever.estimate.sampling import SampledLever, predictive_band, sample_posterior
-from hotlever.estimate.trials import Trials, draw_samples
+from hotlever.estimate.sampling import (
+    SampledLever,
+    Trials,
+    draw_samples,
+    predictive_band,
+    sample_posterior,
+)
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe

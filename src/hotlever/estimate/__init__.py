@@ -5,7 +5,7 @@ problem         a measurement, priors and options, settled: `problem`, by `optio
 forward map     `experiment`: at rest, in time, over a sample; the `surrogate` of a solved lever
 residuals       data by their `noise` and the scales that they have in common: `residuals`
 search          of an `objective`, with a `prior_density`: `search` by an `optimiser`
-posterior       `posterior`: of any quantity, also curved; its `profile`; `sampling` by `trials`
+posterior       `posterior`: of any quantity, also curved; its `profile`; its samples: `sampling`
 verdict         `verdict`: whether data are described; why not: `diagnosis` by `hypotheses`
 estimate        `estimate`: all of that, and its `file`; `estimator` makes it, as a fit or as a
                 `calibration` with `tip_temperature`, `uncertainty_budget`, `knee`, `power_law`

@@ -1,7 +1,7 @@
 """Levers drawn from what is known of one: how hot the tip of any of them may get at a bias.
 
-Errors of priors and data are drawn, and the lever is found that they lead an estimate to, as in
-`hotlever.estimate.trials`: with the residuals r in standard deviations and their Jacobian J, the x
+Errors of priors and data are drawn, and the lever is found that they lead an estimate to, as by
+`hotlever.estimate.sampling`: with residuals r in standard deviations and their Jacobian J, the x
 at which Jᵀ (r(x) − r(0)) has changed by as much as the drawn errors would change it if all were
 linear. Where there are no data yet these are draws from the priors. Each counts by how much more
 probable it is than it was drawn. All are solved for at once, on a grid of places along the branch,

@@ -36,7 +36,7 @@ class NoiseOptions:
 
     Attributes
     ----------
-    shares : sequence of float
+    shares : tuple of float
         Of the variance that may be in proportion to the square of what is shown; of all of it, data
         near zero would count infinitely.
     freedom : float
@@ -61,7 +61,7 @@ class NoiseOptions:
         So many data tell how they scatter about their neighbours.
     """
 
-    shares: Sequence[float] = (0.0, 0.5, 0.8, 0.95, 0.99)
+    shares: tuple[float, ...] = (0.0, 0.5, 0.8, 0.95, 0.99)
     freedom: float = 4.0
     rounds: int = 20
     least_free: float = 0.05
@@ -279,7 +279,7 @@ class PulseOptions:
         600 K.
     heights : int
         That are followed with the coarse mesh.
-    chosen : sequence of int
+    chosen : tuple of int
         Which of them are followed with the fine one and for moved levers, falling.
     per_step : int
         Points of a history for each step.
@@ -293,7 +293,7 @@ class PulseOptions:
     heat_capacity_spread: float = 0.03
     heat_in_air_spread: float = 0.1
     heights: int = 13
-    chosen: Sequence[int] = (12, 9, 6, 3)
+    chosen: tuple[int, ...] = (12, 9, 6, 3)
     per_step: int = 8
     distance: float = 0.5
     least_variance: float = 1e-3

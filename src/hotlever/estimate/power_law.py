@@ -195,11 +195,6 @@ class PowerLawFit:
     power_mW: Array
     residual_K: Array
 
-    @property
-    def rms_K(self) -> float:
-        """Root mean square of the residuals (K)."""
-        return float(np.sqrt(np.mean(self.residual_K**2)))
-
     def largest_residual_K(self, from_mW: float = 0.0, to_mW: float = np.inf) -> float:
         """Return the largest residual (K) between two powers; NaN if there are no data."""
         here = (self.power_mW >= from_mW) & (self.power_mW <= to_mW)
