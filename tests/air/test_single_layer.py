@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hotlever.air.laplace import Laplace, potential, rectangle_pairs
+from hotlever.air.laplace import Approach, Laplace, potential, rectangle_pairs
 from hotlever.air.panels import Mirror, Panels, mirror_group, square_distances
-from hotlever.air.single_layer import single_layer_matrix
+from hotlever.air.single_layer import Screened, separations, single_layer_matrix
 
 
 def rectangle(axis: int, low, high) -> Panels:
@@ -21,10 +21,14 @@ def rectangle(axis: int, low, high) -> Panels:
     return Panels(corners[None])
 
 
-def by_gauss(first: Panels, second: Panels) -> float:
+def length(offsets):
+    return np.linalg.norm(offsets, axis=-1)
+
+
+def by_gauss(first: Panels, second: Panels, kernel=lambda offsets: 1 / length(offsets)):
     (x,), (wx,) = first.points(12)
     (y,), (wy,) = second.points(12)
-    return wx @ (1 / np.linalg.norm(x[:, None] - y, axis=2)) @ wy
+    return wx @ kernel(x[:, None] - y) @ wy
 
 
 @pytest.mark.parametrize("one", range(3))
@@ -57,6 +61,38 @@ def test_rectangles_that_share_an_edge(second):
     (points,), (weights,) = second.points(60)
     outer = weights @ potential(points, first.corners[0])
     assert rectangle_pairs(first, second)[0] == pytest.approx(outer, rel=1e-6)
+
+
+@pytest.mark.parametrize("other", range(3))
+def test_points_of_both_serve_pairs_that_are_apart(other):
+    first = rectangle(2, (0, 0, 0), (1, 0.4, 0))
+    motion, pair = np.array([0.0, 0.0, 1.0]), np.zeros(1, dtype=int)
+    # just beyond where closed forms end, then kernels without a pole
+    second = rectangle(other, (2.75, 0.2, 0.9), (3.25, 1.0, 1.4))
+    assert 2.5 < separations(first, second, pair, pair)[0] < 3.2
+    (found,) = Laplace().near_pairs(first, second, pair, pair)
+    assert found == pytest.approx(rectangle_pairs(first, second)[0], rel=3e-4)
+
+    def approach(offsets):
+        return offsets[..., 2] / length(offsets) ** 3
+
+    (found,) = Approach(motion).near_pairs(first, second, pair, pair)
+    assert found == pytest.approx(by_gauss(first, second, approach), rel=3e-3)
+
+
+@pytest.mark.parametrize(("x", "error"), [(0.9, 3e-4), (1.4, 1.5e-3)])
+@pytest.mark.parametrize("q", [1.0j, 2.0j, 0.5])
+def test_kernels_without_a_pole_by_points_of_both(q, x, error):
+    first, pair = rectangle(2, (0, 0, 0), (1, 0.4, 0)), np.zeros(1, dtype=int)
+    second = rectangle(0, (x, 0.2, 0.1), (x, 1.0, 0.6))
+    assert (separations(first, second, pair, pair)[0] > 1.0) == (x > 1.0)
+
+    def screened(offsets):
+        return np.expm1(-q * length(offsets)) / length(offsets)
+
+    ((found,),) = Screened(np.array([q])).near_pairs(first, second, pair, pair)
+    exact = by_gauss(first, second, screened)
+    assert found == pytest.approx(exact, rel=error)
 
 
 def test_far_expansion_has_order_four():

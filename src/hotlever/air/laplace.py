@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.air.panels import COINCIDENT, Panels, spreads, traces
-from hotlever.air.single_layer import pairs_by_points
+from hotlever.air.single_layer import pairs_by_points, pairs_by_points_of_both, separations
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
@@ -34,8 +34,10 @@ class Laplace:
 
     shape: tuple[int, ...] = ()
     dtype, far = np.dtype(float), 3.0
-    #: For near pairs that have no closed form, see `hotlever.air.single_layer.pairs_by_points`.
-    orders = ((8, 0.5), (6, 1.0), (4, 1.5), (3, 2.0), (2, np.inf))
+    #: Pairs so far apart, in sums of their radii, need no more than two points a side on both.
+    apart = 2.5
+    #: For nearer ones without a closed form, see `hotlever.air.single_layer.pairs_by_points`.
+    orders = ((8, 0.5), (6, 1.0), (4, 1.5), (3, np.inf))
 
     def far_pairs(self, first: Panels, second: Panels, square: Array) -> Array:
         """Return ∫∫ 1/R over distant pairs, to second order in size over distance."""
@@ -47,11 +49,17 @@ class Laplace:
 
     def near_pairs(self, first: Panels, second: Panels, i: Index, j: Index) -> Array:
         """Return ∫∫ 1/R over pairs: closed for rectangles in one frame, else by points."""
-        closed = _in_one_frame(first, second, i, j)
+        apart = separations(first, second, i, j) >= self.apart
+        closed = ~apart & _in_one_frame(first, second, i, j)
+        others = ~(apart | closed)
         result = np.empty(len(i))
+        result[apart] = pairs_by_points_of_both(
+            first, second, i[apart], j[apart], lambda offsets: 1.0 / _length(offsets), 2
+        )
         result[closed] = rectangle_pairs(first.chosen(i[closed]), second.chosen(j[closed]))
-        others = first.chosen(i[~closed]), second.chosen(j[~closed])
-        result[~closed] = pairs_by_points(*others, potential, self.orders)
+        result[others] = pairs_by_points(
+            first.chosen(i[others]), second.chosen(j[others]), potential, self.orders
+        )
         return result
 
 
@@ -93,14 +101,33 @@ class Approach:
             in_plane = ((sides.outward @ self._motion) * sides.inverse).sum(axis=-1)
             return in_plane + (sides.normal @ self._motion) * np.sign(sides.height) * sides.angle
 
-        closed = _in_one_frame(first, second, i, j) & self._upwards
+        def between_points(offsets: Array) -> Array:
+            along = np.tensordot(self._motion, offsets, axes=1)
+            return np.asarray(along / _length(offsets) ** 3)
+
+        apart = separations(first, second, i, j) >= Laplace.apart
+        closed = ~apart & _in_one_frame(first, second, i, j) & self._upwards
+        others = ~(apart | closed)
         result = np.empty(len(i))
+        result[apart] = pairs_by_points_of_both(
+            first, second, i[apart], j[apart], between_points, 2
+        )
         result[closed] = self._motion[2] * _raised_rectangle_pairs(
             first.chosen(i[closed]), second.chosen(j[closed])
         )
-        others = first.chosen(i[~closed]), second.chosen(j[~closed])
-        result[~closed] = pairs_by_points(*others, over_panel, Laplace.orders, odd=True)
+        result[others] = pairs_by_points(
+            first.chosen(i[others]),
+            second.chosen(j[others]),
+            over_panel,
+            Laplace.orders,
+            odd=True,
+        )
         return result
+
+
+def _length(offsets: Array) -> Array:
+    """Return the lengths of vectors (3, ...)."""
+    return np.asarray(np.sqrt(offsets[0] ** 2 + offsets[1] ** 2 + offsets[2] ** 2))
 
 
 def _in_one_frame(first: Panels, second: Panels, i: Index, j: Index) -> NDArray[np.bool_]:
@@ -212,13 +239,11 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
     for pairs, (normal, other_normal), d in _by_orientation(first, second):
         if normal == other_normal:
             u, v = (axis for axis in range(3) if axis != normal)
-            result[pairs] = _parallel(d[:, :, u], d[:, :, v], d[0, :, normal])
+            result[pairs] = _parallel(d[:, u], d[:, v], d[0, normal])
         else:
             shared = 3 - normal - other_normal
             # along the normal of one rectangle only the other extends
-            result[pairs] = _perpendicular(
-                d[:, :, shared], d[[0, 1], :, other_normal], d[[0, 2], :, normal]
-            )
+            result[pairs] = _perpendicular(d[:, shared], d[[0, 1], other_normal], d[[0, 2], normal])
     return result
 
 
@@ -227,26 +252,25 @@ def _by_orientation(
 ) -> Iterator[tuple[NDArray[np.bool_], tuple[int, int], Array]]:
     """Give pairs of rectangles in one frame by the axes normal to both.
 
-    With the differences of their coordinates, (4, pairs, 3): high − low, low − low, high − high,
+    With the differences of their coordinates, (4, 3, pairs): high − low, low − low, high − high,
     low − high.
     """
     (axis, angle), (other_axis, other_angle) = first.frame, second.frame
     # the same axes at angles of next to 0 and π/2
     swapped = np.abs(angle - other_angle) > np.pi / 4
     other_axis = np.where(swapped & (other_axis < 2), 1 - other_axis, other_axis)
-    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    low, high = [], []
-    for panels in (first, second):
-        x, y, z = np.moveaxis(panels.corners, 2, 0)
-        turned = np.stack([cosine * x + sine * y, cosine * y - sine * x, z], axis=2)
-        low.append(turned.min(axis=1))
-        high.append(turned.max(axis=1))
-    differences = np.stack([high[0] - low[1], low[0] - low[1], high[0] - high[1], low[0] - high[1]])
+    half, other_half = first.half_sizes.T, second.half_sizes.T
+    other_half = np.where(swapped, other_half[[1, 0, 2]], other_half)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    x, y, z = (first.centres - second.centres).T
+    between = np.stack([cosine * x + sine * y, cosine * y - sine * x, z])
+    both, less = half + other_half, half - other_half
+    differences = np.stack([between + both, between - less, between + less, between - both])
     for normal in range(3):
         for other_normal in range(3):
             pairs = (axis == normal) & (other_axis == other_normal)
             if pairs.any():
-                yield pairs, (normal, other_normal), differences[:, pairs]
+                yield pairs, (normal, other_normal), differences[..., pairs]
 
 
 def _parallel(u: Array, v: Array, w: Array) -> Array:
@@ -291,16 +315,16 @@ def _raised_rectangle_pairs(first: Panels, second: Panels) -> Array:
     result = np.empty(len(first))
     for pairs, (normal, other_normal), d in _by_orientation(first, second):
         if normal == other_normal == 2:
-            terms = _apart(*_grid(d, 0, 1), d[0, :, 2])
+            terms = _apart(*_grid(d, 0, 1), d[0, 2])
             total = np.einsum("u,v,uvn->n", _TWICE, _TWICE, terms)
         elif normal == other_normal:
-            terms = _aside(*_grid(d, 1 - normal, 2), d[0, :, normal])
+            terms = _aside(*_grid(d, 1 - normal, 2), d[0, normal])
             total = np.einsum("u,v,uvn->n", _TWICE, _TWICE, terms)
         else:
             # along the normal of one rectangle only the other extends
             shared = 3 - normal - other_normal
-            a = d[:, :, shared][:, None, None]
-            b, c = d[[0, 1], :, other_normal][None, :, None], d[[0, 2], :, normal][None, None, :]
+            a = d[:, shared][:, None, None]
+            b, c = d[[0, 1], other_normal][None, :, None], d[[0, 2], normal][None, None, :]
             if shared == 2:
                 terms = _box(a, b, c)
             else:
@@ -312,7 +336,7 @@ def _raised_rectangle_pairs(first: Panels, second: Panels) -> Array:
 
 
 def _grid(d: Array, u: int, v: int) -> tuple[Array, Array]:
-    return d[:, :, u][:, None], d[:, :, v][None, :]
+    return d[:, u][:, None], d[:, v][None, :]
 
 
 def _apart(a: Array, b: Array, c: Array) -> Array:

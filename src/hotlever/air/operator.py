@@ -199,7 +199,18 @@ class PanelledAir:
         layer[np.ix_(on_tip, on_tip)] += self.surface.through_tip * at_tip
         self._layer = layer
         self._basis = _by_sites(self.surface, areas)
+        self._to_unknowns = self._basis.T.tocsr()
         self._site_areas = np.bincount(self.surface.site, areas[own])
+
+    def _by_unknowns(self, layer: Numbers) -> Numbers:
+        """Return a symmetric layer between the unknowns of the basis, not the panels."""
+        to_unknowns, between = self._to_unknowns, np.empty_like(layer)
+        rows_at_once = 128  # whole matrices in between would take longer to allocate than to fill
+        for start in range(0, len(layer), rows_at_once):
+            rows = slice(start, start + rows_at_once)
+            of_rows = np.ascontiguousarray((to_unknowns[rows] @ layer).T)
+            between[rows] = (to_unknowns @ of_rows).T
+        return between
 
     def _condensed(self, layer: Numbers) -> tuple[Numbers, Numbers]:
         """Return the layer between the densities of sites, and the other unknowns by these.
@@ -209,7 +220,7 @@ class PanelledAir:
         so much is left out where one face is compared with the other. That is positive definite
         still, since a layer between the faces holds at most half the thickness.
         """
-        own = self._basis.T @ (self._basis.T @ layer).T
+        own = self._by_unknowns(layer)
         sites, rest = len(self._site_areas), len(own) - len(self.surface.across)
         upper = self.surface.across[:, 0]
         outside = 1.0 - 2.0 * self._over_thickness
@@ -254,8 +265,7 @@ class PanelledAir:
         if math.isnan(self._gap):
             return operator
         # the largest products of matrices here, of which no more than six digits are asked
-        change = self._basis.T @ (self._basis.T @ self._layer_by_gap()).T
-        sites, change = len(heat), change.astype(np.float32)
+        sites, change = len(heat), self._by_unknowns(self._layer_by_gap()).astype(np.float32)
         by_theta, others = by_theta.astype(np.float32), others.astype(np.float32)
         # the change is symmetric: half of what is between the other unknowns on either side
         half = others.T @ (

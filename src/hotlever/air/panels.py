@@ -83,7 +83,7 @@ class Panels:
     def chosen(self, index: NDArray[Any] | slice) -> Panels:
         """Return some of the panels, by number, mask or range; what is known of them stays."""
         some = Panels(self.corners[index])
-        for name in vars(self).keys() & {"areas", "centres", "radii", "moments"}:
+        for name in vars(self).keys() & {"areas", "centres", "radii", "moments", "half_sizes"}:
             vars(some)[name] = vars(self)[name][index]
         if "frame" in vars(self):
             vars(some)["frame"] = tuple(each[index] for each in self.frame)
@@ -157,8 +157,26 @@ class Panels:
         axis = np.where(flat, 2, np.where(standing, 1 - quarters % 2, -1))
         return np.where(proper, axis, -1), angle
 
+    @cached_property
+    def half_sizes(self) -> Array:
+        """Half of how far panels reach along the axes of their own `frame` (µm), shape (n, 3)."""
+        _, angle = self.frame
+        cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        x, y, z = np.moveaxis(self.corners, 2, 0)
+        turned = np.stack([cosine * x + sine * y, cosine * y - sine * x, z], axis=2)
+        return np.asarray(0.5 * np.ptp(turned, axis=1))
+
+    @cached_property
+    def _by_order(self) -> dict[int, tuple[Array, Array]]:
+        return {}
+
     def points(self, order: int) -> tuple[Array, Array]:
         """Return Gauss points (n, order², 3) and weights (n, order²) on each panel."""
+        if order not in self._by_order:
+            self._by_order[order] = self._gauss_points(order)
+        return self._by_order[order]
+
+    def _gauss_points(self, order: int) -> tuple[Array, Array]:
         nodes, weights = gauss_rule(order)
         s, t = np.stack(np.meshgrid(nodes, nodes, indexing="ij")).reshape(2, -1, 1) / 2 + 0.5
         a, b, c, d = np.moveaxis(self.corners, 1, 0)[:, :, None]

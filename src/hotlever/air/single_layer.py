@@ -87,13 +87,13 @@ def single_layer_matrix(
         µm³, symmetric; one for each function of the kernel.
     """
     count = len(panels)
-    matrix: Numbers = np.zeros((*kernel.shape, 0, 0))
+    matrix: Numbers = np.zeros((*kernel.shape, count, count), dtype=kernel.dtype)
     for done, mirror in enumerate(mirrors):
+        share = mirror.sign / (4.0 * np.pi)
         images = panels.reflected(mirror)
         for body in (panels, images):
             # what is known of all is known of a part
-            _ = body.radii, body.moments
-        image = np.empty((*kernel.shape, count, count), dtype=kernel.dtype)
+            _ = body.radii, body.moments, body.frame, body.half_sizes
         near = []
         rows_at_once = 32  # whose arrays stay in the cache
         for start in range(0, count, rows_at_once):
@@ -102,25 +102,76 @@ def single_layer_matrix(
             some, rest = panels.chosen(rows), images.chosen(others)
             square = square_distances(some, rest)
             values = kernel.far_pairs(some, rest, square)
-            image[..., rows, others] = values
-            image[..., others, rows] = np.swapaxes(values, -1, -2)
             reach = kernel.far * np.add.outer(some.radii, rest.radii)
             i, j = np.nonzero(square < reach**2)
+            values[..., i, j] = 0.0
+            values *= share
+            matrix[..., rows, others] += values
             half = i <= j
             near.append(start + np.stack([i[half], j[half]]))
         pairs = np.concatenate(near, axis=1)
         pairs_at_once = 8192
         for start in range(0, pairs.shape[1], pairs_at_once):
             i, j = pairs[:, start : start + pairs_at_once]
-            values = kernel.near_pairs(panels, images, i, j)
-            image[..., i, j] = values
-            image[..., j, i] = values
+            matrix[..., i, j] += share * kernel.near_pairs(panels, images, i, j)
             if progress is not None:
-                share = int(100 * min(start + pairs_at_once, pairs.shape[1]) / pairs.shape[1])
-                progress(100 * done + share, 100 * len(mirrors))
-        image *= mirror.sign / (4.0 * np.pi)
-        matrix = image + matrix if done else image
+                percent = int(100 * min(start + pairs_at_once, pairs.shape[1]) / pairs.shape[1])
+                progress(100 * done + percent, 100 * len(mirrors))
+    for start in range(0, count, 256):
+        # what is below the diagonal, from above it
+        rows, others = slice(start, start + 256), slice(start + 256, count)
+        matrix[..., others, rows] = np.swapaxes(matrix[..., rows, others], -1, -2)
+        upper = np.triu(matrix[..., rows, rows])
+        matrix[..., rows, rows] = upper + np.swapaxes(np.triu(upper, 1), -1, -2)
     return matrix
+
+
+def separations(first: Panels, second: Panels, i: Index, j: Index) -> Array:
+    """Return how far the centroids of pairs are apart, over the sums of their radii, (n,)."""
+    x, y, z = (first.centres[i] - second.centres[j]).T
+    distances = np.sqrt(x**2 + y**2 + z**2)
+    return np.asarray(distances / (first.radii[i] + second.radii[j]))
+
+
+def pairs_by_points_of_both(
+    first: Panels,
+    second: Panels,
+    i: Index,
+    j: Index,
+    between_points: Callable[[Array], Numbers],
+    order: int,
+) -> Numbers:
+    """Integrate over pairs of any panels by Gauss points of both: of those that are apart.
+
+    Parameters
+    ----------
+    first, second : Panels
+    i, j : ndarray of int, shape (n,)
+        Numbers of the panels of each pair.
+    between_points : callable
+        Returns the kernel at offsets from points of the second to points of the first, (3, ...).
+    order : int
+        Points per direction.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+    """
+    bodies = []
+    for panels in (first, second):
+        points, weights = panels.points(order)
+        bodies.append((points.transpose(2, 1, 0).copy(), weights.T.copy()))
+    (at, weights), (others_at, other_weights) = bodies
+    integrals = []
+    # pairs last, and so many that their arrays stay in the cache
+    for pairs in np.array_split(np.arange(len(i)), 1 + len(i) * order**4 // 32768):
+        own, other = i[pairs], j[pairs]
+        offsets = at[:, :, None, own] - others_at[:, None, :, other]
+        values = between_points(offsets)
+        integrals.append(
+            np.einsum("an,bn,...abn->...n", weights[:, own], other_weights[:, other], values)
+        )
+    return np.concatenate(integrals, axis=-1)
 
 
 def pairs_by_points(
@@ -148,7 +199,8 @@ def pairs_by_points(
     -------
     ndarray, shape (..., n)
     """
-    gaps = np.linalg.norm(first.centres - second.centres, axis=1) / (first.radii + second.radii)
+    every = np.arange(len(first))
+    gaps = separations(first, second, every, every)
     smaller = (first.radii <= second.radii)[:, None, None]
     under = Panels(np.where(smaller, first.corners, second.corners))
     source = np.where(smaller, second.corners, first.corners)
@@ -202,9 +254,24 @@ class Screened:
         def over_panel(points: Array, corners: Array) -> Numbers:
             return screened_potential(points, corners, self._q)
 
-        return pairs_by_points(
-            first.chosen(i), second.chosen(j), over_panel, ((4, 0.5), (3, 1.0), (2, np.inf))
+        def between_points(offsets: Array) -> Numbers:
+            x, y, z = offsets
+            distance = np.sqrt(x**2 + y**2 + z**2)
+            return np.asarray(_decay(self._q, distance) / distance)
+
+        gaps = separations(first, second, i, j)
+        result = np.empty((*self.shape, len(i)), dtype=self.dtype)
+        # the kernel has no pole: it bends at R = 0 alone
+        for order, nearest, farthest in ((2, 1.0, np.inf), (3, 0.5, 1.0)):
+            here = (gaps >= nearest) & (gaps < farthest)
+            result[..., here] = pairs_by_points_of_both(
+                first, second, i[here], j[here], between_points, order
+            )
+        near = gaps < 0.5
+        result[..., near] = pairs_by_points(
+            first.chosen(i[near]), second.chosen(j[near]), over_panel, ((4, np.inf),)
         )
+        return result
 
 
 def screened_potential(points: Array, corners: Array, q: Numbers) -> Numbers:

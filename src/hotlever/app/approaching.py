@@ -96,7 +96,7 @@ def answer(
         return _moving(report, Reader(probe, noise), distances, distance, bias)
     lever = make_lever(report, probe.with_(surface_gap_um=distance))
     data = over_surface(lever, [distance], [bias], noise)
-    if not data.tip_K.notnull().any():
+    if not np.isfinite(data.tip_K.values).any():
         raise ComputationError(notes_of(data)[0])
     report.note(*notes_of(data))
     values, around = {name: float(data[name].item()) for name in _READ}, probe.surroundings

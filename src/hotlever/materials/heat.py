@@ -136,11 +136,14 @@ def thermal_conductivity_of_wire(T: ArrayLike, diameter_um: ArrayLike) -> Evalua
 def _sondheimer(depth: Array) -> tuple[Array, Array]:
     """Sondheimer's Eq. 12 with diffuse surfaces, by thickness over Λ, and its derivative."""
     # loaded where it is wanted, as every command loads this module
-    from scipy.special import expn
+    from scipy.special import exp1
 
-    third, fifth = expn(3, depth), expn(5, depth)
+    decayed, integrals = np.exp(-depth), [exp1(depth)]
+    for order in range(1, 5):  # DLMF 8.19.12; expn would take five times as long
+        integrals.append((decayed - depth * integrals[-1]) / order)
+    _, second, third, fourth, fifth = integrals
     share = 1.0 - 1.5 * (0.25 - third + fifth) / depth
-    slope = (1.0 - share) / depth - 1.5 * (expn(2, depth) - expn(4, depth)) / depth
+    slope = (1.0 - share) / depth - 1.5 * (second - fourth) / depth
     return share, slope
 
 

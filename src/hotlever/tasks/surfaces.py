@@ -226,7 +226,7 @@ def approach(
     meshed = make_lever(reporter, above)
     with reporter.progress("distances") as update:
         data = over_surface(meshed, distances, biases, noise, pressures, progress=update)
-    if not data.tip_K.notnull().any():
+    if not np.isfinite(data.tip_K.values).any():
         raise ComputationError(notes_of(data)[0])
     if not reader.is_held and above.circuit.swept != "reader":
         reporter.note(
@@ -313,7 +313,7 @@ def best_resolved(data: xr.Dataset, noise: NoiseOptions) -> list[list[str]]:
     import numpy as np
 
     density = data.resolution_nm_per_rtHz
-    if not density.notnull().any():
+    if not np.isfinite(density.values).any():
         return []
     best = data.isel(density.argmin(...))
     resolution = float(best.resolution_nm_per_rtHz)
