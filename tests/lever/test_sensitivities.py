@@ -6,6 +6,11 @@ import numpy as np
 import pytest
 
 from hotlever.lever import Lever
+from hotlever.lever.branch import Branch
+from hotlever.lever.equations import steps_of
+from hotlever.lever.newton import NewtonOptions
+from hotlever.lever.observables import Linearised
+from hotlever.lever.solved_states import solve_at
 from hotlever.materials import PARAMETERS
 from hotlever.probe import MeshOptions, Probe
 from hotlever.quantities import OBSERVABLES
@@ -60,3 +65,19 @@ def test_a_lever_without_reader_has_no_reader_sensitivity():
     assert np.isnan(sweep.reader_V.item())
     assert np.isnan(sweep.sensitivity.sel(observable="reader")).all()
     assert np.isfinite(sweep.sensitivity.sel(observable="tip")).all()
+
+
+def test_a_state_that_gives_way_to_one_at_a_step_of_a_law_leaves_no_factors(coarse):
+    equations, whole = coarse.equations, coarse.branch()
+    (at_step,) = (u for u in steps_of(equations) if u > 0)
+    u = np.append(whole.u[(whole.u > 0) & (whole.u < at_step)], np.sqrt(at_step**2 - 0.2))
+    roots = solve_at(equations, u, whole.states(u), NewtonOptions())
+    branch = Branch.whole(equations, u, roots)
+    linearised = [
+        Linearised.of(
+            coarse.probe, ("a0", "n_d"), branch, lambda to: to.u[-1] > at_step + 1, None, factors
+        )
+        for factors in (None, equations.factorised(roots.x))
+    ]
+    slopes, again = (each.output_slopes for each in linearised)
+    assert again == pytest.approx(slopes, rel=1e-9, nan_ok=True)

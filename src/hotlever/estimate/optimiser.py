@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hotlever.errors import HotleverError, InputError
+from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimate.diagnosis import lack_of_fit_text
 from hotlever.estimate.experiment import Prediction, Predictor
 from hotlever.estimate.objective import Objective, Subproblem
@@ -127,16 +127,16 @@ class Optimiser:
         """
         if robust and not self.objective.informed:
             self._most = 2 * self._options.most_in_estimate
-        optimum = self.solve(start)
+        optimum = self.solve(start, roughly=True)
         unknown = self.residuals.errors.without.any() and not self.objective.informed
         for _ in range(self._options.scatter_rounds if unknown else 0):
             self.residuals.take_scatter(optimum.prediction.values)
-            optimum = self.solve(optimum.probe)
+            optimum = self.solve(optimum.probe, roughly=True)
         if robust:
             optimum = self._reweighted(start, optimum)
         for _ in range(self._options.confirmations):
             if not self.predictor.confirm(optimum.prediction):
-                return optimum
+                return self.solve(optimum.probe) if self.objective.informed else optimum
             previous, optimum = optimum, self.solve(optimum.probe)
             if not optimum.converged or self._settled(previous, optimum):
                 return optimum
@@ -146,21 +146,53 @@ class Optimiser:
         """Lessen the weight of outliers until nothing changes: gently at first.
 
         With priors outliers stand out at once, since these hold a fit that others would pull along;
-        without any there is nothing to do.
+        without any there is nothing to do, and with some the levers near the optimum tell which.
         """
-        errors, informed, options = self.residuals.errors, self.objective.informed, self._options
-        difference = self.residuals.own_difference(optimum.prediction.values)
-        if informed and not errors.has_outliers(difference):
+        errors, options = self.residuals.errors, self._options
+        rounds = ((True, options.gentle_rounds), (False, options.robust_rounds))
+        if self.objective.informed:
+            difference = self.residuals.own_difference(optimum.prediction.values)
+            for _ in range(options.robust_rounds if errors.has_outliers(difference) else 0):
+                near = Subproblem(self.objective, optimum.prediction)
+                for gently, most in rounds:
+                    self._lessen_nearby(near, gently, most)
+                previous, optimum = optimum, self.solve(optimum.probe, roughly=True)
+                if not optimum.converged or self._settled(previous, optimum):
+                    break
             return optimum
-        for gently, most in ((True, options.gentle_rounds), (False, options.robust_rounds)):
+        for gently, most in rounds:
             for _ in range(most):
                 errors.lessen(self.residuals.own_difference(optimum.prediction.values), gently)
-                # outliers can drive the first fit onto a bound, where it would stay without priors
-                origin = start if gently and not informed else optimum.probe
-                previous, optimum = optimum, self.solve(origin)
+                # outliers can drive the first fit onto a bound, where it would stay
+                origin = start if gently else optimum.probe
+                previous, optimum = optimum, self.solve(origin, roughly=True)
                 if not optimum.converged or self._settled(previous, optimum):
                     break
         return optimum
+
+    def _lessen_nearby(self, near: Subproblem, gently: bool, most: int) -> None:
+        """Lessen the weight of outliers, by the levers near one that was solved."""
+        objective, options = self.objective, self._options
+        region = options.first_region * objective.coordinates.room(near.origin)
+        point = near.origin
+        for _ in range(most):
+            try:
+                values, slopes = near.predict(point)
+            except ComputationError:  # the lever that is solved next tells
+                break
+            self.residuals.errors.lessen(self.residuals.own_difference(values), gently)
+            before, (point, _) = point, near.minimum(point, region)
+            if self._takes_scatter:
+                point, _ = self._with_scatter(point, region, near)
+            stderr = np.sqrt(np.diag(objective.laplace(slopes, point)))
+            if np.all(np.abs(point - before) <= options.settled * stderr):
+                break
+
+    @property
+    def _takes_scatter(self) -> bool:
+        """Whether the noise of some observables is found with the optimum."""
+        unknown = bool(self.residuals.errors.without.any())
+        return unknown and self.objective.informed and self._options.scatter_rounds > 0
 
     def _settled(self, previous: Optimum, optimum: Optimum) -> bool:
         """Whether the parameters have moved too little for another confirmation to matter."""
@@ -170,8 +202,8 @@ class Optimiser:
         least = np.minimum(options.settled * optimum.stderr, options.settled_relative * size)
         return bool(np.all(np.abs(now - previous.probe.values(objective.varied)) <= least))
 
-    def solve(self, start: Probe) -> Optimum:
-        """Find the optimum of the present model and weights.
+    def solve(self, start: Probe, *, roughly: bool = False) -> Optimum:
+        """Find the optimum of the present model and weights, or roughly, to be confirmed.
 
         Raises
         ------
@@ -183,9 +215,7 @@ class Optimiser:
         objective, options = self.objective, self._options
         self._check_start(start)
         most = min(self.predictor.evaluations + options.most_branches, self._most)
-        # the noise of some observables may be found with the optimum
-        unknown = bool(self.residuals.errors.without.any())
-        takes_scatter = unknown and objective.informed and options.scatter_rounds > 0
+        takes_scatter = self._takes_scatter
         at, region, creeping = self.predictor.predict(start), options.first_region, 0
         while True:
             # without priors residuals have no size that says what is near
@@ -197,7 +227,7 @@ class Optimiser:
                 target, least = self._with_scatter(target, region * room, near)
             squares, step = objective.squares(at), target - near.origin
             inner = bool(np.all(np.abs(step) < 0.99 * region * room))
-            left, enough = objective.decrement(at), self._tolerance(at)
+            left, enough = objective.decrement(at), self._tolerance(at, roughly)
             # a step within the region that gains nothing is as good as none
             if left <= enough or (inner and squares - least <= enough):
                 return self._optimum(at, left, converged=True)
@@ -249,7 +279,7 @@ class Optimiser:
             return 1.0
         return self.residuals.errors.noise_squares(self.residuals.difference(at.values))
 
-    def _tolerance(self, at: Prediction) -> float:
+    def _tolerance(self, at: Prediction, roughly: bool) -> float:
         """Return by how much the sum of squares may still fall where a search ends."""
         objective, residuals, options = self.objective, self.residuals, self._options
         squares, noise = objective.squares(at), self._noise(at)
@@ -257,7 +287,8 @@ class Optimiser:
         hopeless = squares > options.misfit * residuals.size * noise
         least = (options.negligible_of_misfit if hopeless else options.negligible) * squares
         if objective.informed:
-            return float(max(options.decrement, least))
+            decrement = options.rough_decrement if roughly else options.decrement
+            return float(max(decrement, least))
         precise = residuals.size * (options.precision * residuals.errors.unit_weight) ** 2
         return float(max(options.relative_decrement * noise, least, precise))
 

@@ -98,6 +98,9 @@ class SearchOptions:
     relative_decrement : float
         The same in units of the noise, where weights count no standard deviations: a thirtieth of a
         standard error.
+    rough_decrement : float
+        The same before the model is confirmed, which moves the optimum anyway: a quarter of a
+        standard error.
     small_decrement : float
         The same where steps gain next to nothing: a third of a standard error. With priors that is
         where no longer step than the ``rough_region`` gains anything, since values are not smooth
@@ -139,6 +142,7 @@ class SearchOptions:
     largest_region: float = 0.7
     decrement: float = 1e-2
     relative_decrement: float = 1e-3
+    rough_decrement: float = 0.05
     small_decrement: float = 0.1
     rough_region: float = 1e-3
     smallest_region: float = 1e-6

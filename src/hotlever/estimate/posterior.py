@@ -222,18 +222,16 @@ class CurvedQuantity:
 
     def changes(self, errors: Array) -> Array:
         """Return by how much errors (n, p) change the quantity, (n,)."""
-        changes = self._to_second_order(errors)
+        bent = np.einsum("ni,ni->n", errors @ self._curvature, errors)
+        changes = np.asarray(errors @ self._gradient + 0.5 * bent)
         if self._along is None:
             return changes
         far = errors @ self._bent_axis
         within = np.clip(far, self._along.x[0], self._along.x[-1])
         solved = self._along(within) + self._along(within, 1) * (far - within)
         # the axis is one of the curvature's own, so that it has no part in the others
-        return changes + solved - self._to_second_order(np.outer(far, self._bent_axis))
-
-    def _to_second_order(self, errors: Array) -> Array:
-        bent = np.einsum("ni,ni->n", errors @ self._curvature, errors)
-        return np.asarray(errors @ self._gradient + 0.5 * bent)
+        slope, bend = self._bent_axis @ self._gradient, self._bent_axis @ self._curvature
+        return changes + solved - far * (slope + 0.5 * far * (bend @ self._bent_axis))
 
     def _derivatives(self, point: Array) -> tuple[Array, Array]:
         """Return those of the residuals, (N, p), and of the quantity, (p,), along the axes."""

@@ -33,6 +33,7 @@ from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import FITTED, OBSERVABLES
 from hotlever.records import Number
 from hotlever.text import BAND
+from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
 
 if TYPE_CHECKING:
@@ -329,6 +330,7 @@ def limits_of(row: xr.Dataset, of: BudgetOf) -> tuple[float, float]:
     return low, high
 
 
+@one_blas_thread
 def budget_of_estimate(solution: Solution, row: xr.Dataset, of: BudgetOf) -> TemperatureBudget:
     """Return the budget of a temperature in a row of the table of an estimated lever.
 

@@ -29,7 +29,7 @@ from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Part
 from hotlever.probe.mesh import ProbeMesh
 from hotlever.probe.solid import SolidMesh
-from hotlever.types import Array, Index, LinearSolver
+from hotlever.types import Array, Index, LinearSolver, Mask
 
 
 class FullSpace(Space):
@@ -288,6 +288,7 @@ class SparseFactors:
         """Return the same, and those of other states after them."""
         return SparseFactors(self._solvers + other._solvers)
 
-    def first(self, count: int) -> SparseFactors:
-        """Return those of the first states."""
-        return SparseFactors(self._solvers[:count])
+    def among(self, states: Mask | Index) -> SparseFactors:
+        """Return those of some states, by a mask or in an order."""
+        chosen = np.arange(len(self._solvers))[states].tolist()
+        return SparseFactors([self._solvers[state] for state in chosen])

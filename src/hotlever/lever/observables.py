@@ -305,12 +305,16 @@ class Linearised:
         x, changes = longer.x[:, longer.solved], np.empty(0)
         constraint = longer.parametrisation.constraint(longer.u[longer.solved])
         equations = derivatives or longer.equations
-        added = np.arange(branch.solved.size, x.shape[1])
-        if factors is None or longer.u[0] < branch.u[0]:
+        if factors is None:
             factors = equations.factorised(x, constraint)
-        elif added.size:
-            of_added = equations.factorised(x[:, added], constraint.among(added))
-            factors = factors.followed_by(of_added)
+        else:
+            before, after = branch.u[branch.solved], longer.u[longer.solved]
+            is_added = ~np.isin(after, before)
+            added, factors = np.flatnonzero(is_added), factors.among(np.isin(before, after))
+            if added.size:
+                of_added = equations.factorised(x[:, added], constraint.among(added))
+                order = np.argsort(np.append(np.flatnonzero(~is_added), added))
+                factors = factors.followed_by(of_added).among(order)
         if derivatives is None:
             output_slopes = by_parameter(longer.equations, x, names, factors, constraint)
         else:
@@ -331,7 +335,7 @@ class Linearised:
         return replace(
             self,
             branch=branch.among(np.arange(count)),
-            factors=None if factors is None else factors.first(solved),
+            factors=None if factors is None else factors.among(np.arange(solved)),
             changes=self.changes[:, :count] if self.changes.size else self.changes,
             output_slopes=self.output_slopes[:count],
         )

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from hotlever.lever.elements import FiniteElements, LinearMap
 from hotlever.lever.films import PlacedFilm, Rim
 from hotlever.lever.transport import Fields, Fluxes, Tangent
-from hotlever.types import Array, Index
+from hotlever.types import Array, Index, Mask
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -41,8 +41,8 @@ class Factors(Protocol):
         """Return the same, and those of other states after them."""
         ...
 
-    def first(self, count: int) -> Any:
-        """Return those of the first states."""
+    def among(self, states: Mask | Index) -> Any:
+        """Return those of some states, by a mask or in an order."""
         ...
 
 

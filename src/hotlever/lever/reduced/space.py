@@ -23,7 +23,7 @@ from hotlever.lever.films import Rim, at_some
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.space import Constraint, Space, SurfaceTangent
 from hotlever.lever.transport import Tangent
-from hotlever.types import Array, Index
+from hotlever.types import Array, Index, Mask
 
 
 def proper_orthogonal_modes(snapshots: Array, most: int | None = None, least: float = 0.0) -> Array:
@@ -299,6 +299,6 @@ class DenseFactors:
         """Return the same, and those of other states after them."""
         return DenseFactors(np.concatenate([self._inverses, other._inverses]))
 
-    def first(self, count: int) -> DenseFactors:
-        """Return those of the first states."""
-        return DenseFactors(self._inverses[:count])
+    def among(self, states: Mask | Index) -> DenseFactors:
+        """Return those of some states, by a mask or in an order."""
+        return DenseFactors(self._inverses[states])
