@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hotlever.estimate import fit, read_fit
-from hotlever.estimate.estimator import known_before_a_fit
+from hotlever.estimate.beside_a_fit import known_before_a_fit
 from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import Prior, published_material
 

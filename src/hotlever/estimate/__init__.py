@@ -6,10 +6,10 @@ forward map     `experiment`: at rest, in time, over a sample; the `surrogate` o
 residuals       data by their `noise` and the scales that they have in common: `residuals`
 search          of an `objective`, with a `prior_density`: `search` by an `optimiser`
 posterior       `posterior`: of any quantity, also curved; its `profile`; its samples: `sampling`
-verdict         `verdict`: whether data are described; why not: `diagnosis` by `hypotheses`
+verdict         `verdict`: whether data are described; why not: `diagnosis`
 estimate        `estimate`: all of that, and its `file`; `estimator` makes it, as a fit or as a
                 `calibration` with `tip_temperature`, `uncertainty_budget`, `knee`, `power_law`
-                and `pulses`; `many` of them
+                and `pulses`; `beside_a_fit`; by the paper's rule, `knee_scaling`; `many` of them
 next            `next_measurement`: which further rows lessen an error most
 ==============  ====================================================================================
 """

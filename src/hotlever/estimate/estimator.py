@@ -9,44 +9,33 @@ said which describes the data.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
 
 from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.estimate.beside_a_fit import solve_beside_a_fit
 from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.diagnosis import Diagnosis, outlier_notes
 from hotlever.estimate.estimate import Estimate, read_fit
-from hotlever.estimate.experiment import Experiment, Prediction
-from hotlever.estimate.knee_scaling import calibrated_by_knee
+from hotlever.estimate.experiment import Model, Seen
+from hotlever.estimate.knee_scaling import calibrated_by_rule
 from hotlever.estimate.options import CalibrationOptions, FitOptions, chosen
-from hotlever.estimate.power_law import PowerLaw
-from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.pulses import pulse_calibration
 from hotlever.estimate.search import Solution, solve
 from hotlever.estimate.tip_table import budgets_of, table_with_budgets
 from hotlever.estimate.tip_temperature import (
-    OF_THE_MEASUREMENT,
     check_in_range,
     limits_of_range,
 )
 from hotlever.estimate.uncertainty_budget import limits_of
 from hotlever.estimate.verdict import check_plausible, check_similar, no_ramp, verdict_on
-from hotlever.measurement import Measurement, given_measurement, with_measured_circuit
-from hotlever.measurement.rows import averaged, note_on_averages
+from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
-from hotlever.probe.priors import (
-    SCALES,
-    Prior,
-    as_known,
-    default_priors,
-    published_material,
-    updated,
-)
-from hotlever.probe.probe_parameters import of_materials, parameters_of, usual_parameters
+from hotlever.probe.probe_parameters import of_materials, parameters_of
 from hotlever.probe.surroundings import Medium
 from hotlever.text import NOT_DETERMINED, value_with_error, with_unit
 from hotlever.types import Array, Progress
@@ -57,9 +46,9 @@ def fit(
     probe: Probe | str | os.PathLike[str] | None = None,
     options: FitOptions | None = None,
     *,
-    model: Callable[[Probe, Array], Experiment] | None = None,
+    model: Model | None = None,
     progress: Progress | None = None,
-    seen: Callable[[Prediction], None] | None = None,
+    seen: Seen | None = None,
     **choices: Any,
 ) -> Estimate:
     """Find the material parameters that make the model match a measurement.
@@ -179,7 +168,7 @@ def calibrate(
         )
     if options.law is not None or (options.medium == "vacuum" and whole.medium == "air"):
         options.need_none_of_the_rule()
-        return _by_the_rule(whole, origin, options.law, route)
+        return calibrated_by_rule(whole, origin, options.law, route)
     if options.pulse is not None:
         origin.circuit.need_cold_start("a calibration for pulses")
 
@@ -199,7 +188,7 @@ def calibrate(
                 alone = problem.probe.circuit.starts_cold
                 solution = solve(problem, progress, stated=causes.stated if alone else None)
             else:
-                solution = _beside_a_fit(problem, fit, options.priors, progress)
+                solution = solve_beside_a_fit(problem, fit, options.priors, progress)
             converged, reason = verdict_on(solution)
             result = calibrated(
                 solution,
@@ -224,95 +213,6 @@ def calibrate(
         note = "the pulse was not followed, since it would be that of another lever"
         return replace(result, notes=[*result.notes, note])
     return result
-
-
-def _by_the_rule(whole: Measurement, origin: Probe, law: PowerLaw | None, route: str) -> Estimate:
-    """Calibrate a lever by the paper's rule."""
-    measured = averaged(whole, robust=True)
-    # a power law holds for vacuum, whatever the lever is in
-    anywhere = measured if law is None else replace(measured, medium=None)
-    probe, notes = with_measured_circuit(origin, anywhere, "vacuum")
-    probe.circuit.need_cold_start("a power law")
-    try:
-        result = calibrated_by_knee(measured, probe, law, route)
-    except InputError as error:
-        raise InputError(f"{measured.path or 'measurement'}: {error}") from error
-    return replace(result, notes=[*notes, *note_on_averages(whole, measured), *result.notes])
-
-
-# --- beside a fit to other data -----------------------------------------------------------------
-
-
-def _beside_a_fit(
-    problem: Problem,
-    fit: Estimate,
-    priors: Mapping[str, Prior | str] | None,
-    progress: Progress | None,
-) -> Solution:
-    """Estimate a lever by its own data and those of a fit.
-
-    What the data of the fit leave of the lever itself is known before the other data; circuit and
-    gas are those of each measurement.
-
-    Raises
-    ------
-    ComputationError
-        If no lever near the probe has states at all measured biases.
-    """
-    before, fixed = known_before_a_fit(fit, priors), dict.fromkeys(fit.options.fixed)
-    options = FitOptions(
-        observables=fit.observables,
-        fixed=fixed,
-        priors=before,
-        medium=fit.probe.surroundings.medium,
-        numerics=problem.options.numerics,
-    )
-    fitted = solve(Problem.of(fit.measurement, fit.probe, options), progress)
-    if _same_data(fit.measurement, problem.measurement):
-        return fitted
-    varied = fitted.problem.options.varied
-    own = [name for name in varied if name not in OF_THE_MEASUREMENT]
-    numbers = [varied.index(name) for name in own]
-    values, covariance = fitted.probe.values(own), fitted.posterior.covariance
-    relative = np.array([name not in before or before[name].relative for name in own])
-    left = PriorDensity.of_estimate(own, values, covariance[np.ix_(numbers, numbers)], relative)
-    probe = problem.probe.replace(dict(zip(own, values.tolist(), strict=True)))
-    theirs = {
-        name: prior
-        for name, prior in problem.known.items()
-        if name in {*OF_THE_MEASUREMENT, *SCALES}
-    }
-    free = tuple(name for name in own if name not in usual_parameters(probe))
-    medium = problem.probe.surroundings.medium
-    again = replace(options, observables=None, priors=theirs, free=free, medium=medium)
-    together = Problem.of(problem.measurement, probe, again, before=left)
-    try:
-        return solve(replace(together, known={**before, **theirs}), progress)
-    except ComputationError as error:
-        raise ComputationError(
-            f"no lever like the fitted one shows these data; is it another lever's fit? ({error})"
-        ) from error
-
-
-def known_before_a_fit(fit: Estimate, priors: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
-    """Return what was known of a lever before it was fitted.
-
-    The probe of a fit has the material that was found, so that this is no prior of its own.
-    """
-    if priors is not None and not priors:
-        return {}
-    stated = {**fit.options.priors, **(priors or {})}
-    probe = as_known(fit.probe, stated)
-    before = updated(default_priors(probe, published_material()), stated, probe, "priors")
-    return {name: prior for name, prior in before.items() if name not in fit.options.fixed}
-
-
-def _same_data(first: Measurement, second: Measurement) -> bool:
-    columns, others = (
-        (data.bias_V, data.observable("current"), data.observable("bridge"))
-        for data in (first, second)
-    )
-    return np.array_equal(columns, others, equal_nan=True)
 
 
 # --- a medium that nobody knows -----------------------------------------------------------------

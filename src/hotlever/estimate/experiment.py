@@ -112,6 +112,12 @@ class Experiment(Protocol):
         ...
 
 
+# Makes the forward model of a probe at some biases (V) or, in time, times (µs).
+Model = Callable[[Probe, Array], Experiment]
+# Called with each prediction on the way of a search, which comes nearer and nearer to the data.
+Seen = Callable[[Prediction], None]
+
+
 class Predictor:
     """Predicts with an experiment, each lever from the latest one; the latest are at hand.
 
@@ -138,7 +144,7 @@ class Predictor:
         self,
         experiment: Experiment,
         progress: Progress | None = None,
-        seen: Callable[[Prediction], None] | None = None,
+        seen: Seen | None = None,
         near: Prediction | None = None,
         before: int = 0,
     ) -> None:

@@ -30,7 +30,8 @@ from hotlever.lever import Branch, OperatingPoint
 from hotlever.lever.branch import Reach, shifted
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
-from hotlever.measurement import Measurement
+from hotlever.measurement import Measurement, with_measured_circuit
+from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
 from hotlever.probe.priors import METERS, default_priors
@@ -95,16 +96,17 @@ def knee_of(model: Branch) -> OperatingPoint:
     return model.knee
 
 
-def calibrated_by_knee(
-    measured: Measurement, probe: Probe, law: PowerLaw | None, route: str
+def calibrated_by_rule(
+    whole: Measurement, origin: Probe, law: PowerLaw | None, route: str
 ) -> Estimate:
-    """Return the calibration of a lever by its knee: the temperatures of a reference at k times P.
+    """Calibrate a lever by the paper's rule: the temperatures of a reference at k times the power.
 
     Parameters
     ----------
-    measured : Measurement
-    probe : Probe
-        Resembles the lever; in vacuum, in the circuit of the measurement.
+    whole : Measurement
+        As it was read.
+    origin : Probe
+        As it is given: resembles the lever.
     law : PowerLaw, optional
         The reference; the probe's model in vacuum by default.
     route : str
@@ -118,6 +120,22 @@ def calibrated_by_knee(
     ComputationError
         If the probe has no knee.
     """
+    measured = averaged(whole, robust=True)
+    # a power law holds for vacuum, whatever the lever is in
+    anywhere = measured if law is None else replace(measured, medium=None)
+    probe, notes = with_measured_circuit(origin, anywhere, "vacuum")
+    probe.circuit.need_cold_start("a power law")
+    try:
+        result = _calibrated_by_knee(measured, probe, law, route)
+    except InputError as error:
+        raise InputError(f"{measured.path or 'measurement'}: {error}") from error
+    return replace(result, notes=[*notes, *note_on_averages(whole, measured), *result.notes])
+
+
+def _calibrated_by_knee(
+    measured: Measurement, probe: Probe, law: PowerLaw | None, route: str
+) -> Estimate:
+    """Return the calibration of a lever like a probe in vacuum, in the circuit of its data."""
     lever = Lever(probe)
     vacuum, circuit = lever.branch(), probe.circuit
     if turns := power_turns(vacuum, "vacuum"):

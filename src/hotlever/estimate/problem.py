@@ -6,14 +6,13 @@ Medium, circuit, observables, priors and noise are settled here, once: what come
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.estimate.experiment import Experiment, ExperimentAtRest, experiment_of
+from hotlever.estimate.experiment import Experiment, ExperimentAtRest, Model, experiment_of
 from hotlever.estimate.experiment_in_time import ExperimentInTime, known_in_time
 from hotlever.estimate.noise import errors_of_scales
 from hotlever.estimate.options import FitOptions
@@ -33,7 +32,6 @@ from hotlever.probe.priors import (
     updated,
 )
 from hotlever.quantities import FITTED, OF_A_CONTACT
-from hotlever.types import Array
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ class Problem:
     residuals: Residuals
     start: Probe
     notes: list[str]
-    model: Callable[[Probe, Array], Experiment] | None = None
+    model: Model | None = None
 
     @classmethod
     def of(
@@ -80,7 +78,7 @@ class Problem:
         options: FitOptions,
         *,
         before: PriorDensity = FLAT,
-        model: Callable[[Probe, Array], Experiment] | None = None,
+        model: Model | None = None,
     ) -> Problem:
         """Settle what is asked of a measurement.
 
@@ -106,8 +104,9 @@ class Problem:
         in_time = measurement.time_us is not None
         if in_time:
             probe.circuit.need_cold_start("a fit in time")
+        of_averages = note_on_averages(whole, measurement)
         probe, notes = with_measured_circuit(probe, measurement, options.medium)
-        notes += note_on_averages(whole, measurement) + check_sample(measurement, probe)
+        notes += of_averages + check_sample(measurement, probe)
         if not in_time and (options.usual_priors or "chip_K_per_mW" in options.priors):
             # that none is stated says nothing against the usual ones
             probe = as_known(probe, options.priors or None)

@@ -8,7 +8,7 @@ portion begins where the last has led, and no candidate is asked for biases that
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,6 +23,7 @@ from hotlever.estimate.experiment import (
     Prediction,
     PredictionAtRest,
     Predictor,
+    Seen,
 )
 from hotlever.estimate.objective import Objective
 from hotlever.estimate.optimiser import Optimiser, Optimum
@@ -88,7 +89,7 @@ class Solution(Optimum):
 def solve(
     problem: Problem,
     progress: Progress | None = None,
-    seen: Callable[[Prediction], None] | None = None,
+    seen: Seen | None = None,
     stated: Linearised | None = None,
 ) -> Solution:
     """Find the lever that priors and a measurement make most likely.
@@ -125,7 +126,7 @@ class Search:
 
     problem: Problem
     progress: Progress | None = None
-    seen: Callable[[Prediction], None] | None = None
+    seen: Seen | None = None
     stated: Linearised | None = None
 
     def near(self, experiment: Experiment, start: Probe, before: int = 0) -> Optimum:
