@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hotlever.estimate.objective import Objective, Penalty, Quantity, Subproblem
+from hotlever.estimate.objective import EstimatedQuantity, Objective, Penalty, Subproblem
 from hotlever.estimate.posterior import Posterior
 from hotlever.estimate.prior_density import Coordinates, PriorDensity
 from hotlever.estimate.profile import ErrorProfile, profile_of_tip
@@ -89,7 +89,7 @@ def profile(bend):
 
 def test_a_quantity_is_known_as_well_as_what_it_follows_from():
     for row, slope in enumerate(SLOPES):
-        value, stderr = posterior(0.1).of(Quantity("tip", row))
+        value, stderr = posterior(0.1).of(EstimatedQuantity("tip", row))
         assert value == pytest.approx(TIPS[row])
         assert stderr == pytest.approx(slope)
 
@@ -102,7 +102,7 @@ def test_changes_along_the_axes_add_up_to_the_variance():
 def test_a_pulled_quantity_is_on_its_profile():
     """Of all levers with this tip it is the one nearest to what was known: x² tells how far."""
     known = posterior(0.0)
-    tip = Quantity("tip", 2)
+    tip = EstimatedQuantity("tip", 2)
     for target in (TIPS[2] + 30.0, TIPS[2] - 50.0):
         penalised = known.objective.penalised(Penalty(tip, target, 1e-3))
         there, squares = Subproblem(penalised, known.at).minimum()

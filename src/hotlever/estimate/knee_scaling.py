@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import InputError
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.knee import (
     IVCurve,
@@ -26,7 +26,7 @@ from hotlever.estimate.knee import (
 )
 from hotlever.estimate.power_law import PowerLaw, law_of_model, power_turns
 from hotlever.estimate.tip_table import rms, table_by_bias
-from hotlever.lever import Branch, OperatingPoint
+from hotlever.lever import Branch
 from hotlever.lever.branch import Reach, shifted
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
@@ -77,23 +77,7 @@ def curve_of_model(model: Branch) -> TemperatureCurve:
     ComputationError
         If it has no knee.
     """
-    return TemperatureCurve(model.tip_temperature, knee_of(model).power_mW)
-
-
-def knee_of(model: Branch) -> OperatingPoint:
-    """Return the knee of a model.
-
-    Raises
-    ------
-    ComputationError
-        If it has none.
-    """
-    if model.knee is None:
-        raise ComputationError(
-            f"the model has no knee below {model.hottest_K:.0f} K; calibrate a lever whose model "
-            "has one"
-        )
-    return model.knee
+    return TemperatureCurve(model.tip_temperature, model.need_knee("the model").power_mW)
 
 
 def calibrated_by_rule(
@@ -231,7 +215,7 @@ def _estimated_knee(
     Levers of other materials have other knees for the same rise.
     """
     scale = scale_to(curve, like)
-    model, *others = (knee_of(branch).power_mW for branch in similar)
+    model, *others = (branch.need_knee("the model").power_mW for branch in similar)
     spread = np.linalg.norm(np.array(others) / model - 1.0) / _STEP
     error = float(np.hypot(scale.power_stderr, spread))
     if error > 0.3:
@@ -282,7 +266,7 @@ def _similar_branches(probe: Probe, like: Branch) -> list[Branch]:
 
 def _error_of_other_levers(similar: list[Branch], ratio: Array) -> Array:
     """Return the standard deviation (K) of the tip at powers over that of the knee, (n,)."""
-    knees = [knee_of(branch).power_mW for branch in similar]
+    knees = [branch.need_knee("the model").power_mW for branch in similar]
     ends = [branch.by_power.highest_mW for branch in similar]
     # where one of them has melted they differ as they do before
     power = np.outer(knees, np.minimum(ratio, np.min(np.divide(ends, knees))))

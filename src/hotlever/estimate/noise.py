@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hotlever.estimate.options import NoiseOptions
+from hotlever.estimate.options import DataNoiseOptions
 from hotlever.measurement import Measurement
 from hotlever.measurement.data import noise_about_neighbours
 from hotlever.probe.priors import SCALES, USUAL_SCALES, Prior, PriorShift
@@ -29,7 +29,7 @@ def relative_noise(
     predicted: Array,
     leverage: Array,
     least: float,
-    options: NoiseOptions | None = None,
+    options: DataNoiseOptions | None = None,
 ) -> Array:
     """Return the noise of data relative to its root mean square, (n,); one where there is none.
 
@@ -43,7 +43,7 @@ def relative_noise(
         The share of each datum's noise that the fit has taken up.
     least : float
         Counts as one datum more, in the unit of the data.
-    options : NoiseOptions, optional
+    options : DataNoiseOptions, optional
 
     Notes
     -----
@@ -51,7 +51,7 @@ def relative_noise(
     that of greatest likelihood; precisions are averaged with the likelihoods of the shares, so
     that data that cannot tell them apart are not forced to.
     """
-    options = options or NoiseOptions()
+    options = options or DataNoiseOptions()
     shares, freedom = np.array(options.shares), options.freedom
     here = np.isfinite(difference)
     squares = difference[here] ** 2 / np.maximum(1.0 - leverage[here], options.least_free)
@@ -88,7 +88,7 @@ class DataErrors:
         Of how many rows of a file each is the mean, as a root: by it errors are smaller.
     measured : ndarray, shape (observables, n), optional
         Standard errors. An observable without them begins with a hundredth of its largest value.
-    options : NoiseOptions, optional
+    options : DataNoiseOptions, optional
 
     Attributes
     ----------
@@ -109,9 +109,9 @@ class DataErrors:
         along: Array,
         root: Array,
         measured: Array | None = None,
-        options: NoiseOptions | None = None,
+        options: DataNoiseOptions | None = None,
     ) -> None:
-        self._options = options or NoiseOptions()
+        self._options = options or DataNoiseOptions()
         self.present, self.largest, self._root = present, largest, root
         self._order = np.argsort(along, kind="stable")
         self.measured, self.without = measured is not None, np.zeros(len(present), dtype=bool)

@@ -23,7 +23,7 @@ from hotlever.types import Array
 
 
 @dataclass(frozen=True)
-class Quantity:
+class EstimatedQuantity:
     """A number that follows from a lever.
 
     Attributes
@@ -56,7 +56,7 @@ class Penalty:
     value there, it is the one nearest to data and priors.
     """
 
-    quantity: Quantity
+    quantity: EstimatedQuantity
     target: float
     error: float
 

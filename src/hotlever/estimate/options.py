@@ -31,7 +31,7 @@ BudgetOf = Literal["tip", "apex"]
 
 
 @dataclass(frozen=True)
-class NoiseOptions:
+class DataNoiseOptions:
     """How data tell their noise, and when they are outliers.
 
     Attributes
@@ -310,7 +310,7 @@ class Numerics:
 
     Attributes
     ----------
-    noise : NoiseOptions
+    noise : DataNoiseOptions
     search : SearchOptions
     diagnosis : DiagnosisOptions
     trials : TrialOptions
@@ -327,7 +327,7 @@ class Numerics:
     80
     """
 
-    noise: NoiseOptions = NoiseOptions()
+    noise: DataNoiseOptions = DataNoiseOptions()
     search: SearchOptions = SearchOptions()
     diagnosis: DiagnosisOptions = DiagnosisOptions()
     trials: TrialOptions = TrialOptions()

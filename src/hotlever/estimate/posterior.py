@@ -22,7 +22,7 @@ from scipy import optimize
 from scipy.interpolate import PchipInterpolator
 
 from hotlever.estimate.experiment import Prediction
-from hotlever.estimate.objective import Objective, Quantity, Subproblem, inverse_or_nan
+from hotlever.estimate.objective import EstimatedQuantity, Objective, Subproblem, inverse_or_nan
 from hotlever.estimate.surrogate import Surrogate
 from hotlever.probe.priors import PriorShift
 from hotlever.types import Array
@@ -160,7 +160,7 @@ class Posterior:
             rows.append(function(origin + half) - function(origin - half))
         return np.array(rows)
 
-    def of(self, quantity: Quantity) -> tuple[float, float]:
+    def of(self, quantity: EstimatedQuantity) -> tuple[float, float]:
         """Return a quantity and its standard error, linearised."""
         value = quantity.value(self.at.values, self.at.probe.values(self.objective.varied))
         return value, float(standard_errors(quantity.gradient(self.slopes), self.covariance))

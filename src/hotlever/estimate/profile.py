@@ -17,7 +17,7 @@ from scipy.special import chdtri
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimate.experiment import TIP, Experiment, Prediction, Predictor, experiment_of
-from hotlever.estimate.objective import Objective, Penalty, Quantity, Subproblem
+from hotlever.estimate.objective import EstimatedQuantity, Objective, Penalty, Subproblem
 from hotlever.estimate.optimiser import Optimiser
 from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.posterior import Posterior
@@ -107,7 +107,7 @@ def profile_of_tip(
     """
     objective, at, rows = posterior.objective, posterior.at, hotter_rows(posterior.at)
     least = objective.squares(at)
-    tips = {number: Quantity("tip", int(row)) for number, row in enumerate(rows)}
+    tips = {number: EstimatedQuantity("tip", int(row)) for number, row in enumerate(rows)}
     moving = {number: tip for number, tip in tips.items() if posterior.of(tip)[1] > 0.0}
     sides = np.ones((2, rows.size))
     for side, way in enumerate((-1.0, 1.0) if moving else ()):
@@ -157,7 +157,7 @@ def _solved_near(
     return None
 
 
-def _penalty(posterior: Posterior, tip: Quantity, away: float) -> Penalty:
+def _penalty(posterior: Posterior, tip: EstimatedQuantity, away: float) -> Penalty:
     """Return a datum that moves an estimate by so many standard errors, if everything is linear.
 
     It is twice as far away, with the error that the tip is known by: the estimate moves half way.
@@ -220,7 +220,7 @@ def profile_likelihood(
         raise InputError(f"found points = {points}, expected an odd number of 5 or more")
     if not result.sum_of_squares > 0:
         raise InputError("the fit meets its data exactly: without scatter nothing tells how sure")
-    quantity = Quantity("parameter", result.names.index(name))
+    quantity = EstimatedQuantity("parameter", result.names.index(name))
     names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
     objective = result.objective(names)
     residuals = objective.residuals

@@ -29,7 +29,7 @@ from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP, ExperimentAtRest, Predictor, experiment_of, named
-from hotlever.estimate.objective import Objective, Quantity, Subproblem
+from hotlever.estimate.objective import EstimatedQuantity, Objective, Subproblem
 from hotlever.estimate.options import TrialOptions
 from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.posterior import Posterior
@@ -339,7 +339,9 @@ def sample_tip(
     # one that counts for much is there several times
     different, index = np.unique(drawn.points, axis=0, return_inverse=True)
     tips = np.array([near.values_at(point)[TIP, rows] for point in different])[index]
-    middle, stderr = np.transpose([posterior.of(Quantity("tip", int(row))) for row in rows])
+    middle, stderr = np.transpose(
+        [posterior.of(EstimatedQuantity("tip", int(row))) for row in rows]
+    )
     low, high = np.percentile(tips, (2.5, 97.5), axis=0)
     return SampledTip(
         ErrorProfile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),

@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hotlever.errors import BranchEndError
+from hotlever.errors import BranchEndError, ComputationError
 from hotlever.lever.equations import ELECTRICAL_OUTPUTS, LeverEquations, steps_of
 from hotlever.lever.newton import NewtonOptions, NewtonResult
 from hotlever.lever.readings import Reading, slow_ramp
@@ -325,6 +325,18 @@ class Branch:
     def knee(self) -> OperatingPoint | None:
         """The knee dV_l/dI_h = 0: the highest lever voltage; None if V_l rises to the end."""
         return None if self.knee_u is None else self.point(self.knee_u)
+
+    def need_knee(self, which: str = "the lever") -> OperatingPoint:
+        """Return the knee.
+
+        Raises
+        ------
+        ComputationError
+            If there is none, saying of which lever.
+        """
+        if self.knee is None:
+            raise ComputationError(f"{which} has no knee below {self.hottest_K:.0f} K")
+        return self.knee
 
     def point(self, u: float) -> OperatingPoint:
         """Return the operating point at u."""

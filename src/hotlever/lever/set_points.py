@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class HeldQuantity:
     """What a controller measures of a lever, by its voltage V and its current I.
 
     Attributes
@@ -60,14 +60,14 @@ class Quantity:
 
 #: What a lever may be held at: V_l/I_h, without the series resistor, and V_l I_h.
 HELD = {
-    "resistance": Quantity(
+    "resistance": HeldQuantity(
         *("ohm", "set_ohm", "slope_ohm_per_K"),
         of=lambda V, mA: 1000.0 * V / mA,
         missed=lambda V, mA, ohm: V - mA * (ohm / 1000.0),
         level=lambda V, mA: V.derivative() * mA - V * mA.derivative(),
         slope=lambda level, mA: 1000.0 * level / mA**2,
     ),
-    "power": Quantity(
+    "power": HeldQuantity(
         *("mW", "set_mW", "slope_mW_per_K"),
         of=lambda V, mA: V * mA,
         missed=lambda V, mA, mW: V * mA - mW,
@@ -147,7 +147,7 @@ def hold(
 class _Along:
     """A quantity along a branch, as far as the swept supply heats the lever."""
 
-    def __init__(self, lever: Lever, branch: Branch, quantity: Quantity) -> None:
+    def __init__(self, lever: Lever, branch: Branch, quantity: HeldQuantity) -> None:
         self._lever, self._branch, self._quantity = lever, branch, quantity
         curve = branch.curve
         lever_V, current = (Piecewise(curve.c[..., k], curve.x) for k in (0, 1))

@@ -40,7 +40,7 @@ from hotlever.estimate import Estimate, Measurement, fit
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import solve
-from hotlever.lever import Branch, Lever, OperatingPoint
+from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.materials.departures import FACTORS, departure_of
 from hotlever.materials.heat import thermal_conductivity
@@ -79,19 +79,6 @@ class Suspect(StrEnum):
     TOGETHER = "all together"
 
 
-def knee_of(branch: Branch, which: str = "the lever") -> OperatingPoint:
-    """Return the knee of a branch.
-
-    Raises
-    ------
-    ComputationError
-        If it has none, saying of which lever.
-    """
-    if branch.knee is None:
-        raise ComputationError(f"{which} has no knee below {branch.hottest_K:.0f} K")
-    return branch.knee
-
-
 def knee_K(probe: Probe) -> float:
     """Return the tip temperature at a probe's knee (K).
 
@@ -100,7 +87,7 @@ def knee_K(probe: Probe) -> float:
     ComputationError
         If it has none.
     """
-    return knee_of(Lever(probe).branch()).tip_K
+    return Lever(probe).branch().need_knee().tip_K
 
 
 # --- why it is not at the inversion temperature ---------------------------------------------------
@@ -162,7 +149,7 @@ def _highest(branch: Branch, name: str) -> tuple[float, float]:
     maxima = roots[curve(roots, 2) < 0]
     if not maxima.size:
         raise ComputationError(f"the lever ({name}) has no knee below {branch.hottest_K:.0f} K")
-    return knee_of(branch, f"the lever ({name})").tip_K, float(maxima[0])
+    return branch.need_knee(f"the lever ({name})").tip_K, float(maxima[0])
 
 
 # --- what a tip changes ---------------------------------------------------------------------------
@@ -195,7 +182,7 @@ def tip_effects(probe: Probe, sizes: Sequence[tuple[float, float]] = SIZES) -> x
         If one of the levers has no knee.
     """
     bare = Lever(probe).branch()
-    without = knee_of(bare)
+    without = bare.need_knee()
     rows = []
     for height, angle in sizes:
         tip = Tip(height_um=height, half_angle_deg=angle, in_air=True)
@@ -207,7 +194,7 @@ def tip_effects(probe: Probe, sizes: Sequence[tuple[float, float]] = SIZES) -> x
             conducts = tip.model_copy(update={"in_air": False})
             conducting = Lever(probe.model_copy(update={"tip": conducts})).branch()
         fitted_K = knee_K(fit(data, probe).probe)
-        knee, by_conduction = knee_of(branch), knee_of(conducting)
+        knee, by_conduction = branch.need_knee(), conducting.need_knee()
         rows.append(
             {
                 "height_um": height,
@@ -344,7 +331,7 @@ def carried_by(probe: Probe, suspect: str, own_K: float | None = None) -> Carrie
     lever, away = Lever(true), suspect == Suspect.AWAY
     data = Measurement.of_sweep(ramp_of(lever, -1 if away else 1))
     branch = lever.branch_to(0.0, lowest=-paper.RAMP[-1]).mirrored if away else lever.branch()
-    apparent_K = knee_of(branch, f"the lever ({suspect})").tip_K
+    apparent_K = branch.need_knee(f"the lever ({suspect})").tip_K
     if by_line:
         data = replace(data, tip_K=read_by_the_line(data.tip_K))
         apparent_K = float(read_by_the_line(apparent_K))
@@ -353,7 +340,7 @@ def carried_by(probe: Probe, suspect: str, own_K: float | None = None) -> Carrie
     model = Lever(fitted)
     ramp_K = read_off_the_ramp(data) - read_off_the_ramp(Measurement.of_sweep(ramp_of(model, 1)))
     own_K = knee_K(probe) if own_K is None else own_K
-    fitted_K = knee_of(model.branch(), "the fitted lever").tip_K
+    fitted_K = model.branch().need_knee("the fitted lever").tip_K
     return Carried(apparent_K - own_K, apparent_K - fitted_K, ramp_K, fitted)
 
 
