@@ -8,7 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hotlever.estimate.experiment import Prediction
 from hotlever.estimate.objective import EstimatedQuantity, Objective, Penalty, Subproblem
+from hotlever.estimate.options import Numerics
 from hotlever.estimate.posterior import Posterior
 from hotlever.estimate.prior_density import Coordinates, PriorDensity
 from hotlever.estimate.profile import ErrorProfile, profile_of_tip
@@ -43,6 +45,7 @@ class OneUnknown(Objective):
         self.bounds = self.coordinates.bounds
         self.residuals = SimpleNamespace(
             size=0,
+            numerics=Numerics(),
             data=np.zeros((1, 0)),
             present=np.zeros((1, 0), dtype=bool),
             errors=SimpleNamespace(without=np.zeros(1, dtype=bool)),
@@ -69,7 +72,7 @@ class Bent:
         surrogate = SimpleNamespace(
             predict=self._prediction, values_at=lambda x: self._prediction(x)[0]
         )
-        return SimpleNamespace(values=values, slopes=slopes, probe=probe, surrogate=surrogate)
+        return Prediction(probe, values, slopes, surrogate, columns={}, tip_slopes=slopes[2])
 
     def _prediction(self, x):
         tip = TIPS + SLOPES * (x[0] + self._bend * x[0] ** 2)
@@ -161,7 +164,7 @@ def test_quantiles_of_the_posterior_are_those_of_what_is_unknown():
 
 
 def test_few_posterior_samples_are_not_enough():
-    enough = SampledTip(ErrorProfile(TIPS, TIPS, TIPS), effective_samples=450.0)
+    enough = SampledTip(ErrorProfile(TIPS, TIPS, TIPS), effective_samples=450.0, fewest=400)
     assert enough.enough
     assert "between quantiles" in enough.note
     few = replace(enough, effective_samples=139.0)
