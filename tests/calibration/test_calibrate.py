@@ -264,14 +264,14 @@ def test_routes_exclude_each_other(reference):
 
 
 @pytest.mark.slow
-def test_too_few_posterior_samples_of_a_usual_lever_leave_its_limits(calibrated):
-    """Of 2000 some 150 are worth anything, and these span little more than half of the limits."""
+def test_posterior_samples_of_a_usual_lever_are_enough_and_near_its_limits(calibrated):
+    """Beyond the knee, where data pull on a tip that gets hotter more than on one that does not."""
     sampled = calibrate(calibrated.measurement, samples=2000)
-    assert any("too few posterior samples" in note for note in sampled.notes)
+    assert any("quantiles of posterior samples" in note for note in sampled.notes)
     np.testing.assert_allclose(sampled.table.tip_K, calibrated.table.tip_K, atol=0.01)
     for name in ("tip_low_K", "tip_high_K"):
         limits, usual = (each.table[name] - each.table.tip_K for each in (sampled, calibrated))
-        np.testing.assert_allclose(limits, usual)
+        np.testing.assert_allclose(limits, usual, rtol=0.3)
 
 
 def test_a_scaled_model_is_the_paper_s_rule(reference):

@@ -154,7 +154,8 @@ def test_other_errors_are_the_same_either_way():
 def test_quantiles_of_the_posterior_are_those_of_what_is_unknown():
     """x is normal, so that the quantiles of the tip are the tips at 1.96 standard errors."""
     bend = 0.12
-    found = sample_tip(posterior(bend), SimpleNamespace(others=lambda at: []), samples=2000)
+    predictor = SimpleNamespace(others=lambda at: [], experiment=None)
+    found = sample_tip(posterior(bend), predictor, samples=2000)
     assert found.enough
     assert found.effective_samples > 500
     low, high = found.profile.credible_interval(TIPS[1:], SLOPES[1:], np.zeros(2))

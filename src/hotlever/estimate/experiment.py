@@ -289,6 +289,10 @@ class ExperimentAtRest:
         fast = self.fast.for_any_parameters()
         return self if fast is self.fast else replace(self, fast=fast, correction=None)
 
+    def until_melting(self) -> Self:
+        """Return the model with branches that end where something melts, not corrected."""
+        return replace(self, until_it_melts=True, correction=None)
+
     def drawn_anew(self, probe: Probe) -> Self:
         """Return the model on meshes of a probe's own drawing, not corrected."""
         full = None if self.full is None else SimilarLevers(Lever(probe))

@@ -169,6 +169,11 @@ class ExperimentOverSample(ExperimentAtRest):
         """See `ExperimentAtRest.coarse`."""
         return replace(super().coarse(), away=tuple(each.coarse() for each in self.away))
 
+    def until_melting(self) -> Self:
+        """See `ExperimentAtRest.until_melting`."""
+        away = tuple(each.until_melting() for each in self.away)
+        return replace(super().until_melting(), away=away)
+
     def drawn_anew(self, probe: Probe) -> Self:
         """See `ExperimentAtRest.drawn_anew`."""
         pairs = zip(self.away, self.positions.probes(probe), strict=True)

@@ -331,7 +331,10 @@ def sample_tip(
     Levers that the predictor has solved far enough from the optimum say how values bend. What is
     sampled costs too little for processes of its own.
     """
-    objective, at = posterior.objective, posterior.at
+    objective, at, experiment = posterior.objective, posterior.at, predictor.experiment
+    if isinstance(experiment, ExperimentAtRest) and at.probe.circuit.starts_cold:
+        # of a branch that ends with the measurement no sample would be hotter
+        _, at = experiment.until_melting().exact_at(at.probe)
     # a solved lever that far away tells of those that samples reach
     near = Subproblem(objective, at, predictor.others(at), least=1.0)
     trials, rows = Trials(near, options=objective.residuals.numerics.trials), hotter_rows(at)
