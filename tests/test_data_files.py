@@ -57,6 +57,33 @@ def test_of_several_sheets_one_is_asked_for(tmp_path):
     np.testing.assert_allclose(data.current_mA, 1.3e3 * CURRENT, rtol=1e-15)
 
 
+@pytest.mark.parametrize("units", [[], ["V", "uA"]])
+def test_a_sheet_may_have_a_row_for_each_quantity(tmp_path, units):
+    bias, current = (np.linspace(0.5, 8.0, 16) * factor for factor in (1.0, 120.0))
+    heads = [["V_b", "I_h"], units] if units else [["V_b (V)", "I_h (uA)"]]
+    lying = [[*head, *each.tolist()] for *head, each in zip(*heads, [bias, current], strict=True)]
+    path = workbook(tmp_path / "iv.xlsx", sweep=[["Lever 7"], ["R_s (kOhm)", 5.6], *lying])
+    data = read_measurement(path)
+    np.testing.assert_array_equal(data.bias_V, bias)
+    np.testing.assert_allclose(data.current_mA, current / 1e3)
+    assert data.series_resistance_ohm == 5600.0
+
+
+def test_rows_that_begin_with_words_are_rows(tmp_path):
+    """Below their headings, however few they are."""
+    values = zip(["up", "up", "down"], [1.0, 2.0, 3.0], [0.1, 0.2, 0.3], [5.0] * 3, strict=True)
+    sheet = [["branch", "V_b (V)", "I_h (mA)", "f (Hz)"], *map(list, values)]
+    data = read_measurement(workbook(tmp_path / "iv.xlsx", sweep=sheet))
+    assert data.bias_V.tolist() == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("first", ["#", "# row"])
+def test_headings_that_begin_with_a_number_sign_are_no_comment(tmp_path, first):
+    sheet = [[first, "V_b (V)", "I_h (mA)"], [1, 0.5, 0.1], [2, 1.0, 0.2]]
+    data = read_measurement(workbook(tmp_path / "iv.xlsx", sweep=sheet))
+    assert data.bias_V.tolist() == [0.5, 1.0]
+
+
 def test_a_formula_that_nobody_has_calculated_is_an_error(tmp_path):
     path = workbook(tmp_path / "iv.xlsx", sweep=[*rows(), ["=A4*2", 1.0]])
     with pytest.raises(InputError, match=r"cell A8: a formula without its value"):
@@ -288,6 +315,18 @@ def test_an_array_beside_a_column_has_as_many_rows(tmp_path):
     np.testing.assert_allclose(data.current_mA, 1.1e3 * CURRENT, rtol=1e-15)
 
 
+def test_a_name_with_another_unit_than_is_stated_is_asked_for(tmp_path):
+    """Which of them is right nobody knows: a factor of a thousand would be wrong in silence."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "iv.h5", "w") as file:
+        for name, unit, values in (("V_b", "V", BIAS), ("I_h_mA", "A", CURRENT)):
+            file.create_dataset(name, data=values).attrs["units"] = unit
+    with pytest.raises(InputError, match="'I_h_mA, A'"):
+        read_measurement(tmp_path / "iv.h5")
+    data = read_measurement(tmp_path / "iv.h5", {"I_h (A)": "I_h_mA, A"})
+    np.testing.assert_allclose(data.current_mA, 1e3 * CURRENT)
+
+
 def test_an_unknown_compression_is_named(tmp_path, monkeypatch):
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "iv.h5"
@@ -345,6 +384,40 @@ def test_a_matlab_file_of_version_7_3_is_read(tmp_path):
         raw.write(b"MATLAB 7.3 MAT-file")
     data = read_measurement(path, {"V_b (V)": "V_b", "I_h (mA)": "I_h"})
     assert data.bias_V.tolist() == BIAS.tolist()
+
+
+def test_units_that_are_missing_are_one_question(tmp_path):
+    savemat(tmp_path / "iv.mat", {"V_b": BIAS, "I_h": CURRENT})
+    answers = r"--column 'V_b \(V\)=V_b' --column 'I_h \(mA\)=I_h'"
+    with pytest.raises(InputError, match=f"2 columns without a unit.*{answers}"):
+        read_measurement(tmp_path / "iv.mat")
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_cells_are_tables_and_of_columns_one(tmp_path, version):
+    table, path = np.column_stack([BIAS, CURRENT]), tmp_path / "iv.mat"
+    cells = {"sweeps": [table, 2.0 * table], "parts": [BIAS, CURRENT]}
+    if version == "5":
+        packed = {name: np.empty(2, dtype=object) for name in cells}
+        for name, (first, second) in cells.items():
+            packed[name][0], packed[name][1] = first, second
+        savemat(path, packed)
+    else:
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "w", userblock_size=512) as file:
+            for name, both in cells.items():
+                variable = file.create_dataset(name, (1, 2), dtype=h5py.ref_dtype)
+                variable.attrs["MATLAB_class"] = np.bytes_("cell")
+                for number, each in enumerate(both):
+                    data = np.atleast_2d(each.T)
+                    part = file.create_dataset(f"#refs#/{name}{number}", data=data)
+                    part.attrs["MATLAB_class"] = np.bytes_("double")
+                    variable[0, number] = part.ref
+    assert file_groups(path) == ["/", "/sweeps(1)", "/sweeps(2)"]
+    columns = {"group": "/", "V_b (V)": "parts(1)", "I_h (A)": "parts(2)"}
+    assert read_measurement(path, columns).bias_V.tolist() == BIAS.tolist()
+    columns = {"group": "/sweeps(2)", "V_b (V)": "1", "I_h (A)": "2"}
+    assert read_measurement(path, columns).bias_V.tolist() == (2.0 * BIAS).tolist()
 
 
 def test_complex_numbers_that_are_real_are_numbers(tmp_path):

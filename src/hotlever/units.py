@@ -231,6 +231,26 @@ def name_and_unit(heading: str) -> tuple[str, str | None]:
     return heading, None
 
 
+def heading_with(name: str, unit: str) -> str:
+    """Return a heading with the unit that is stated beside it.
+
+    Where it has another one of its own it is no heading of a known quantity any more, so that
+    which of them is right is asked for.
+
+    Examples
+    --------
+    >>> heading_with("V_b", "V"), heading_with("V_b (V)", "V"), heading_with("I_h_mA", "A")
+    ('V_b (V)', 'V_b (V)', 'I_h_mA, A')
+    """
+    own = name_and_unit(name)[1]
+    if own is None:
+        return f"{name} ({unit})" if unit else name
+    theirs, ours = _unit(unit), _unit(own)
+    if theirs is None or ours is None or theirs.quantity != ours.quantity:
+        return name
+    return name if theirs == ours else f"{name}, {unit}"
+
+
 def is_unit_of(name: str, unit: str) -> bool:
     """Whether a column of some name may have a unit; that of a time is one of a time only.
 

@@ -80,7 +80,7 @@ WORDS = {
     "thousands with blanks": "line 3: I_h: found '1 041,5', expected a number",
     "decimal commas between commas": "line 2: 4 cells, expected 2 .*tabs or semicolons must",
     "two decimal signs": "line 2: I_h: found '0.14', expected a number with a decimal comma",
-    "no units": r"line 1: column 'V_b' has no unit.*--column 'V_b \(V\)=V_b' gives one",
+    "no units": r"line 1: 2 columns without a unit.*--column 'V_b \(V\)=V_b' ",
     "another unit": "line 1: I_h .*: unit 'mW' is not understood here, expected one like mA",
     "a unit to evaluate": r"unit '9\*\*9\*\*9\*\*9' is not understood",
     "voltage of what": r"line 1: the header names 'Voltage \(V\)', .*--column 'V_b \(V\)=Voltage",

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hotlever.errors import InputError, counted, excerpt, unknown_name
+from hotlever.errors import InputError, counted, excerpt, quoted, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import MEASURED
 from hotlever.quantities import FITTED, MEASURANDS, PLAIN
@@ -217,6 +217,7 @@ def find_columns(
         named = quantity_of(heading)
         if named is not None and named not in columns and index not in unavailable:
             candidates[named].append(index)
+    found: dict[str, int] = {}
     for symbol, indices in candidates.items():
         # its own symbol names a quantity before any other name
         own = [i for i in indices if name_and_unit(table.names[i])[0].lower() == symbol.lower()]
@@ -225,7 +226,9 @@ def find_columns(
             raise InputError(
                 f"{where}: column '{symbol}' stands twice; {_assignment(symbol)} says which it is"
             )
-        columns[symbol] = _column(table, symbol, first, None)
+        found[symbol] = first
+    _check_units(table, found)
+    columns |= {symbol: _column(table, symbol, index, None) for symbol, index in found.items()}
     if "t" in columns and not (in_time or _are_brief(table, columns["t"])):
         del columns["t"]
     if not driven:
@@ -250,6 +253,22 @@ def _take_the_only_ones(
         plain = [i for i in may_be if _bare(name_and_unit(table.names[i])[0]) in headings]
         if missing and plain == may_be and len(plain) == 1:
             columns[symbol] = _column(table, symbol, plain[0], None)
+
+
+def _check_units(table: TextTable, found: Mapping[str, int]) -> None:
+    """Ask for the units of all columns that have none, in one question."""
+    bare = {
+        symbol: table.names[index]
+        for symbol, index in found.items()
+        if table.names[:1] != ["DataName"] and name_and_unit(table.names[index])[1] is None
+    }
+    if len(bare) > 1:
+        expected = ", ".join(f"'{MEASURANDS[symbol].heading}'" for symbol in bare)
+        raise InputError(
+            f"{table.where(-1)}: {counted(len(bare), 'column')} without a unit: "
+            f"{', '.join(map(quoted, bare.values()))}; expected {expected} or other units in "
+            f"parentheses; {' '.join(_assignment(*each) for each in bare.items())} gives them"
+        )
 
 
 def _column(table: TextTable, symbol: str, index: int, assigned: str | None) -> Column:

@@ -33,7 +33,7 @@ from hotlever.tables.headings import with_units
 from hotlever.tables.table import MOST_LINES, Line, decode
 from hotlever.tables.table import number as decimal
 from hotlever.types import Array, T
-from hotlever.units import TIMES, conversion, name_and_unit
+from hotlever.units import TIMES, conversion, heading_with, name_and_unit
 
 # The tables of a file by name, whose lines are made when they are asked for.
 Groups = dict[str, Callable[[], list[str]]]
@@ -286,7 +286,7 @@ def _names(wave: dict[str, Any], count: int) -> list[str]:
     header = wave["wave_header"]
     if count == 1:
         unit = _name(wave.get("data_units", b"")) or _name(header["dataUnits"])
-        return [_heading(_name(header["bname"]), unit)]
+        return [heading_with(_name(header["bname"]), unit)]
     # the first label is that of all of them
     labels = list(map(_name, wave["labels"][1][1:]))
     labels += [""] * (count - len(labels))
@@ -305,11 +305,7 @@ def _scale(wave: dict[str, Any], count: int) -> tuple[str, Array] | None:
     if not unit and (step, first) == (1.0, 0.0):
         return None
     name = "time" if conversion(unit, "s") else "x"
-    return _heading(name, unit), first + step * np.arange(count)
-
-
-def _heading(name: str, unit: str) -> str:
-    return f"{name} ({unit})" if unit and name_and_unit(name)[1] is None else name
+    return heading_with(name, unit), first + step * np.arange(count)
 
 
 def _name(name: Any) -> str:
@@ -437,7 +433,7 @@ class _Node:
 
     def add(self, name: str, value: Any, unit: str = "") -> None:
         """Add what has a name: columns, or a setting; what is neither is said to be left out."""
-        heading = _heading(_cell(name), _cell(unit))
+        heading = heading_with(_cell(name), _cell(unit))
         values = np.squeeze(np.asarray(value))
         if values.dtype.kind in "SUO" and values.ndim == 0:
             self.settings.append(f"# {heading}: {_cell(_decoded(values.item()))}")
@@ -465,7 +461,7 @@ class _Node:
             beside = (rows in lengths) - (width in lengths)
             lies = beside < 0 or (beside == 0 and rows < width)
             for number, column in enumerate(values if lies else values.T, start=1):
-                self.columns[column.size][_heading(f"{matrix} {number}", unit)] = column
+                self.columns[column.size][heading_with(f"{matrix} {number}", unit)] = column
         return {
             name if len(self.columns) == 1 else f"{name} ({rows} rows)": partial(
                 self._lines, rows, where
@@ -503,7 +499,15 @@ def _in_group(group: Any, name: str, above: Sequence[str], where: str) -> Groups
         part = group.get(key)
         if key == "#refs#" or part is None:
             continue
-        if isinstance(part, h5py.Group) or _is_table(part):
+        if _is_of_references(part):
+            # MATLAB's cells: a column each, or a table
+            for number, cell in enumerate(_referred(group, part), start=1):
+                if _is_column(cell):
+                    _check_filters(cell, where)
+                    _add_dataset(node, f"{key}({number})", cell)
+                else:
+                    inner[f"{key}({number})"] = cell
+        elif isinstance(part, h5py.Group) or _is_table(part):
             inner[key] = part
         elif isinstance(part, h5py.Dataset):
             _check_filters(part, where)
@@ -513,6 +517,11 @@ def _in_group(group: Any, name: str, above: Sequence[str], where: str) -> Groups
         path = f"{name.rstrip('/')}/{_cell(key)}"
         if isinstance(part, h5py.Group):
             tables |= _in_group(part, path, node.settings, where)
+        elif not _is_table(part):
+            alone = _Node([*node.settings])
+            _check_filters(part, where)
+            _add_dataset(alone, key, part)
+            tables |= alone.tables(path, where)
         else:
             _check_filters(part, where)
             table = _Node([*node.settings, *_attributes(part)])
@@ -534,6 +543,19 @@ def _check_filters(dataset: Any, where: str) -> None:
                 f"{where}: '{excerpt(dataset.name)}' is compressed by '{excerpt(_decoded(name))}', "
                 "expected gzip or no compression"
             )
+
+
+def _is_of_references(part: Any) -> bool:
+    import h5py
+
+    dtype = getattr(part, "dtype", None)
+    return dtype is not None and h5py.check_ref_dtype(dtype) is h5py.Reference
+
+
+def _referred(group: Any, cells: Any) -> list[Any]:
+    """Return what cells refer to, in MATLAB's order."""
+    references = islice(np.ravel(cells[()]).tolist(), MOST_LINES)
+    return [group.file[reference] for reference in references if reference]
 
 
 def _is_table(part: Any) -> bool:
@@ -604,12 +626,31 @@ def _in_structure(
         if len(parts) and all(isinstance(part, dict) for part in parts):
             many = len(parts) > 1
             inner |= {f"{key}({n})" if many else key: part for n, part in enumerate(parts, start=1)}
+        elif _are_cells(value):
+            for number, cell in enumerate(value, start=1):
+                if _is_column(cell):
+                    node.add(f"{key}({number})", cell)
+                else:
+                    inner[f"{key}({number})"] = {key: cell}
         else:
             node.add(key, value)
     tables = node.tables(name, where)
     for key, part in inner.items():
         tables |= _in_structure(part, f"{name.rstrip('/')}/{key}", node.settings, where)
     return tables
+
+
+def _is_column(cell: Any) -> bool:
+    shape = getattr(cell, "shape", ())
+    return bool(shape) and max(shape) == np.prod(shape)
+
+
+def _are_cells(value: Any) -> bool:
+    """Whether a variable of MATLAB is a cell array of arrays of numbers."""
+    objects = isinstance(value, np.ndarray) and value.dtype.kind == "O"
+    parts = value if objects or isinstance(value, list) else []
+    arrays = [part for part in parts if isinstance(part, np.ndarray)]
+    return bool(len(parts)) and len(arrays) == len(parts) and all(map(_has_columns, arrays))
 
 
 # --- workbooks ----------------------------------------------------------------------------------
@@ -723,12 +764,50 @@ def _sheet_lines(rows: Sequence[Sequence[Any]], where: str) -> list[str]:
     """Return the rows of a sheet as lines, empty ones too, so that they keep their numbers."""
     _check_length(len(rows), where)
     table = [["" if cell is None else _cell(cell) for cell in row] for row in rows]
+    table = _upright(table)
     width = max(number for cells in table for number, cell in enumerate(cells, start=1) if cell)
     lines = []
     for cells in table:
         # words alone in the first cell are what text files have as comments
         alone = any(cells) and cells[0] and not any(cells[1:]) and decimal(cells[0]) is None
+        if not alone and cells and cells[0].startswith("#") and not _holds_numbers(cells):
+            # a heading such as that of a count, and no comment
+            cells[0] = f"No{cells[0][1:]}" if len(cells[0]) == 1 else cells[0][1:].strip()
         cells += [""] * (width - len(cells))
         filled = "\t".join(cells[:width]) if any(cells) else ""
         lines.append(f"# {cells[0]}" if alone else filled)
     return lines
+
+
+def _holds_numbers(cells: Sequence[str]) -> bool:
+    return any(decimal(cell) is not None for cell in cells)
+
+
+def _upright(table: list[list[str]]) -> list[list[str]]:
+    """Return the cells of a sheet with a column for each quantity, which may have a row for each.
+
+    Such rows begin with one or two words, a name and maybe its unit, before all their numbers, and
+    no row of words alone heads the columns.
+    """
+    words = [
+        next((n for n, cell in enumerate(row) if decimal(cell) is not None), 0) for row in table
+    ]
+    lying = [
+        number
+        for number, (row, before) in enumerate(zip(table, words, strict=True))
+        if before in (1, 2) and all(row[:before]) and len([*filter(None, row)]) - before > 1
+    ]
+    others = [row for number, row in enumerate(table) if number not in lying]
+    longest = max((len(table[number]) for number in lying), default=0)
+    numbers = (cell for number in lying for cell in table[number][words[number] :])
+    is_table = (
+        len(lying) > 1
+        and longest > 2 * len(lying)
+        and len({words[number] for number in lying}) == 1
+        and not any(sum(map(bool, row)) > 2 for row in others)
+        and all(not cell or decimal(cell) is not None for cell in numbers)
+    )
+    if not is_table:
+        return table
+    columns = zip_longest(*(table[number] for number in lying), fillvalue="")
+    return [*others, *map(list, columns)]

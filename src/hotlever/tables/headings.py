@@ -13,7 +13,13 @@ from itertools import groupby, zip_longest
 import numpy as np
 
 from hotlever.tables.table import DIALECTS, Dialect, Line, is_readable
-from hotlever.units import LONGEST_NUMBER, is_unit, is_unit_of, name_and_unit, plain_minus
+from hotlever.units import (
+    LONGEST_NUMBER,
+    heading_with,
+    is_unit,
+    is_unit_of,
+    plain_minus,
+)
 
 #: Marks of a comment, around it, and quotes.
 _MARKS = ' \t"#%!'
@@ -270,7 +276,7 @@ def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
 
     Examples
     --------
-    >>> with_units(["V_b", "I_h (mA)", "note"], ["V", "A"])
+    >>> with_units(["V_b", "I_h (mA)", "note"], ["V", "mA"])
     ['V_b (V)', 'I_h (mA)', 'note']
     """
     times = "X_Value"  # LabVIEW's, which may stand before each channel
@@ -280,7 +286,7 @@ def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
         units = ["" if name == times else next(of_channels, "") for name in names]
     units = [*units, *[""] * (len(names) - len(units))]
     return [
-        f"{name} ({unit})" if is_unit_of(name, unit) and name_and_unit(name)[1] is None else name
+        heading_with(name, unit) if is_unit_of(name, unit) else name
         for name, unit in zip(names, units, strict=False)
     ]
 
