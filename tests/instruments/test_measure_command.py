@@ -32,6 +32,14 @@ def test_a_twin_is_measured_and_calibrated(run, tmp_path):
     assert 350.0 < told < 500.0
 
 
+def test_without_a_row_there_is_no_file_and_it_says_why(run, tmp_path):
+    words = ("--bias", "1:5:3", "--stay-below", "293.5K", "-o", "iv.csv")
+    status, _, err = run(*TWIN, *words, "--calibration", "cal.json")
+    assert status == 1
+    assert "iv.csv: not written, since no row was taken: beyond 0 V the tip might be" in err
+    assert not [*tmp_path.iterdir()]
+
+
 @pytest.mark.parametrize(
     ("words", "found"),
     [

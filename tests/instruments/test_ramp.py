@@ -47,7 +47,7 @@ def test_the_tip_stays_below_the_limit_and_steps_become_finer_before_it(curve):
     measured = ramp([3.0, 5.0, 9.0, 10.0], stay_below_K=500.0)
     measured.measure(twin, lambda reading, step: rows.append((reading, step)))
     assert measured.complete
-    assert "might be above 500 K" in measured.reason or "all 4 rows are taken" in measured.reason
+    assert "might be above 500 K" in measured.reason or "no more than 4 rows" in measured.reason
     assert 400.0 < twin.hottest_K < 500.0
     assert len(rows) <= 4
     assert rows[-1][0].bias_V not in (9.0, 10.0)
@@ -102,6 +102,18 @@ def test_biases_that_do_not_rise_are_refused():
     for wrong in ([], [0.0, 1.0], [2.0, 1.0], [-1.0]):
         with pytest.raises(InputError, match="biases that rise"):
             ramp(wrong)
+
+
+def test_a_limit_that_a_cold_lever_is_above_is_refused():
+    with pytest.raises(InputError, match=r"a limit of 250 K, expected one above .*, 293 K"):
+        ramp([1.0, 2.0], stay_below_K=250.0)
+
+
+def test_a_limit_that_no_bias_is_safe_for_leaves_no_row(curve):
+    measured = ramp([1.0, 2.0], stay_below_K=293.5)
+    measured.measure(WithoutLine(curve), lambda *row: None)
+    assert not measured.readings
+    assert "beyond 0 V the tip might be above 294 K, with a probability" in measured.reason
 
 
 def test_rows_are_on_disk_as_they_come_and_can_be_read(tmp_path):

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hotlever.errors import ComputationError, HotleverError, InputError
+from hotlever.errors import ComputationError, HotleverError, InputError, counted
 from hotlever.estimate.next_measurement import LinearisedLever, hottest_tips, plan_next
 from hotlever.estimate.row_by_row import RowByRow
 from hotlever.instruments.source_meter import Reading
@@ -110,7 +110,8 @@ class Ramp:
     Raises
     ------
     InputError
-        If the biases do not rise from above 0, or the lever does not start cold.
+        If the biases do not rise from above 0, the limit is not above the base temperature, or
+        the lever does not start cold.
     """
 
     def __init__(
@@ -123,6 +124,12 @@ class Ramp:
         self.options = options or RampOptions()
         if not (bias.size and bias[0] > 0.0 and (np.diff(bias) > 0.0).all()):
             raise InputError("measure: expected biases that rise, the first above 0 V")
+        base_K, limit_K = probe.circuit.base_temperature_K, self.options.stay_below_K
+        if isinstance(limit_K, float) and limit_K <= base_K:
+            raise InputError(
+                f"measure: a limit of {limit_K:.5g} K, expected one above the base temperature, "
+                f"{base_K:.5g} K"
+            )
         self._probe, self._bias = probe, bias
         self._spacing = float(np.diff(bias).mean()) if bias.size > 1 else float(bias[0])
         self._lever = RowByRow(probe, priors)
@@ -225,7 +232,7 @@ class Ramp:
         if self.reason:
             return None
         if len(self.readings) == self._bias.size:
-            self.reason = f"all {self._bias.size} rows are taken"
+            self.reason = f"no more than {counted(self._bias.size, 'row')} were wanted"
             return None
         bias = (
             self._proposed(last_V) if self.options.propose and self.tells else self._wanted(last_V)
@@ -253,8 +260,11 @@ class Ramp:
         safe = np.logical_and.accumulate(self._tip_limits(biases) < self.limit_K)
         if safe.any() and biases[safe][-1] - last_V >= finest:
             return float(biases[safe][-1])
+        stated, limit_K = self.options.stay_below_K, self.limit_K
+        where = " (its knee)" if stated == "knee" else " (where it jumps or melts)"
         self.reason = (
-            f"the tip might be above {self.limit_K:.0f} K beyond {last_V:.4g} V with more than 1 %"
+            f"beyond {last_V:.4g} V the tip might be above {limit_K:.0f} K"
+            f"{where if limit_K != stated else ''}, with a probability of more than 1 %"
         )
         return None
 

@@ -113,9 +113,11 @@ def measure_lever(
                 f"{output}: {rows}; stopped by the user, the output is off"
             ) from None
         file.comment(f"ended: {ramp.reason}")
+    if not ramp.readings:
+        raise ComputationError(f"{output}: not written, since no row was taken: {ramp.reason}")
     reporter.give(_result(output, ramp))
     if not ramp.complete:
-        raise ComputationError(f"{output}: {len(ramp.readings)} rows; {ramp.reason}")
+        raise ComputationError(f"{output}: {counted(len(ramp.readings), 'row')}; {ramp.reason}")
     if calibration is not None:
         with reporter.progress("calibrate") as update:
             whole = calibrate(
@@ -154,9 +156,10 @@ def _instruments(
 
 def _row(number: int, reading: Reading, step: Step) -> str:
     """Return a row in words."""
+    how = "to first order" if step.first_order else "with 99 %"
     return (
-        f"{number:3d}  {reading.bias_V:7.4g} V  {reading.current_mA:8.5g} mA   tip expected at "
-        f"{step.tip_K:.0f} K, below {step.tip_limit_K:.0f} K{' to first order' * step.first_order}"
+        f"row {number}: {reading.bias_V:.4g} V, {reading.current_mA:.5g} mA; the tip expected at "
+        f"{step.tip_K:.0f} K, below {step.tip_limit_K:.0f} K {how}"
     )
 
 
@@ -185,7 +188,7 @@ def _result(output: Path, ramp: Ramp) -> str:
     import numpy as np
 
     readings = ramp.readings
-    text = f"{len(readings)} rows in {output}: {ramp.reason}.\n"
+    text = f"{counted(len(readings), 'row')} in {output}: {ramp.reason}.\n"
     if ramp.tells:
         last_V = max(reading.bias_V for reading in readings)
         low, tip, high = ramp.known.likely.band(np.array([last_V]))[:, 0].tolist()
