@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.tri import Triangulation
 from numpy.typing import ArrayLike
 from PIL import Image
 
@@ -39,7 +40,7 @@ from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.common_steps import make_lever
 from hotlever.threads import one_blas_thread
-from hotlever.types import Array
+from hotlever.types import Array, Index
 
 
 class _Map:
@@ -58,7 +59,8 @@ class _Map:
         self.box = [float(end) for end in ends]
         points = np.stack(np.meshgrid(self.x, self.y), axis=-1).reshape(-1, 2)
         self._inside = layout.contains(points)
-        self._cells = space.elements.basis.probes(points[self._inside].T)
+        points = points[self._inside]
+        self._cells, _ = space.elements.interpolation(points, _triangles_at(space, points))
         self.outline = layout.outline
         path, along = current_path(space, potential)
         self.along = np.linspace(0.0, along[-1], 361)
@@ -81,6 +83,16 @@ class _Map:
     def line(self, T: Array) -> Array:
         """Return the temperature (K) along the current."""
         return np.asarray((self._shares * T[self._on_path]).sum(axis=1))
+
+
+def _triangles_at(space: FullSpace, points: Array) -> Index:
+    """Return the triangle at each of many points (n, 2), by a map of trapezoids."""
+    mesh = space.mesh.elements
+    x, y = mesh.p
+    found = np.asarray(Triangulation(x, y, mesh.t.T).get_trifinder()(*points.T))
+    outside = found < 0  # by rounding
+    found[outside] = space.elements.at_points(points[outside])[0]
+    return found
 
 
 def coloured(T: ArrayLike, low: float, high: float) -> Array:

@@ -203,17 +203,19 @@ class FiniteElements:
             positions=positions.reshape(len(positions), -1),
         )
 
-    def interpolation(self, points: Array) -> tuple[csr_matrix, Index]:
+    def interpolation(
+        self, points: Array, elements: Index | None = None
+    ) -> tuple[csr_matrix, Index]:
         """Return the matrix from nodal values to those at points, and the element of each.
 
         See `at_points`.
         """
-        elements, shares, _ = self.at_points(points)
+        elements, shares, _ = self.at_points(points, elements)
         starts = np.arange(0, shares.size + 1, shares.shape[1])
         matrix = (shares.ravel(), self.dofs[elements].ravel(), starts)
         return csr_matrix(matrix, shape=(len(points), self.size)), elements
 
-    def at_points(self, points: Array) -> tuple[Index, Array, Array]:
+    def at_points(self, points: Array, elements: Index | None = None) -> tuple[Index, Array, Array]:
         """Return the element at each point, and its basis functions there, with their slopes.
 
         Parameters
@@ -221,6 +223,8 @@ class FiniteElements:
         points : ndarray, shape (n, dimension)
             µm; a last coordinate left out is zero. A point outside by rounding is given the nearest
             element.
+        elements : ndarray of int, shape (n,), optional
+            In which the points lie, if that is known.
 
         Returns
         -------
@@ -234,9 +238,23 @@ class FiniteElements:
             If a point lies outside the mesh.
         """
         points = np.pad(points, ((0, 0), (0, len(self.positions) - points.shape[1])))
-        elements = np.empty(len(points), dtype=np.intp)
-        local = np.empty(points.T.shape)
-        corners = self.basis.mesh.p[:, self.basis.mesh.t[0]]
+        if elements is None:
+            elements = self._around(points)
+        away = points - self._corners[:, elements].T
+        local = np.einsum("nra,na->rn", self.inverse[elements], away)
+        shape = [self.basis.elem.lbasis(local, node) for node in range(self.dofs.shape[1])]
+        values = np.stack([value for value, _ in shape], axis=1)
+        slopes = np.stack([slope for _, slope in shape], axis=-1)
+        return elements, values, np.einsum("nra,rnk->ank", self.inverse[elements], slopes)
+
+    @property
+    def _corners(self) -> Array:
+        """The first corner of each element, (dimension, elements)."""
+        return np.asarray(self.basis.mesh.p[:, self.basis.mesh.t[0]])
+
+    def _around(self, points: Array) -> Index:
+        """Return the element at each point (n, dimension); see `at_points`."""
+        elements, corners = np.empty(len(points), dtype=np.intp), self._corners
         together = 256
         for first in range(0, len(points), together):
             some = slice(first, first + together)
@@ -251,11 +269,8 @@ class FiniteElements:
             if outside.size:
                 where = ", ".join(f"{value:g}" for value in points[some][outside[0]])
                 raise InputError(f"the point ({where}) µm lies outside the lever")
-            elements[some], local[:, some] = nearest, here[nearest, :, number].T
-        shape = [self.basis.elem.lbasis(local, node) for node in range(self.dofs.shape[1])]
-        values = np.stack([value for value, _ in shape], axis=1)
-        slopes = np.stack([slope for _, slope in shape], axis=-1)
-        return elements, values, np.einsum("nra,rnk->ank", self.inverse[elements], slopes)
+            elements[some] = nearest
+        return elements
 
 
 def numbered(

@@ -326,17 +326,16 @@ def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
         return np.asarray(flow / np.linalg.norm(flow))
 
     def streamline(at: Array, sign: float) -> Iterator[Array]:
-        size, steps = sign * longest, 0
+        size, steps, along = sign * longest, 0, direction(at)
         # to end at the edge steps are halved six times
         while abs(size) > longest / 2**6 and steps < 2000:
             try:
-                middle = at + 0.5 * size * direction(at)
-                after = at + size * direction(middle)
-                direction(after)
+                after = at + size * direction(at + 0.5 * size * along)
+                along_there = direction(after)
             except InputError:  # beyond the edge
                 size /= 2
                 continue
-            at, steps = after, steps + 1
+            at, along, steps = after, along_there, steps + 1
             yield at
 
     start = np.array(layout.tip)
