@@ -77,6 +77,17 @@ def test_rows_that_begin_with_words_are_rows(tmp_path):
     assert data.bias_V.tolist() == [1.0, 2.0, 3.0]
 
 
+def test_of_sweeps_side_by_side_one_question_asks_which(tmp_path):
+    row, heads = [0.5, 0.1, None, 0.5, 0.2], ["V_b (V)", "I_h (mA)"]
+    sheet = [["first", None, None, "second"], [*heads, None, *heads], row]
+    path = workbook(tmp_path / "iv.xlsx", sweep=sheet)
+    answers = r"--column 'V_b \(V\)=1' --column 'I_h \(mA\)=2' says which"
+    with pytest.raises(InputError, match=f"columns 'V_b', 'I_h' stand twice; {answers}"):
+        read_measurement(path)
+    data = read_measurement(path, {"V_b (V)": "4", "I_h (mA)": "5"})
+    assert data.current_mA.tolist() == [0.2]
+
+
 @pytest.mark.parametrize("first", ["#", "# row"])
 def test_headings_that_begin_with_a_number_sign_are_no_comment(tmp_path, first):
     sheet = [[first, "V_b (V)", "I_h (mA)"], [1, 0.5, 0.1], [2, 1.0, 0.2]]

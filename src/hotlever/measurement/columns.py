@@ -218,15 +218,21 @@ def find_columns(
         if named is not None and named not in columns and index not in unavailable:
             candidates[named].append(index)
     found: dict[str, int] = {}
+    twice: dict[str, str] = {}
     for symbol, indices in candidates.items():
         # its own symbol names a quantity before any other name
         own = [i for i in indices if name_and_unit(table.names[i])[0].lower() == symbol.lower()]
         first, *others = own or indices
         if others and symbol != "t":
-            raise InputError(
-                f"{where}: column '{symbol}' stands twice; {_assignment(symbol)} says which it is"
-            )
+            twice[symbol] = str(first + 1)
         found[symbol] = first
+    if twice:
+        verb = "stands" if len(twice) == 1 else "stand"
+        which = " ".join(_assignment(symbol, number) for symbol, number in twice.items())
+        raise InputError(
+            f"{where}: column{'s' * (len(twice) > 1)} {', '.join(map(quoted, twice))} {verb} "
+            f"twice; {which} says which, by number or heading"
+        )
     _check_units(table, found)
     columns |= {symbol: _column(table, symbol, index, None) for symbol, index in found.items()}
     if "t" in columns and not (in_time or _are_brief(table, columns["t"])):
