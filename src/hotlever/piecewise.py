@@ -242,6 +242,27 @@ def spline_through(u: Array, values: Array, most: int = 3) -> BSpline:
     return spline
 
 
+def spline_values(u: Array, values: Array, at: Array, derivative: int = 0) -> Array:
+    """Return values, or a derivative, of the cubic spline through values (k, ...) at some u.
+
+    As `spline_through`, which takes longer: many splines in turn have one set of nodes.
+
+    Examples
+    --------
+    >>> u = np.linspace(0.0, 1.0, 5)
+    >>> spline_values(u, u**3, np.array([0.3])).round(12).tolist()
+    [0.027]
+    """
+    weights = _cardinal_splines(tuple(u.tolist()))(at, derivative)
+    return np.asarray(np.tensordot(weights, values, axes=1))
+
+
+@lru_cache(maxsize=32)
+def _cardinal_splines(nodes: tuple[float, ...]) -> BSpline:
+    """Return the splines that are one at a node and zero at all others."""
+    return spline_through(np.array(nodes), np.eye(len(nodes)))
+
+
 def hermite_weights(nodes: Array, at: Array, derivative: int = 0) -> Array:
     """Return the weights, (n, 2k), of k values and then k slopes that interpolate at n points.
 

@@ -119,12 +119,16 @@ def calibrated(
 def _hotter(solution: Solution, medium: str) -> Branch:
     """Return the branch of a coarse lever, to tips hotter than was measured, in a medium.
 
-    In that of the measurement it goes on from the states that the search ended with.
+    In that of the measurement it goes on from the states that the search ended with, in another one
+    it has the same mesh.
     """
     assert isinstance(solution.prediction, PredictionAtRest)
     probe, searched = solution.probe, solution.prediction.linearised.branch
-    if medium != probe.surroundings.medium or searched.equations.space.is_reduced:
+    space = searched.equations.space
+    if space.is_reduced:
         return Lever(probe.in_medium(medium), COARSE).branch()
+    if medium != probe.surroundings.medium:
+        return Lever(probe.in_medium(medium), COARSE, space=space.full).branch()
     rise = HOTTEST - probe.circuit.base_temperature_K
     return continued(searched.equations, lambda to: to.values[-1, TIP_RISE] >= rise, searched)
 

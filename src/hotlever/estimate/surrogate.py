@@ -32,7 +32,7 @@ from hotlever.lever.observables import (
     with_changes,
 )
 from hotlever.lever.reduced.lever import ReducedLever
-from hotlever.piecewise import Piecewise, crossing, spline_through
+from hotlever.piecewise import Piecewise, crossing, spline_values
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import OBSERVABLES
@@ -85,7 +85,7 @@ class Rows:
     def values(self, branch: Branch, circuit: Circuit) -> Array:
         """Return the observables of the states, (observables, n); see `states`."""
         u, short = self.states(branch, circuit)
-        return observed(circuit, self._shown(branch, u, short))
+        return observed(circuit, self._shown(branch.curve(u).T, short))
 
     def differentiated(
         self, branch: Branch, by_parameter: Array, circuit: Circuit, names: Sequence[str]
@@ -103,7 +103,7 @@ class Rows:
         """
         u, short = self.states(branch, circuit)
         outputs = branch.curve(u).T
-        by_state = spline_through(branch.u, by_parameter)(u)
+        by_state = spline_values(branch.u, by_parameter, u)
         of_circuit = np.stack([circuit.bias_by(name, outputs[1]) for name in names], axis=1)
         along = branch.curve(u, 1)
         if self.measured is not None:
@@ -117,12 +117,12 @@ class Rows:
             slopes[:, ends] = np.moveaxis(by_state[ends], 1, 0)
             slopes[:TIP_RISE, ends] *= self._left(short[ends])[:, None]
             slopes[:TIP_RISE, ends] += outputs[:TIP_RISE, ends, None] * less
-        outputs = self._shown(branch, u, short)
+        outputs = self._shown(outputs, short)
         return observed(circuit, outputs), observed_by(circuit, outputs, slopes, names)
 
-    def _shown(self, branch: Branch, u: Array, short: Array) -> Array:
-        """Return V_l, I_h, V_r and the tip's rise at some u, (4, n), less where they fall short."""
-        outputs = branch.curve(u).T.copy()
+    def _shown(self, outputs: Array, short: Array) -> Array:
+        """Return V_l, I_h, V_r and the tip's rise, (4, n), less where they fall short."""
+        outputs = outputs.copy()
         outputs[:TIP_RISE] *= self._left(short)
         return outputs
 
@@ -287,7 +287,7 @@ class CurveSurrogate:
             powers = self._rates[1:] / branch.values[1:, :, None]
             # without power everything is zero; its ratios are those of a barely warm lever
             self._rates = np.concatenate([powers[:1], powers])
-        self._slopes = spline_through(branch.u, self._rates)(branch.u, 1)
+        self._slopes = spline_values(branch.u, self._rates, branch.u, 1)
 
     def reading(self, rows: Rows) -> Self:
         """Return the same of other rows."""
@@ -311,7 +311,7 @@ class CurveSurrogate:
 
         By the distance of each parameter, of a lever that only the swept supply heats.
         """
-        return np.asarray(spline_through(self.branch.u, self._rates)(u))
+        return spline_values(self.branch.u, self._rates, u)
 
     def powers(self, u: Array) -> Array:
         """Return with which powers of the parameters V_l, I_h and V_r go at some u, (n, 4, p).
@@ -396,7 +396,7 @@ class ReducedSurrogate(CurveSurrogate):
         ratio[1:, :TIP_RISE] = outputs / self._local_outputs
         # without power the ratio is that of a barely warm lever
         ratio[0] = ratio[1]
-        growth = spline_through(self.branch.u, ratio)(self.branch.u, 1) / ratio
+        growth = spline_values(self.branch.u, ratio, self.branch.u, 1) / ratio
         return multiplied(self.branch, ratio, growth)
 
     @one_blas_thread

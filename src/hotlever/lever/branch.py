@@ -125,8 +125,8 @@ class Branch:
     def showing(self, values: Array, value_slopes: Array) -> Branch:
         """Return the same states, which show other values, with other derivatives by u."""
         other = replace(self, values=values, value_slopes=value_slopes)
-        # where something melts follows from the states alone, and is asked of thousands like it
-        other.__dict__["end_u"] = self.end_u
+        # what follows from the states alone is asked of thousands like it
+        vars(other).update(end_u=self.end_u, steps=self.steps)
         return other
 
     def followed_by(self, after: Branch) -> Branch:

@@ -358,7 +358,10 @@ class LeverEquations:
         tested = np.zeros((*tests.shape[1:], len(names)))
         for column, name in enumerate(names):
             for law, weight in weighted.named.items():
-                tested[..., column] += np.einsum("pn,pnm->nm", getattr(by[name], law), weight)
+                change = getattr(by[name], law)
+                # most parameters are those of one law
+                if change.any():
+                    tested[..., column] += np.einsum("pn,pnm->nm", change, weight)
             if name in moved:
                 tested[..., column] += moved[name].tested(at_points, weights)
         # by these parameters heat leaves the surface or the leg ends, whatever radiates or touches

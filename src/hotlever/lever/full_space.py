@@ -65,7 +65,6 @@ class FullSpace(Space):
         wiring: Wiring | None = None,
         factorisation: FactorisationOptions | None = None,
     ) -> None:
-        self.mesh = mesh
         self.wiring = wiring or Circuit().wiring(mesh.terminal_facets)
         self.elements = elements or FiniteElements(mesh.elements)
         self.end_nodes = {
@@ -88,27 +87,32 @@ class FullSpace(Space):
         )
         self.is_temperature = np.zeros(self.size + 1, dtype=bool)
         self.is_temperature[self._T[self._T >= 0]] = True
-        # in the middle of the silicon's thickness
-        (element,), (weights,), _ = self.elements.at_points(np.array([mesh.layout.tip]))
-        self.tip = (self._T[self.elements.dofs[element]], weights)
         self.held = {name: int(self._V[self.contact_nodes[name][0]]) for name in self.wiring.held}
         self.chip = (self._T[on_chip[:1]], np.ones(1)) if on_chip.size else None
-        unknowns = np.stack([self._T, self._V])
-        behind = [*self.held.values(), *(self._T[on_chip[:1]].tolist())]
-        self._jacobian = SparseJacobian(
-            self.elements, unknowns, self.size, behind, self.tip, factorisation
-        )
-        self._losses: dict[str, ElementLosses] = {}
         self.air = AirLoss.nothing(self.size + 1)
         self.reader = None
         if "reader" in self.wiring.measurable:
             nodes = self.contact_nodes["reader"]
             self.reader = self._V[nodes], np.full(nodes.size, 1.0 / nodes.size)
+        self._place(mesh)
+        unknowns = np.stack([self._T, self._V])
+        behind = [*self.held.values(), *(self._T[on_chip[:1]].tolist())]
+        self._jacobian = SparseJacobian(
+            self.elements, unknowns, self.size, behind, self.tip, factorisation
+        )
+
+    def _place(self, mesh: ProbeMesh | SolidMesh) -> None:
+        """Take up where the elements are on a mesh, and what that makes of the maps."""
+        self.mesh, self._losses = mesh, dict[str, ElementLosses]()
+        # in the middle of the silicon's thickness
+        (element,), (weights,), _ = self.elements.at_points(np.array([mesh.layout.tip]))
+        self.tip = (self._T[self.elements.dofs[element]], weights)
         sampling, points = self.elements.sampling, self.elements.weights.size
         kinds = 1 + len(self.elements.positions)
         self.temperature = LinearMap(sampling @ _selection(self._T, self.size), kinds)
         self.potential = LinearMap(sampling[points:] @ _selection(self._V, self.size), kinds - 1)
         self.weights = self.elements.weights[:, None]
+        ends = np.unique(np.concatenate(list(self.end_nodes.values())))
         self.end_test = _sampled_sum(self.elements, ends)
         self.end_tests = {
             name: _sampled_sum(self.elements, nodes) for name, nodes in self.end_nodes.items()
@@ -122,6 +126,18 @@ class FullSpace(Space):
         self.films, self.thickness_um, self.plate_um = placed
         parts = np.array([region.part for region in mesh.layout.regions])[region]
         self.parts = {part: np.flatnonzero(parts == part) for part in get_args(Part)}
+
+    def moved(self, mesh: ProbeMesh) -> FullSpace:
+        """Return the same unknowns on the same mesh with its vertices elsewhere, in vacuum."""
+        space = copy(self)
+        for found in ("rim", "footprint"):
+            vars(space).pop(found, None)
+        basis = self.elements.basis
+        space.elements = FiniteElements(mesh.elements, basis.elem, (basis.X, basis.W))
+        space.air = AirLoss.nothing(self.size + 1)
+        space._place(mesh)
+        space._jacobian = self._jacobian.moved(space.elements, space.tip)
+        return space
 
     # --- where things are -------------------------------------------------------------------------
 

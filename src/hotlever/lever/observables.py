@@ -32,7 +32,8 @@ Shown = Mapping[str, Array]
 def _bridge_voltage(circuit: Circuit, shown: Shown, names: Sequence[str] = ()) -> Evaluated:
     """Return V_bridge (V), NaN without a bridge; see `FOLLOWING`."""
     bias_V = shown["bias_V"]
-    by = {name: circuit.bridge_by(name, bias_V) for name in names}
+    own = (name for name in names if name.startswith("bridge_"))
+    by = {name: circuit.bridge_by(name, bias_V) for name in own}
     return circuit.bridge_voltage(shown["lever_V"], bias_V), {
         "lever_V": circuit.bridge_change(1.0, 0.0),
         **by,

@@ -102,7 +102,7 @@ class SimilarLevers:
         """Return mesh, operators and air of a similar probe."""
         space = self._lever.space
         if (probe.shape, probe.tip) != (self.drawn.shape, self.drawn.tip):
-            space = FullSpace(self._moving.mesh_of(probe), wiring=space.wiring)
+            space = space.moved(self._moving.mesh_of(probe))
         # air takes up from a place nearly what it took before the place moved a little
         return space.with_air(self._air(probe))
 

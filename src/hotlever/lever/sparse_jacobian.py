@@ -8,6 +8,7 @@ Numer. Methods Eng. 8, 198 (1974)). Of cubic triangles a fifth of the unknowns i
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -49,14 +50,15 @@ class SparseJacobian:
         options: FactorisationOptions | None = None,
     ) -> None:
         self._elements = elements
+        self._made_of = unknowns, size, held, options
         number = np.concatenate(unknowns[:, elements.dofs], axis=1)
         nodes = elements.dofs.shape[1]
-        tip_unknowns, self._tip = (each[tip[1] != 0] for each in tip)
+        self._tip_unknowns, self._tip = _of_tip(tip)
         # the row of V_l is the current, which the constraint replaces
         has_column, has_row = number >= 0, (number >= 0) & (number < size)
         inside = np.tile(np.arange(nodes) >= nodes - elements.inner, 2)
         # the constraint belongs to no element from which it could be condensed
-        of_tip = np.isin(number[:, inside], tip_unknowns).any(axis=1, keepdims=True)
+        of_tip = np.isin(number[:, inside], self._tip_unknowns).any(axis=1, keepdims=True)
         is_inner: Mask = has_row & inside & ~of_tip
         self._condensation = _Condensation(number, is_inner, has_row, has_column, inside)
         # what is left is counted anew
@@ -69,7 +71,7 @@ class SparseJacobian:
             column * count + row,
             count**2,  # after all others: dropped
         )
-        of_constraint = left[np.append(tip_unknowns, size)] * count + count - 1
+        of_constraint = left[np.append(self._tip_unknowns, size)] * count + count - 1
         diagonal = left[np.array(held, dtype=int)] * (count + 1)
         every = np.concatenate([keys.ravel(), of_constraint, diagonal])
         unique, slots = np.unique(every, return_inverse=True)
@@ -80,6 +82,16 @@ class SparseJacobian:
         )
         starts = np.searchsorted(unique // count, np.arange(count + 1))
         self._factorisation = Factorisation.of_pattern(unique % count, starts, options)
+
+    def moved(self, elements: FiniteElements, tip: tuple[Index, Array]) -> SparseJacobian:
+        """Return that of the same elements elsewhere; the structure is shared."""
+        tip_unknowns, weights = _of_tip(tip)
+        if not np.array_equal(tip_unknowns, self._tip_unknowns):
+            unknowns, size, held, options = self._made_of
+            return SparseJacobian(elements, unknowns, size, held, tip, options)
+        other = copy(self)
+        other._elements, other._tip = elements, weights
+        return other
 
     def element_matrices(self, tangent: Tangent) -> Array:
         """Return those of one state's tangent, (elements, 2 nodes, 2 nodes), temperatures first."""
@@ -115,6 +127,13 @@ class SparseJacobian:
         entries[self._held_slots] += conductance
         entries[self._constraint_slots] = np.append(constraint.tip * self._tip, constraint.lever)
         return _CondensedFactors(self._factorisation.factorised(entries), *condensed)
+
+
+def _of_tip(tip: tuple[Index, Array]) -> tuple[Index, Array]:
+    """Return the unknowns that the rise of the tip depends on, in rising order, and weights."""
+    unknowns, weights = (each[tip[1] != 0] for each in tip)
+    order = np.argsort(unknowns)
+    return unknowns[order], weights[order]
 
 
 class ElementLosses:
