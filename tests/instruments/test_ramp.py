@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
-from hotlever.errors import InputError
+from hotlever.errors import ComputationError, InputError
 from hotlever.instruments.ramp import CurveFile, Ramp, RampOptions
 from hotlever.instruments.source_meter import Reading
 from hotlever.instruments.twin import RampCurve, TwinBench, drawn_from_priors
@@ -130,3 +133,14 @@ def test_rows_are_on_disk_as_they_come_and_can_be_read(tmp_path):
     assert (data.base_temperature_K, data.medium) == (293.0, "vacuum")
     with pytest.raises(InputError, match="exists"), CurveFile(path, Probe.reference(), False):
         pass
+
+
+def test_a_full_disk_is_one_line(tmp_path, monkeypatch):
+    path = tmp_path / "iv.csv"
+    with CurveFile(path, Probe.reference(), with_reader=False) as file:
+        file.add(Reading(1.0, 0.1, float("nan"), False))
+        full = OSError(errno.ENOSPC, "No space left on device")
+        monkeypatch.setattr("os.fsync", Mock(side_effect=full))
+        with pytest.raises(ComputationError, match=r"iv\.csv: cannot be written on \(No space"):
+            file.add(Reading(2.0, 0.2, float("nan"), False))
+    assert "1,0.1\n" in path.read_text()

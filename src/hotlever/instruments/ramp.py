@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -308,6 +309,8 @@ class CurveFile:
     ------
     InputError
         If the file exists or cannot be written.
+    ComputationError
+        If a line cannot be written later on.
     """
 
     def __init__(self, path: str | os.PathLike[str], probe: Probe, with_reader: bool) -> None:
@@ -344,11 +347,18 @@ class CurveFile:
         self._write(",".join("" if np.isnan(value) else f"{value:.9g}" for value in values))
 
     def _write(self, line: str) -> None:
-        self._file.write(f"{line}\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        try:
+            self._file.write(f"{line}\n")
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise ComputationError(
+                f"{self._path}: cannot be written on ({error.strerror}); the rows before are there"
+            ) from error
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        # what did not fit is written once more, and does not fit again
+        with suppress(OSError):
+            self._file.close()
         if not self._has_heads:
             self._path.unlink(missing_ok=True)
