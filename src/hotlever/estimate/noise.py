@@ -71,6 +71,23 @@ def relative_noise(
     return relative
 
 
+def steepness_of(bias_V: Array, data: Array) -> Array:
+    """Return by how much data (observables, n) change with a share of the bias, (observables, n).
+
+    That is the greater of the changes from the row before and to the one after, in the order in
+    which rows were measured: on one side of a jump data do not tell how far it is.
+    """
+    steepness = np.zeros(data.shape)
+    size = np.abs(bias_V)
+    for own, values in zip(steepness, data, strict=True):
+        rows = np.flatnonzero(np.isfinite(values) & (size > 0))
+        way, change = np.abs(np.diff(np.log(size[rows]))), np.abs(np.diff(np.abs(values[rows])))
+        # rows of one bias differ by noise, or by what else was changed
+        rate = np.where(way > 1e-3, change / np.maximum(way, 1e-3), 0.0)
+        own[rows] = np.maximum(np.append(rate, 0.0), np.append(0.0, rate))
+    return steepness
+
+
 class DataErrors:
     """Standard errors of data, each by itself, and how little outliers count.
 
@@ -86,6 +103,8 @@ class DataErrors:
         By which data have neighbours.
     root : ndarray, shape (n,)
         Of how many rows of a file each is the mean, as a root: by it errors are smaller.
+    steepness : ndarray, shape (observables, n)
+        By how much data change with a share of the bias.
     measured : ndarray, shape (observables, n), optional
         Standard errors. An observable without them begins with a hundredth of its largest value.
     options : DataNoiseOptions, optional
@@ -108,11 +127,13 @@ class DataErrors:
         largest: Array,
         along: Array,
         root: Array,
+        steepness: Array,
         measured: Array | None = None,
         options: DataNoiseOptions | None = None,
     ) -> None:
         self._options = options or DataNoiseOptions()
         self.present, self.largest, self._root = present, largest, root
+        self._steepness = steepness
         self._order = np.argsort(along, kind="stable")
         self.measured, self.without = measured is not None, np.zeros(len(present), dtype=bool)
         self.scale = np.broadcast_to(largest / root, present.shape)
@@ -120,7 +141,7 @@ class DataErrors:
             self.without = np.all(np.isnan(measured), axis=1)
             self.scale = np.where(np.isfinite(measured), measured, 0.01 * largest / root)
         # what was stated, and what a model is off by beside it
-        self._stated, self._discrepancy = self.scale, np.zeros_like(largest)
+        self._stated, self._discrepancy = self.scale, np.zeros(present.shape)
         self.down = np.ones(present.shape)
         # the noise of each datum over that of its observable
         self._relative = np.ones(present.shape)
@@ -182,15 +203,16 @@ class DataErrors:
 
         Outliers count as little as they weigh. The `leverage`, (observables, n), is the share of
         each datum's noise that a fit has taken up. The `discrepancy` is by how much a model is off
-        that describes the data, a share of the largest value: it is an error of every datum beside
-        its scatter, or beside what was measured of it. With it the noise may go with the size of
-        what is predicted (see `relative_noise`), and is not what is smooth; without it is the same
+        that describes the data, a share of the largest value, and of the bias: it is an error of
+        every datum beside its scatter, or beside what was measured of it. With it the noise may go
+        with the size of what is predicted (see `relative_noise`), and is not what is smooth;
+        without it is the same
         everywhere.
         """
         weight = np.where(self.present, self.down**2, 0.0)
         difference = difference * self._root
         leverage = np.broadcast_to(leverage, difference.shape)
-        self._discrepancy = least = discrepancy * self.largest
+        least = discrepancy * self.largest
         options = self._options
         if discrepancy:
             for row in np.flatnonzero(self.without):
@@ -205,8 +227,9 @@ class DataErrors:
             most = np.maximum(of_noise, options.most_of_discrepancy * least)
             scatter = np.minimum(scatter, most)
         # the mean of many rows of a file has less noise, but no better model
-        own = self._relative * np.hypot(scatter / self._root, least)
-        self.scale = np.where(self.without[:, None], own, np.hypot(self._stated, least))
+        self._discrepancy = np.hypot(self._relative * least, discrepancy * self._steepness)
+        noise = np.where(self.without[:, None], self._relative * scatter / self._root, self._stated)
+        self.scale = np.hypot(noise, self._discrepancy)
 
     def degrees_of_freedom(self, leverage: Array) -> Array:
         """Return those of the errors of each observable, (observables,); infinite of stated ones.
@@ -216,7 +239,7 @@ class DataErrors:
         """
         count = np.sum(np.where(self.present, self.down**2, 0.0), axis=1)
         free = np.maximum(count - leverage.sum(axis=1), 1.0)
-        estimated = 1.0 - (self._relative * self._discrepancy / self.scale) ** 2
+        estimated = 1.0 - (self._discrepancy / self.scale) ** 2
         share = np.mean(estimated, axis=1, where=self.present)
         with np.errstate(divide="ignore"):
             free = free / share**2

@@ -125,8 +125,8 @@ class SearchOptions:
         Most of them.
     discrepancy : float
         By how much a model is off that describes the data, a share of an observable's largest
-        value, where something was known of the lever beforehand (Kennedy and O'Hagan, J. R. Stat.
-        Soc. B 63, 425 (2001)).
+        value, and of the bias, where something was known of the lever beforehand (Kennedy and
+        O'Hagan, J. R. Stat. Soc. B 63, 425 (2001)).
     scatter_rounds : int
         Rounds in which an observable without measurement errors finds its scatter.
     creeping_steps : int

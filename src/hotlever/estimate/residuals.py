@@ -13,7 +13,7 @@ from copy import copy
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.estimate.noise import CommonCovariance, CommonError, DataErrors
+from hotlever.estimate.noise import CommonCovariance, CommonError, DataErrors, steepness_of
 from hotlever.estimate.options import Numerics, Weights
 from hotlever.measurement import Measurement
 from hotlever.probe.priors import PriorShift
@@ -92,8 +92,12 @@ class Residuals:
         rows = measurement.rows
         root = np.ones(self.bias.size) if rows is None else np.sqrt(rows[self._used])
         measured = self._measured_errors() if weights == "errors" and data_weights is None else None
+        at_rest = measurement.time_us is None
+        steepness = steepness_of(self.bias, self.data) if at_rest else np.zeros(self.data.shape)
         of_noise = self.numerics.noise
-        self.errors = DataErrors(self.present, self.largest, self.along, root, measured, of_noise)
+        self.errors = DataErrors(
+            self.present, self.largest, self.along, root, steepness, measured, of_noise
+        )
         if data_weights is not None:
             self.errors.fix(data_weights[:, self._used])
             self.present = self.errors.present
