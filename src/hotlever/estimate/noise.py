@@ -75,7 +75,8 @@ def steepness_of(bias_V: Array, data: Array) -> Array:
     """Return by how much data (observables, n) change with a share of the bias, (observables, n).
 
     That is the greater of the changes from the row before and to the one after, in the order in
-    which rows were measured: on one side of a jump data do not tell how far it is.
+    which rows were measured, beyond the largest value, by which a resistor's would change at most:
+    on one side of a jump data do not tell how far it is.
     """
     steepness = np.zeros(data.shape)
     size = np.abs(bias_V)
@@ -84,7 +85,8 @@ def steepness_of(bias_V: Array, data: Array) -> Array:
         way, change = np.abs(np.diff(np.log(size[rows]))), np.abs(np.diff(np.abs(values[rows])))
         # rows of one bias differ by noise, or by what else was changed
         rate = np.where(way > 1e-3, change / np.maximum(way, 1e-3), 0.0)
-        own[rows] = np.maximum(np.append(rate, 0.0), np.append(0.0, rate))
+        either = np.maximum(np.append(rate, 0.0), np.append(0.0, rate))
+        own[rows] = np.maximum(either - np.abs(values[rows]).max(initial=0.0), 0.0)
     return steepness
 
 
@@ -104,7 +106,7 @@ class DataErrors:
     root : ndarray, shape (n,)
         Of how many rows of a file each is the mean, as a root: by it errors are smaller.
     steepness : ndarray, shape (observables, n)
-        By how much data change with a share of the bias.
+        By how much data change with a share of the bias, see `steepness_of`.
     measured : ndarray, shape (observables, n), optional
         Standard errors. An observable without them begins with a hundredth of its largest value.
     options : DataNoiseOptions, optional
