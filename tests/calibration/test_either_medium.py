@@ -62,9 +62,10 @@ def test_a_fit_in_either_medium_is_one_in_the_better(cold):
     either = fit(cold, medium="unknown", usual_priors=True, priors=priors)
     own = fit(cold, medium=either.medium, usual_priors=True, priors=priors)
     assert either.options.medium == either.medium
-    assert {name: parameter.value for name, parameter in either.parameters.items()} == {
-        name: parameter.value for name, parameter in own.parameters.items()
-    }
+    # but for rounding: factorisations begin with the pivots of what was solved before
+    assert {name: parameter.value for name, parameter in either.parameters.items()} == (
+        pytest.approx({name: parameter.value for name, parameter in own.parameters.items()}, 1e-6)
+    )
     assert np.all(either.band.tip_stderr_K >= own.band.tip_stderr_K)
     assert either.band.tip_stderr_K[-1] > 1.05 * own.band.tip_stderr_K[-1]
 
