@@ -140,8 +140,9 @@ class Search:
     def from_anywhere(self, experiment: ExperimentAtRest) -> Optimum:
         """Search from a lever of which little may be known.
 
-        If it shows something else than the data, or the search leads to a lever that does, or that
-        jumps on the way, it first grows; of two ends the one that describes the data better counts.
+        If it shows something else than the data, or the search leads to a lever that does, that
+        jumps on the way or ends before the data do, it first grows; of two ends the one that
+        describes the data better counts.
 
         Raises
         ------
@@ -154,7 +155,7 @@ class Search:
         with suppress(ComputationError):
             if not _is_far(problem.residuals, optimiser.predictor.predict(problem.start)):
                 ends.append(optimiser.solve_and_confirm(problem.start, problem.options.robust))
-                if ends[0].describes_data and not _jumps(ends[0]):
+                if ends[0].describes_data and not _may_mislead(ends[0]):
                     return ends[0]
         before = optimiser.predictor.evaluations
         # by fewer portions a lever comes another way: worth it where the first ends at jumps
@@ -169,10 +170,17 @@ class Search:
                 if not ends:
                     raise
                 break
-            if not (ends[-1].describes_data and _jumps(ends[-1])):
+            if not (ends[-1].describes_data and _may_mislead(ends[-1])):
                 break
             before = ends[-1].predictor.evaluations
-        return min(ends, key=lambda end: (not end.describes_data, end.misfit))
+        return min(
+            ends,
+            key=lambda end: (
+                not end.describes_data,
+                bool(end.prediction.without_state.any()),
+                end.misfit,
+            ),
+        )
 
     def _as_stated(self, experiment: ExperimentAtRest) -> PredictionAtRest | None:
         """Return what is shown by the lever as stated, if it is one that an experiment solves."""
@@ -259,12 +267,15 @@ def _is_far(residuals: Residuals, at: Prediction) -> bool:
     return bool(np.nanmax(np.nanmedian(np.abs(share), axis=1)) > 0.06)
 
 
-def _jumps(end: Optimum) -> bool:
-    """Whether a lever jumps below the highest bias.
+def _may_mislead(end: Optimum) -> bool:
+    """Whether a lever jumps below the highest bias, or has no state at one.
 
     Rows beside a jump may be on either side of it, so that a search may end at jumps that the data
-    have not, where another lever describes them better without.
+    have not, where another lever describes them better without. A row that a lever has no state for
+    is far from it, and passes for an outlier.
     """
+    if end.prediction.without_state.any():
+        return True
     prediction, circuit = end.prediction, end.probe.circuit
     if not isinstance(prediction, PredictionAtRest) or not circuit.starts_cold:
         return False
