@@ -106,8 +106,7 @@ class Rows:
         by_state = spline_values(branch.u, by_parameter, u)
         of_circuit = np.stack([circuit.bias_by(name, outputs[1]) for name in names], axis=1)
         along = branch.curve(u, 1)
-        if self.measured is not None:
-            self._steepen(along, circuit, u)
+        self._steepen(along, circuit, u)
         slopes = at_fixed_bias(along, circuit, by_state, of_circuit)
         ends = np.flatnonzero(short > 1.0)
         if ends.size:
