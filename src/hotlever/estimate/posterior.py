@@ -45,7 +45,7 @@ class Posterior:
 
     def __init__(self, objective: Objective, at: Prediction) -> None:
         # a row at whose bias there is no state tells that the lever is colder, and not by how much
-        slopes = np.where(at.without_state, 0.0, at.slopes.transpose(2, 0, 1)).transpose(1, 2, 0)
+        slopes = np.where(at.without_state[:, None], 0.0, at.slopes)
         self.objective, self.at = objective, replace(at, slopes=slopes)
         self._point = objective.point(at.probe)
         self._rates = objective.coordinates.rates(self._point)
