@@ -30,11 +30,7 @@ from hotlever.estimate.next_measurement import LinearisedLever
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import (
-    FINER,
-    HIGHEST_V,
-    HOT,
-    NOISE,
-    RAMAN,
+    LaboratoryOptions,
     MinimosMaterial,
     draw,
 )
@@ -52,6 +48,7 @@ STEPS = (
     {"bias": 3, "spectra": 1},
     {"bias": 2, "spectra": 1},
 )
+OPTIONS = LaboratoryOptions()
 #: Of the steps so many keep the tip below the limit.
 LIMITED = 2
 
@@ -60,22 +57,23 @@ class Laboratory:
     """A lever, an instrument, and a thermometer that is off by the same share all along."""
 
     def __init__(self, true: Probe, random: np.random.Generator) -> None:
-        self.lever = Lever(true.with_material("material", MinimosMaterial), FINER)
+        self.lever = Lever(true.with_material("material", MinimosMaterial), OPTIONS.mesh)
         self.base_K, self._random = true.circuit.base_temperature_K, random
-        self._scale = 1.0 + RAMAN[1] * random.standard_normal()
+        self._alone, self._common = OPTIONS.raman_errors
+        self._scale = 1.0 + self._common * random.standard_normal()
 
     def measure(self, bias: Array, spectra: Array) -> Measurement:
         """Measure the current at biases (V), and with a spectrum where `spectra`, (n,), says so."""
         sweep, nothing = self.lever.sweep(bias), np.full(bias.size, np.nan)
         noisy, off = self._random.standard_normal((2, bias.size))
         rise = sweep.tip_K.values - self.base_K
-        tip = self.base_K + rise * self._scale * (1.0 + RAMAN[0] * off)
+        tip = self.base_K + rise * self._scale * (1.0 + self._alone * off)
         return Measurement(
             sweep.bias_V.values,
-            sweep.current_mA.values * (1.0 + NOISE * noisy),
+            sweep.current_mA.values * (1.0 + OPTIONS.noise * noisy),
             nothing,
             np.where(spectra, tip, np.nan),
-            np.where(spectra, np.hypot(*RAMAN) * rise, np.nan),
+            np.where(spectra, np.hypot(self._alone, self._common) * rise, np.nan),
         )
 
     def even(self, highest_V: float) -> Measurement:
@@ -86,7 +84,7 @@ class Laboratory:
         except BranchEndError as error:
             highest_V = 0.97 * error.bias_reached
             tip = self.lever.sweep(highest_V * share).tip_K.values
-        at = np.linspace(HOT, 0.98 * tip.max(), SPECTRA)
+        at = np.linspace(OPTIONS.hot_K, 0.98 * tip.max(), SPECTRA)
         chosen = np.searchsorted(tip, at).clip(0, EVEN - 1)
         return self.measure(highest_V * share, np.isin(np.arange(EVEN), chosen))
 
@@ -121,13 +119,17 @@ def judge(number: int, medium: str) -> dict[str, Any]:
         laboratory = Laboratory(true, random)
         branch = laboratory.lever.branch()
         aim = float(branch.bias(np.array([AT_K]), true.circuit)[0])
-        even = calibrate(laboratory.even(HIGHEST_V[medium]), probe=nominal)
+        even = calibrate(laboratory.even(OPTIONS.highest_V[medium]), probe=nominal)
         measured, calibration, highest = None, None, 0.0
         foretold, beyond, ratios, seconds = np.nan, 0, [], []
         for step, allowed in enumerate(STEPS):
             limited = step < LIMITED
             began = time.process_time()
-            how = {"probe": nominal, "noise": {"current": NOISE}} if calibration is None else {}
+            how = (
+                {"probe": nominal, "noise": {"current": OPTIONS.noise}}
+                if calibration is None
+                else {}
+            )
             plan = plan_next(
                 calibration,
                 at_K=AT_K,

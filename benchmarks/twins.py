@@ -63,10 +63,8 @@ from hotlever.probe.priors import default_priors, updated
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.studies.simulation_based_calibration import (
     DEPARTURES,
-    HIGHEST_V,
-    HOT,
     LEVELS,
-    NOISE,
+    LaboratoryOptions,
     concatenated,
     coverage_by_decile,
     judge,
@@ -78,13 +76,15 @@ from hotlever.studies.simulation_based_calibration import (
 from hotlever.types import Array
 from problems import drawn_reference, table
 
+LABORATORY = LaboratoryOptions()
+
 
 def judged(
     number: int, medium: str, what: str, departures: list[str], noise: float, laws: str
 ) -> xr.Dataset | str:
     """Judge the calibration of a lever; the reason in words if there is none of that number."""
     try:
-        return judge(number, medium, what, departures, noise, laws)
+        return judge(number, medium, what, departures, LaboratoryOptions(noise=noise), laws)
     except HotleverError as error:
         return str(error)
 
@@ -105,7 +105,9 @@ def report(results: list[xr.Dataset | str], title: str) -> None:
     ]
     table(("largest error above 400 K (K)", "median", "90 %", "worst"), rows)
     print(f"\npooled rms of error / stated: {total.rms:.2f}")
-    stated = np.sqrt((answers.stated_K.where(answers.tip_K > HOT) ** 2).mean("row").values)
+    stated = np.sqrt(
+        (answers.stated_K.where(answers.tip_K > LABORATORY.hot_K) ** 2).mean("row").values
+    )
     print(f"stated above 400 K (rms of a lever): median {np.nanmedian(stated):.1f} K")
     print(f"levers within 2 stated errors everywhere: {total.everywhere:.0%}")
     print_coverage(total.coverage.values)
@@ -184,7 +186,7 @@ def judge_heater(
     held = [name for name in Probe.reference().shape.dimensions() if name != "thickness_um"]
     drawn = values_from_priors(Probe.reference(), rng)
     lever = true.with_(**{name: drawn[name] for name in drawn if name not in held})
-    data, _, solved = measure(lever, rng, "iv", noise=noise)
+    data, _, solved = measure(lever, rng, "iv", laboratory=LaboratoryOptions(noise=noise))
     exact = {name: _EXACT for name in held if name in default_priors(nominal)}
     try:
         found = calibrate(data, probe=nominal, priors={"laws": laws, **exact, **prior})
@@ -192,7 +194,7 @@ def judge_heater(
         return {"refused": str(error)}
     tip = solved.sweep(found.table.bias_V.values).tip_K.values
     off = found.table.tip_K.values - tip
-    hot = tip > HOT
+    hot = tip > LABORATORY.hot_K
     (name,) = prior
     use = found.priors[name]
     heater = np.array([use.value, use.posterior_value, use.posterior_spread])
@@ -661,19 +663,23 @@ if __name__ == "__main__":
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("levers", nargs="?", type=int, default=200)
-    parser.add_argument("medium", nargs="?", choices=(*HIGHEST_V, "all"), default="vacuum")
+    parser.add_argument(
+        "medium", nargs="?", choices=(*LABORATORY.highest_V, "all"), default="vacuum"
+    )
     parser.add_argument("what", nargs="?", choices=("iv", "reader", "raman"), default="iv")
     listed = "\n".join(f"{name}: {meaning}" for name, meaning in DEPARTURES.items())
     listed = listed.replace("%", "%%")  # argparse formats its help
     parser.add_argument("--without", nargs="+", choices=DEPARTURES, default=[], help=listed)
-    parser.add_argument("--noise", type=float, default=NOISE, help="of meters, a share")
+    parser.add_argument("--noise", type=float, default=LABORATORY.noise, help="of meters, a share")
     parser.add_argument("--laws", choices=("uncertain", "paper"), default="uncertain")
     parser.add_argument("--obey", action="store_true", help="wild levers obey the paper's laws")
     parser.add_argument("--drawn", action="store_true", help="levers whose heaters are off")
     parser.add_argument("--wild", action="store_true", help="levers of which little is known")
     parser.add_argument("--count", type=int, default=200, help="of levers of which little is known")
     parser.add_argument("--first", type=int, default=0, help="number of the first of them")
-    parser.add_argument("--medium", dest="around", choices=[*HIGHEST_V], help="of all of them")
+    parser.add_argument(
+        "--medium", dest="around", choices=[*LABORATORY.highest_V], help="of all of them"
+    )
     parser.add_argument("--results", type=Path, metavar="FILE", help="one line for each of them")
     parser.add_argument("--write", type=Path, metavar="DIR", help="their data, not judged")
     given = parser.parse_args()
@@ -688,6 +694,8 @@ if __name__ == "__main__":
             wild(numbers, given.around, given.laws, given.obey, given.results)
         sys.exit()
     chosen = [name for name in DEPARTURES if name not in given.without]
-    everything = [(medium, what) for medium in HIGHEST_V for what in ("iv", "reader", "raman")]
+    everything = [
+        (medium, what) for medium in LABORATORY.highest_V for what in ("iv", "reader", "raman")
+    ]
     for medium, what in everything if given.medium == "all" else [(given.medium, given.what)]:
         main(given.levers, medium, what, chosen, given.noise, given.laws)

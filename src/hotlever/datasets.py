@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-#: Attribute of a written dataset, see `checksum`.
-CHECKSUM = "checksum"
-
 
 def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:
     """Return the columns of a file: the usual ones, and those that only some levers have.
@@ -167,7 +164,7 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str], columns: Seque
             # those whose address in the file is damaged
             numbers = [name for name in data.variables if data[name].dtype.kind in "if"]
             sums = {name: {"fletcher32": True} for name in numbers if data[name].ndim}
-            summed = data.assign_attrs({CHECKSUM: checksum(data)})
+            summed = data.assign_attrs(checksum=checksum(data))
             summed.to_netcdf(temporary, engine="netcdf4", encoding=sums)
     else:
         raise InputError(f"{path}: unknown file type '{suffix}', expected .csv or .nc")

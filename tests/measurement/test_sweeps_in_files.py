@@ -11,11 +11,12 @@ from test_lab_files import write
 from hotlever.errors import InputError
 from hotlever.estimate import fit, read_measurement
 from hotlever.measurement import parse_columns, with_measured_circuit
-from hotlever.measurement.measurement_file import NITROGEN
 from hotlever.measurement.rows import disagreements, sweeps_of
 from hotlever.probe import Circuit, Probe
 
 IV = "V_b (V),I_h (mA)\n"
+# κ of nitrogen over that of air
+NITROGEN = 0.975
 RAMP = np.linspace(0.0, 8.0, 17)
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from hotlever.probe import Probe
 from hotlever.spieser2017 import HOTTEST_TIP_K, NOMINAL_DOPING
-from hotlever.studies import parameter_consistency
 from hotlever.studies.parameter_consistency import (
     ERRORS,
     FREE,
@@ -17,15 +16,12 @@ from hotlever.studies.parameter_consistency import (
     published_levers,
     twin_measurement,
 )
-from hotlever.studies.simulation_based_calibration import DEPARTURES
+from hotlever.studies.simulation_based_calibration import DEPARTURES, LaboratoryOptions
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 
 
-@pytest.fixture
-def noiseless(monkeypatch):
-    monkeypatch.setattr(parameter_consistency, "NOISE", 0.0)
-    monkeypatch.setattr(parameter_consistency, "RAMAN", (0.0, 0.02))
+NOISELESS = LaboratoryOptions(noise=0.0, raman_errors=(0.0, 0.02))
 
 
 def test_errors_are_those_that_calibrations_are_judged_by():
@@ -33,12 +29,16 @@ def test_errors_are_those_that_calibrations_are_judged_by():
     assert set(ERRORS["all"]) == {name for names in ERRORS.values() for name in names}
 
 
-def test_without_noise_and_errors_twins_have_the_parameters_that_they_were_made_of(noiseless):
+def test_without_noise_and_errors_twins_have_the_parameters_that_they_were_made_of():
     progress = []
     probe = Probe.reference().with_(c_kappa=0.66, n_d=5e17)
     geometries = {"short": {"length_um": 45.0}, "other heater": {"heater_width_um": 2.0}}
     study = consistency_study(
-        probe, geometries, ("none",), progress=lambda done, total: progress.append((done, total))
+        probe,
+        geometries,
+        ("none",),
+        laboratory=NOISELESS,
+        progress=lambda done, total: progress.append((done, total)),
     )
     assert progress[-1] == (2, 2)
     free = study.value.sel(error="none", doping=FREE)
@@ -47,9 +47,11 @@ def test_without_noise_and_errors_twins_have_the_parameters_that_they_were_made_
     assert (largest_deviation(study).sel(doping=FREE) < 2e-3).all()
 
 
-def test_a_thermometer_that_is_off_reads_all_rises_off_alike(noiseless):
+def test_a_thermometer_that_is_off_reads_all_rises_off_alike():
     probe, rng = Probe.reference(), np.random.default_rng
-    right, wrong = (twin_measurement(probe, names, rng(0)) for names in ((), ("thermometer",)))
+    right, wrong = (
+        twin_measurement(probe, names, rng(0), NOISELESS) for names in ((), ("thermometer",))
+    )
     assert right.tip_K.max() == pytest.approx(HOTTEST_TIP_K, abs=0.5)
     ratio = (wrong.tip_K - 293.0) / (right.tip_K - 293.0)
     assert np.ptp(ratio) < 1e-9

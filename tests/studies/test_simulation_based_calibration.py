@@ -17,6 +17,7 @@ from hotlever.studies.simulation_based_calibration import (
     DEPARTURES,
     ESTIMATE,
     WAYS,
+    LaboratoryOptions,
     MinimosMaterial,
     MinimosSilicon,
     draw,
@@ -24,17 +25,14 @@ from hotlever.studies.simulation_based_calibration import (
     measure,
 )
 
-
-@pytest.fixture(autouse=True)
-def coarse_levers(monkeypatch):
-    """What is tested here does not depend on the mesh."""
-    monkeypatch.setattr(study, "FINER", COARSE)
+# what is tested here does not depend on the mesh
+LABORATORY = LaboratoryOptions(mesh=COARSE)
 
 
 @pytest.fixture
 def solved_once(monkeypatch):
     """A lever that is not solved for every number anew."""
-    points = study.LaboratoryOptions().points
+    points = LABORATORY.points
     sweep = Lever(Probe.reference(), COARSE).sweep(np.linspace(0.275, 11.0, points))
     monkeypatch.setattr(Lever, "sweep", lambda *_: sweep)
     return sweep
@@ -42,7 +40,7 @@ def solved_once(monkeypatch):
 
 def data_of(number, departures, what="iv", probe=None):
     rng = np.random.default_rng(number)
-    return measure(probe or Probe.reference(), rng, what, departures)[0]
+    return measure(probe or Probe.reference(), rng, what, departures, laboratory=LABORATORY)[0]
 
 
 def test_a_departure_that_is_left_out_changes_nothing_else():
@@ -75,7 +73,7 @@ def test_outliers_are_far_off_few_and_in_a_third_of_the_levers(solved_once):
     some = 0
     for number in range(300):
         with_, without = (data_of(number, more).current_mA for more in (["outliers"], []))
-        off = np.abs(with_ / without - 1.0) / study.NOISE
+        off = np.abs(with_ / without - 1.0) / LABORATORY.noise
         outliers = off[off > 1e-9]
         assert outliers.size <= 2
         assert np.all((outliers > 9.9) & (outliers < 50.1))
@@ -90,7 +88,7 @@ def test_drift_grows_over_the_ramp(solved_once):
     ]
     spread = np.std(off, axis=0)
     assert spread[0] == pytest.approx(0.0, abs=1e-12)
-    assert spread[-1] == pytest.approx(study.LaboratoryOptions().drift, rel=0.25)
+    assert spread[-1] == pytest.approx(LABORATORY.drift, rel=0.25)
 
 
 def test_another_mobility_changes_the_lever_and_nobody_else_s():
@@ -109,7 +107,7 @@ def test_another_mobility_changes_the_lever_and_nobody_else_s():
 def test_raman_temperatures_have_the_errors_that_they_state(solved_once):
     data, tip = data_of(0, [], "raman"), solved_once.tip_K.values
     measured = np.isfinite(data.tip_K)
-    assert measured.sum() == study.LaboratoryOptions().raman_points
+    assert measured.sum() == LABORATORY.raman_points
     assert np.all(np.abs(data.tip_K - tip)[measured] < 4 * data.tip_error_K[measured])
     assert tip[measured].min() > 390
 
@@ -121,9 +119,9 @@ def test_a_reader_is_measured_where_there_is_one():
 
 @pytest.mark.slow
 def test_a_lever_like_the_model_is_calibrated_within_the_stated_error():
-    judged = judge(0, departures=["mesh"])
+    judged = judge(0, departures=["mesh"], laboratory=LABORATORY)
     assert judged.refused == ""
-    hot = judged.tip_K.values > study.HOT
+    hot = judged.tip_K.values > LABORATORY.hot_K
     estimate = judged.off_K.sel(way=ESTIMATE).values
     assert np.array_equal(np.isfinite(estimate), hot)
     assert np.nanmax(np.abs(estimate / judged.stated_K.values)) < 3.0
@@ -137,7 +135,7 @@ def test_a_lever_without_an_answer_is_kept_with_the_reason(monkeypatch):
         raise study.HotleverError("no lever like this")
 
     monkeypatch.setattr(study, "calibrate", refuse)
-    judged = judge(0, departures=["mesh"])
+    judged = judge(0, departures=["mesh"], laboratory=LABORATORY)
     assert judged.refused == "no lever like this"
     assert judged.off_K.isnull().all()
 

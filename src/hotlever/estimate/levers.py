@@ -31,21 +31,6 @@ class Compared(NamedTuple):
     upper: float = np.inf
 
 
-#: What calibrated levers are compared by beside the tip temperature somewhere.
-OF_A_CALIBRATION = {
-    "knee_lever_V": Compared("knee V_l (V)", "V", "knee_lever_V{}", "lever voltage of the knee"),
-    "knee_current_mA": Compared("knee I_h (mA)", "mA", "knee_current_mA{}", "current of the knee"),
-    "knee_power_mW": Compared("knee P_l (mW)", "mW", "knee_power_mW{}", "power of the knee"),
-    "knee_tip_K": Compared("knee T_tip (K)", "K", "knee_tip_K{}", "tip temperature of the knee"),
-    "k": Compared("k", "1", "k{}", "k"),
-    "linear_K_per_mW": Compared("a (K/mW)", "K/mW", "linear_K_per_mW", "a"),
-    "nonlinear_K": Compared("b (K)", "K", "nonlinear_K", "b"),
-    "exponent": Compared("m", "1", "exponent", "m"),
-    "hot_K_per_mW": Compared("c (K/mW)", "K/mW", "hot_K_per_mW", "c"),
-    "threshold_mW": Compared("threshold (mW)", "mW", "threshold_mW", "threshold"),
-}
-
-
 class Setting(NamedTuple):
     """What levers are compared at: a column of their tables, and its value there."""
 
@@ -115,7 +100,25 @@ def _by_the_tip(
 ) -> xr.Dataset:
     """Compare calibrations at a setting; see `compare_levers`."""
     tip = Compared(f"T_tip at {at.text} (K)", "K", "tip{}_K", f"tip temperature at {at.text}")
-    named = {"tip_K": tip, **OF_A_CALIBRATION}
+    named = {
+        "tip_K": tip,
+        "knee_lever_V": Compared(
+            "knee V_l (V)", "V", "knee_lever_V{}", "lever voltage of the knee"
+        ),
+        "knee_current_mA": Compared(
+            "knee I_h (mA)", "mA", "knee_current_mA{}", "current of the knee"
+        ),
+        "knee_power_mW": Compared("knee P_l (mW)", "mW", "knee_power_mW{}", "power of the knee"),
+        "knee_tip_K": Compared(
+            "knee T_tip (K)", "K", "knee_tip_K{}", "tip temperature of the knee"
+        ),
+        "k": Compared("k", "1", "k{}", "k"),
+        "linear_K_per_mW": Compared("a (K/mW)", "K/mW", "linear_K_per_mW", "a"),
+        "nonlinear_K": Compared("b (K)", "K", "nonlinear_K", "b"),
+        "exponent": Compared("m", "1", "exponent", "m"),
+        "hot_K_per_mW": Compared("c (K/mW)", "K/mW", "hot_K_per_mW", "c"),
+        "threshold_mW": Compared("threshold (mW)", "mW", "threshold_mW", "threshold"),
+    }
     tips = {lever: _tip_at(each, at) for lever, each in calibrations.items()}
     quantities, coefficients = {}, list(PowerLaw.model_fields)
     for lever, each in calibrations.items():

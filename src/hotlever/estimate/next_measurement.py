@@ -490,8 +490,6 @@ Aim = Literal["tip", "knee"]
 KINDS = {"bias": (), "reader": ("reader",), "spectra": ("tip",), "dimensions": ()}
 #: With this probability the tip is no hotter than is said.
 SURE = 0.99
-#: What is said where levers were not found otherwise.
-FIRST_ORDER = "how hot the tip may get is known to first order alone; take small steps"
 
 
 @dataclass(frozen=True)
@@ -710,7 +708,7 @@ def plan_next(
     after = list(accumulate(each, Information.with_rows, initial=lever.information))
     stays, notes = _errors_that_stay(lever, calibration, np.append(bias, aim_V))
     if lever.likely.first_order:
-        notes.append(FIRST_ORDER)
+        notes.append("how hot the tip may get is known to first order alone; take small steps")
     of_aim = np.array([information.stderr(gradient) for information in after])
     stderr = np.hypot(of_aim, stays[-1])
     proposed = [candidates[number] for number in chosen]

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.datasets import (
-    CHECKSUM,
     checksum,
     in_a_file,
     labelled,
@@ -205,7 +204,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
         with xr.open_dataset(path, engine="netcdf4") as data:
             loaded = data.load()
         # files of 1.0 have none
-        damaged = loaded.attrs.pop(CHECKSUM, None) not in (None, checksum(loaded))
+        damaged = loaded.attrs.pop("checksum", None) not in (None, checksum(loaded))
     except Exception as error:
         # a damaged file raises what its libraries think of
         raise InputError(f"{path}: not a NetCDF file, or a damaged one") from error

@@ -24,13 +24,21 @@ from hotlever.probe.circuit import Circuit
 from hotlever.quantities import OBSERVABLES
 from hotlever.types import Array
 
-# What a lever shows by itself, by the names of `hotlever.quantities`, (n,) each: V_b, V_l, I_h, V_r
-# and T_tip; or how that changes with parameters, (n, p).
-Shown = Mapping[str, Array]
 
+def _bridge_voltage(
+    circuit: Circuit, shown: Mapping[str, Array], names: Sequence[str] = ()
+) -> Evaluated:
+    """Return V_bridge (V), NaN without a bridge; see `FOLLOWING`.
 
-def _bridge_voltage(circuit: Circuit, shown: Shown, names: Sequence[str] = ()) -> Evaluated:
-    """Return V_bridge (V), NaN without a bridge; see `FOLLOWING`."""
+    Parameters
+    ----------
+    circuit : Circuit
+    shown : mapping of str to ndarray, shape (n,)
+        What a lever shows by itself, by the names of `hotlever.quantities`: V_b, V_l, I_h, V_r
+        and T_tip; or how that changes with parameters, (n, p).
+    names : sequence of str, optional
+        Of the parameters that it is derived by, the bridge's count.
+    """
     bias_V = shown["bias_V"]
     own = (name for name in names if name.startswith("bridge_"))
     by = {name: circuit.bridge_by(name, bias_V) for name in own}
@@ -79,7 +87,7 @@ def observed(circuit: Circuit, outputs: Array) -> Array:
     )
 
 
-def with_following(probe: Probe, columns: Shown) -> dict[str, Array]:
+def with_following(probe: Probe, columns: Mapping[str, Array]) -> dict[str, Array]:
     """Return columns of a sweep or a history with the observables of a probe that follow."""
     following = {
         OBSERVABLES[name].name: follow(probe.circuit, columns)[0]

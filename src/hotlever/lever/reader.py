@@ -28,12 +28,6 @@ if TYPE_CHECKING:
 
     from hotlever.lever.branch import Branch
 
-#: Columns of a file.
-READER_COLUMNS = (
-    *("surface_gap_um", "bias_V", "reader_ohm", "reader_V", "dV_dz_V_per_um", "dlnR_dz_per_um"),
-    *("noise_V_per_rtHz", "resolution_nm_per_rtHz"),
-)
-
 
 class Signal(NamedTuple):
     """What a reader shows at a distance and a bias, named as in `hotlever.quantities`."""
@@ -154,7 +148,7 @@ def over_surface(
     -------
     xarray.Dataset
         On the dimensions ``distance`` and ``bias``, and ``pressure`` if there are any, one variable
-        for each of `READER_COLUMNS` and a few more, NaN where a bias is not reached;
+        for each column of `rows_of` and a few more, NaN where a bias is not reached;
         ``source_V_per_rtHz`` by source of the noise as well.
 
     Raises
@@ -293,7 +287,11 @@ def rows_of(data: xr.Dataset) -> xr.Dataset:
     """Return the columns of a file of what `over_surface` gives, a row for each point."""
     import xarray as xr
 
-    columns = [*READER_COLUMNS, *(["pressure_mbar"] if "pressure" in data.sizes else [])]
+    columns = [
+        *("surface_gap_um", "bias_V", "reader_ohm", "reader_V", "dV_dz_V_per_um", "dlnR_dz_per_um"),
+        *("noise_V_per_rtHz", "resolution_nm_per_rtHz"),
+        *(["pressure_mbar"] if "pressure" in data.sizes else []),
+    ]
     order = [name for name in ("pressure", "distance", "bias") if name in data.sizes]
     (full,) = xr.broadcast(data[columns])
     rows = full.stack(row=order)

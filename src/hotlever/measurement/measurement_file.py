@@ -78,9 +78,6 @@ _OTHER_GASES = {
     *("helium", "he", "argon", "ar", "hydrogen", "h2", "oxygen", "o2", "co2", "neon", "ne"),
     *("krypton", "kr", "xenon", "xe", "sf6", "methane", "ch4", "steam", "water", "oil"),
 }
-#: κ of nitrogen over that of air, within 1.3 % from 300 to 1200 K: the dilute gases of Lemmon and
-#: Jacobsen, Int. J. Thermophys. 25, 21 (2004).
-NITROGEN = 0.975
 #: mbar; a gas below it, of free molecules, takes less than 0.2 % of a lever's power.
 VACUUM_MBAR = 0.05
 #: Characters of a setting that are looked at.
@@ -188,7 +185,9 @@ class Contents:
                 )
         if self.settings.get("medium") == "nitrogen":
             self.settings["medium"] = "air"
-            self.put("gas_conductivity", NITROGEN, f"{self.origin['medium']}, nitrogen")
+            # within 1.3 % from 300 to 1200 K: the dilute gases of Lemmon and Jacobsen, Int. J.
+            # Thermophys. 25, 21 (2004)
+            self.put("gas_conductivity", 0.975, f"{self.origin['medium']}, nitrogen")
 
     def take_columns(self, columns: dict[str, Column]) -> None:
         """Read the columns of some quantities.

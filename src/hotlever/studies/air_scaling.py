@@ -30,8 +30,6 @@ from hotlever.types import Array, Progress
 
 #: Tip temperatures (K) at which k is compared.
 COLD, HOT = 330.0, 1006.0
-#: Gaps (µm) between a lever and a surface below it, the last of which is none.
-GAPS_UM = (0.5, 1.0, 2.0, 5.0, 10.0, 50.0, np.inf)
 
 
 def find_scale_factor(vacuum: Branch, air: Branch, hottest_K: float = HOT) -> xr.Dataset:
@@ -93,7 +91,7 @@ def surroundings_study(probe: Probe) -> xr.Dataset:
 
 
 def one_sided_study(
-    probe: Probe, gaps_um: Sequence[float] = GAPS_UM, progress: Progress | None = None
+    probe: Probe, gaps_um: Sequence[float], progress: Progress | None = None
 ) -> xr.Dataset:
     """Return k with a cold surface below a lever, by the gap between them.
 

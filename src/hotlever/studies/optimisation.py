@@ -270,8 +270,6 @@ def reads_distance(probe: Probe) -> bool:
 
 # --- the search ---------------------------------------------------------------------------------
 
-#: Designs that are tried at most.
-MOST_DESIGNS = 30
 #: How near a bound is met: over its range, or over the bound of a quantity.
 _AT_BOUND = 1e-3
 
@@ -324,6 +322,7 @@ def optimise(
     bounds: Mapping[str, Bounds],
     *,
     greatest: bool = False,
+    most_designs: int = 30,
     progress: Progress | None = None,
 ) -> OptimalDesign:
     """Find the design within bounds whose quantity is least, or greatest.
@@ -339,6 +338,8 @@ def optimise(
         From and to, of numbers of the design, see `hotlever.probe.probe_parameters`, of which there
         must be one, and of quantities, where either may be None.
     greatest : bool
+    most_designs : int
+        Tried at most.
     progress : callable, optional
         Called with the designs tried and how many there may be.
 
@@ -358,7 +359,7 @@ def optimise(
 
     probe.circuit.need_cold_start("a study of a design")
     _check(probe, quantity, bounds)
-    search = _Search(probe, quantity, point, bounds, greatest, progress)
+    search = _Search(probe, quantity, point, bounds, greatest, most_designs, progress)
     search.solved(search.start)  # whatever is wrong with the first design is an error
     reason = ""
     try:
@@ -369,11 +370,11 @@ def optimise(
             method="SLSQP",
             bounds=[(0.0, 1.0)] * len(search.names),
             constraints=search.constraints,
-            options={"ftol": search.accuracy, "maxiter": MOST_DESIGNS},
+            options={"ftol": search.accuracy, "maxiter": most_designs},
         )
         reason = "" if result.success else result.message[:1].lower() + result.message[1:]
     except _EnoughDesigns:
-        reason = f"{MOST_DESIGNS} designs were tried without coming to rest"
+        reason = f"{most_designs} designs were tried without coming to rest"
     if search.best is None:
         raise InputError(
             f"no design was found within {_bounds_text(search.limited)}; expected wider bounds, "
@@ -438,8 +439,10 @@ class _Search:
         point: WorkingPoint,
         bounds: Mapping[str, Bounds],
         greatest: bool,
+        most_designs: int,
         progress: Progress | None,
     ) -> None:
+        self._most_designs = most_designs
         self._probe, self._point, self._progress = probe, point, progress
         self._quantity, self._sign = quantity, -1.0 if greatest else 1.0
         self.names = tuple(name for name in bounds if name not in QUANTITIES)
@@ -521,11 +524,11 @@ class _Search:
 
     def solved(self, share: Array) -> SolvedDesign:
         """Return a design solved, on the last mesh moved if that can follow."""
-        if self.designs == MOST_DESIGNS:
+        if self.designs == self._most_designs:
             raise _EnoughDesigns
         self.designs += 1
         if self._progress is not None:
-            self._progress(self.designs, MOST_DESIGNS)
+            self._progress(self.designs, self._most_designs)
         probe = self.probe_at(share)
         if self._reads_distance:
             self._similar = SimilarLevers(Lever(probe, COARSE))

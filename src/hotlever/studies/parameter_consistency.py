@@ -26,8 +26,7 @@ from hotlever.probe import Probe
 from hotlever.spieser2017 import HOTTEST_TIP_K, NOMINAL_DOPING, PUBLISHED_VALUES, RAMP
 from hotlever.steps import each
 from hotlever.studies.simulation_based_calibration import (
-    NOISE,
-    RAMAN,
+    LaboratoryOptions,
     MinimosMaterial,
     some_tip,
     values_from_priors,
@@ -61,6 +60,7 @@ def consistency_study(
     geometries: Mapping[str, Mapping[str, float]] = GEOMETRIES,
     errors: Sequence[str] = tuple(ERRORS),
     *,
+    laboratory: LaboratoryOptions | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Fit twins of a probe, each by itself, with errors of the model and without.
@@ -73,6 +73,8 @@ def consistency_study(
         Dimensions of each twin that differ from the probe's.
     errors : sequence of str
         Of `ERRORS`.
+    laboratory : LaboratoryOptions, optional
+        How twins are measured.
     progress : callable, optional
         Called with the fits done and their number.
 
@@ -93,7 +95,8 @@ def consistency_study(
     for error, number in each(cases, progress):
         nominal = probe.with_(**list(geometries.values())[number])
         lever = SimilarLevers(Lever(nominal, COARSE))
-        data = twin_measurement(nominal, ERRORS[errors[error]], np.random.default_rng(number))
+        random = np.random.default_rng(number)
+        data = twin_measurement(nominal, ERRORS[errors[error]], random, laboratory)
         for way, choice in enumerate(ways.values()):
             fitted = fit(data, nominal, model=partial(_experiment, lever), **choice).probe.material
             values[error, way, number] = [getattr(fitted, name) for name in PARAMETERS]
@@ -117,7 +120,10 @@ def _experiment(lever: SimilarLevers, _: Probe, bias: Array) -> ExperimentAtRest
 
 
 def twin_measurement(
-    nominal: Probe, departures: Sequence[str], rng: np.random.Generator
+    nominal: Probe,
+    departures: Sequence[str],
+    rng: np.random.Generator,
+    laboratory: LaboratoryOptions | None = None,
 ) -> Measurement:
     """Return what is measured of a lever that departs from its nominal one.
 
@@ -138,12 +144,13 @@ def twin_measurement(
     def noisy(values: Array, share: float) -> Array:
         return np.asarray(values * (1.0 + share * rng.standard_normal(len(RAMP))))
 
-    (alone, common), base = RAMAN, true.circuit.base_temperature_K
+    laboratory, base = laboratory or LaboratoryOptions(), true.circuit.base_temperature_K
+    alone, common = laboratory.raman_errors
     scale = 1.0 + common * rng.standard_normal() * ("thermometer" in departures)
     return Measurement(
         sweep.bias.values,
-        noisy(sweep.current_mA.values, NOISE),
-        noisy(sweep.reader_V.values, NOISE),
+        noisy(sweep.current_mA.values, laboratory.noise),
+        noisy(sweep.reader_V.values, laboratory.noise),
         base + scale * noisy(sweep.tip_K.values - base, alone),
         np.full(len(RAMP), np.nan),
     )

@@ -12,9 +12,9 @@ band's level of confidence (Talts et al., arXiv:1804.06788).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import ClassVar
 
@@ -57,13 +57,6 @@ DEPARTURES = {
 #: Ways of calibrating; all but the estimate need the knee.
 ESTIMATE = "estimate with priors"
 WAYS = (ESTIMATE, "model of the drawing at k", "Eq. 12 at k", "knee at T_i")
-#: Noise of instruments, as a share, and errors of Raman temperatures, as shares of the rise: of
-#: each, and common to all.
-NOISE, RAMAN = 2e-3, (0.01, 0.02)
-HIGHEST_V = {"vacuum": 11.0, "air": 13.0}
-#: Tip temperature (K) above which errors count.
-HOT = 400.0
-FINER = MeshOptions(refinement=1.3)
 #: Levels of confidence, and their limits in standard deviations.
 LEVELS = {0.68: 0.994, 0.95: BAND}
 
@@ -84,6 +77,16 @@ class LaboratoryOptions:
         How far these are off, from and to, in standard deviations.
     raman_points : int
         Raman temperatures.
+    noise : float
+        Of meters, as a share of what they show.
+    raman_errors : tuple of float
+        Of Raman temperatures, as shares of the rise: of each, and common to all.
+    highest_V : mapping of str to float
+        Where ramps end, by medium.
+    hot_K : float
+        Tip temperature above which errors count, and Raman temperatures are taken.
+    mesh : MeshOptions
+        Of levers that have elements other than those of the model.
     """
 
     points: int = 40
@@ -91,6 +94,11 @@ class LaboratoryOptions:
     outlier_share: float = 1 / 3
     outlier: tuple[float, float] = (10.0, 50.0)
     raman_points: int = 5
+    noise: float = 2e-3
+    raman_errors: tuple[float, float] = (0.01, 0.02)
+    highest_V: Mapping[str, float] = field(default_factory=lambda: {"vacuum": 11.0, "air": 13.0})
+    hot_K: float = 400.0
+    mesh: MeshOptions = field(default_factory=lambda: MeshOptions(refinement=1.3))
 
 
 class MinimosSilicon(NSilicon):
@@ -150,7 +158,6 @@ def measure(
     what: str,
     departures: Collection[str] = DEPARTURES,
     highest: float | None = None,
-    noise: float = NOISE,
     laboratory: LaboratoryOptions | None = None,
 ) -> tuple[Measurement, Array, Lever]:
     """Measure a lever up to a bias (V), or as far as it goes; return its true temperatures (K) too.
@@ -164,13 +171,13 @@ def measure(
         If a state of the lever was not found.
     """
     laboratory = laboratory or LaboratoryOptions()
-    points = laboratory.points
+    points, noise = laboratory.points, laboratory.noise
     if "mobility" in departures:
         true = true.with_material("material", MinimosMaterial)
-    lever = Lever(true, FINER if "mesh" in departures else None)
+    lever = Lever(true, laboratory.mesh if "mesh" in departures else None)
     even = np.linspace(1.0 / points, 1.0, points)
     try:
-        sweep = lever.sweep((highest or HIGHEST_V[true.surroundings.medium]) * even)
+        sweep = lever.sweep((highest or laboratory.highest_V[true.surroundings.medium]) * even)
     except BranchEndError as error:
         sweep = lever.sweep(0.97 * error.bias_reached * even)
     tip, drifting = sweep.tip_K.values, laboratory.drift * ("drift" in departures)
@@ -183,9 +190,9 @@ def measure(
     reader = noisy(sweep.reader_V.values) if what == "reader" else nothing
     tips, errors = nothing.copy(), nothing.copy()
     if what == "raman":
-        at = np.linspace(HOT, 0.98 * tip.max(), laboratory.raman_points)
+        at = np.linspace(laboratory.hot_K, 0.98 * tip.max(), laboratory.raman_points)
         some = np.searchsorted(tip, at).clip(0, points - 1)
-        (alone, common), base = RAMAN, true.circuit.base_temperature_K
+        (alone, common), base = laboratory.raman_errors, true.circuit.base_temperature_K
         scale = 1.0 + common * rng.standard_normal() * ("thermometer" in departures)
         rise = (tip - base)[some] * scale * (1.0 + alone * rng.standard_normal(some.size))
         tips[some], errors[some] = base + rise, alone * (tip[some] - base)
@@ -195,7 +202,7 @@ def measure(
         sizes = rng.uniform(*laboratory.outlier, outliers.size)
         off = rng.choice((-1.0, 1.0), outliers.size) * sizes
         current[outliers] *= 1.0 + noise * off
-    stated = RAMAN[1] if what == "raman" else None
+    stated = laboratory.raman_errors[1] if what == "raman" else None
     data = Measurement(sweep.bias.values, current, reader, tips, errors, raman_scale=stated)
     return data, tip, lever
 
@@ -229,7 +236,7 @@ def judge(
     medium: str = "vacuum",
     what: str = "iv",
     departures: Collection[str] = DEPARTURES,
-    noise: float = NOISE,
+    laboratory: LaboratoryOptions | None = None,
     laws: str = "uncertain",
     rows: int = 101,
 ) -> xr.Dataset:
@@ -253,9 +260,9 @@ def judge(
     ComputationError
         If the lever could not be solved.
     """
-    rng = np.random.default_rng(number)
+    rng, laboratory = np.random.default_rng(number), laboratory or LaboratoryOptions()
     true, nominal = draw(rng, number, medium, departures)
-    data, _, lever = measure(true, rng, what, departures, noise=noise)
+    data, _, lever = measure(true, rng, what, departures, laboratory=laboratory)
     off, refused, doubted = np.full((len(WAYS), rows), np.nan), "", ""
     tip, stated = off[0], off[0]
     began = time.process_time()
@@ -276,7 +283,7 @@ def judge(
             ways = paper_ways(data, nominal)
             off[1:] = [tip_at(table.power_mW.values) - tip for tip_at in ways]
     columns = {
-        "off_K": (("way", "row"), np.where(tip > HOT, off, np.nan)),
+        "off_K": (("way", "row"), np.where(tip > laboratory.hot_K, off, np.nan)),
         "tip_K": ("row", tip),
         "stated_K": ("row", stated),
         "seconds": seconds,

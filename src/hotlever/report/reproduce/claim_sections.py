@@ -33,7 +33,7 @@ from hotlever.studies.parameter_consistency import (
     published_levers,
 )
 from hotlever.studies.radiation import radiated_heat, sheet_emissivities
-from hotlever.studies.simulation_based_calibration import NOISE, RAMAN
+from hotlever.studies.simulation_based_calibration import LaboratoryOptions
 from hotlever.studies.thermoelectric_shift import of_p_silicon, self_heated, shift_by_heat
 
 
@@ -77,12 +77,13 @@ def consistency_section(page: Findings) -> None:
     geometries = dict(list(GEOMETRIES.items())[: page.extent.geometries])
     # how near to their mean the paper's levers are said to be
     claimed = 0.1
-    study = consistency_study(probe, geometries, errors)
+    study, laboratory = consistency_study(probe, geometries, errors), LaboratoryOptions()
     published = published_levers()
-    numbers: Any = {"count": len(geometries), "common": RAMAN[1]}
+    alone, common = laboratory.raman_errors
+    numbers: Any = {"count": len(geometries), "common": common}
     numbers["dimensions"] = default_priors(probe)["thickness_um"].spread
     doping = probe.material.n_d
-    page.say("consistency", noise=NOISE, thermometer=RAMAN[0], doping=doping, **numbers)
+    page.say("consistency", noise=laboratory.noise, thermometer=alone, doping=doping, **numbers)
     figure = figures.parameter_deviations(study, published, claimed)
     page.draw("parameter_deviations", figure, claimed=claimed)
     ours, theirs = largest_deviation(study), largest_deviation(published)

@@ -15,7 +15,6 @@ from hotlever import spieser2017 as paper
 from hotlever.estimate import Estimate, Measurement, fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.report.report_page import Page, filled, texts
-from hotlever.studies.air_scaling import GAPS_UM
 from hotlever.studies.parameter_consistency import ERRORS, GEOMETRIES
 from hotlever.studies.published_lever.ensemble import CRITERIA, verdict_on
 
@@ -36,7 +35,7 @@ class Extent:
     errors : tuple of str
         Errors of the model that these have.
     gaps_um : tuple of float
-        Distances of a surface (µm).
+        Distances of a surface (µm), the last of which is none.
     levers : int
         Levers never seen; each is made with either law of the mobility.
     """
@@ -44,7 +43,7 @@ class Extent:
     every: int = 1
     geometries: int = len(GEOMETRIES)
     errors: tuple[str, ...] = tuple(ERRORS)
-    gaps_um: tuple[float, ...] = GAPS_UM
+    gaps_um: tuple[float, ...] = (0.5, 1.0, 2.0, 5.0, 10.0, 50.0, np.inf)
     levers: int = 12
 
     @classmethod
