@@ -156,6 +156,18 @@ def test_no_right_lever_is_taken_for_another(curve, long_u_shape):
     assert Diagnosis(altered_measurement(curve), Probe.reference()).of_another_lever() == ""
 
 
+def test_a_lever_of_which_both_polarities_were_measured_is_no_other_one(curve):
+    """Half of the rows have negative biases: all of them had counted as without a current."""
+    sign = np.where(np.arange(curve.bias_V.size) % 2, 1.0, -1.0)
+    both = altered_measurement(
+        curve, bias_V=sign * curve.bias_V, current_mA=sign * curve.current_mA
+    )
+    thermoelectric = Probe.reference().with_physics(("thermoelectric",))
+    assert Diagnosis(both, thermoelectric).of_another_lever() == ""
+    with pytest.raises(InputError, match="expected 0 or more: a lever shows the same"):
+        calibrate(both, probe=Probe.reference())
+
+
 @pytest.mark.slow
 def test_a_lever_of_which_little_is_known_is_looked_for_from_its_cold_rows():
     """Three times less doping than stated: all rows at once led away, and it was refused."""

@@ -102,6 +102,15 @@ def test_power_and_temperature_are_inverse(reference):
     np.testing.assert_allclose(reference.by_power.slope(power), by_difference, rtol=1e-5)
 
 
+def test_of_both_polarities_the_power_is_that_of_positive_biases():
+    """Power rises on either side of the cold lever: read together they were no function."""
+    lever = Lever(Probe.reference().with_physics(("thermoelectric",)), COARSE)
+    both, one = lever.branch_to(8.0, lowest=-8.0), lever.branch_to(8.0)
+    assert both.u[0] < 0.0
+    power = np.linspace(0.0, 2.2, 12)
+    np.testing.assert_allclose(both.tip_temperature(power), one.tip_temperature(power), rtol=1e-6)
+
+
 def test_the_bias_of_a_temperature_heats_to_it(lever, reference):
     tip = np.array([350.0, 600.0, 1100.0])
     sweep = lever.sweep(reference.bias(tip, lever.circuit))

@@ -240,7 +240,8 @@ def _of_units() -> list[Hypothesis]:
 
 
 def _of_the_meter(rows: MeasuredRows) -> list[Hypothesis]:
-    largest, along = float(rows.current_mA.max()), np.linspace(0.0, 1.0, rows.bias_V.size)
+    largest = float(np.abs(rows.current_mA).max())
+    along = np.linspace(0.0, 1.0, rows.bias_V.size)
 
     def raised(pattern: Array | float, rows: MeasuredRows, share: float) -> MeasuredRows:
         return replace(rows, current_mA=rows.current_mA - share * largest * pattern)
@@ -265,7 +266,7 @@ def _of_the_meter(rows: MeasuredRows) -> list[Hypothesis]:
 
 def _of_the_resistor(rows: MeasuredRows) -> Hypothesis:
     stated = rows.series_kohm
-    measured = float(np.median(rows.bias_V / np.maximum(np.abs(rows.current_mA), 1e-12)))
+    measured = float(np.median(np.abs(rows.bias_V) / np.maximum(np.abs(rows.current_mA), 1e-12)))
 
     def other(rows: MeasuredRows, kohm: float) -> MeasuredRows:
         return replace(rows, series_kohm=max(kohm, 0.0))
@@ -423,11 +424,13 @@ class _Curve:
     def current(self, away: Array, rows: MeasuredRows) -> Array:
         """Return I_h (mA) at the biases, for logarithms of parameters over the probe's.
 
-        Beyond its end the branch stays level: no lever takes such a bias.
+        Beyond its end the branch stays level: no lever takes such a bias. Both polarities are taken
+        to show the same.
         """
         lever, current = np.exp(self.logarithms + self.powers @ (away - self.at)).T
         bias = np.maximum.accumulate(lever + rows.series_kohm * current)
-        return np.interp(rows.bias_V, np.append(0.0, bias), np.append(0.0, current))
+        size = np.interp(np.abs(rows.bias_V), np.append(0.0, bias), np.append(0.0, current))
+        return np.asarray(np.copysign(size, rows.bias_V))
 
 
 def _with_powers(probe: Probe, priors: Mapping[str, Prior]) -> tuple[str, ...]:
@@ -575,7 +578,8 @@ class Diagnosis:
 
         All rows at once lead away from a lever of which little is known; cold ones tell its doping.
         """
-        cold = self._rows.bias_V <= np.median(self._rows.bias_V)
+        size = np.abs(self._rows.bias_V)
+        cold = size <= np.median(size)
         colder = Hypothesis(lambda _: "", lambda rows, _: replace(rows, included=cold))
         of_cold_rows = self._again(self._estimated(colder, 0.0, self._curve))
         nothing = self._as_stated.hypothesis

@@ -476,7 +476,7 @@ class Branch:
 
 
 class ByPower:
-    """A branch of a lever that starts cold, read by its power.
+    """A branch of a lever that starts cold, read by its power at biases of 0 and more.
 
     On most levers the power rises with the tip temperature to the end. Where the heat moves towards
     the tip faster than the tip gets hotter, the power turns: the tip gets hotter with less of it,
@@ -538,14 +538,15 @@ class ByPower:
     def _by_root(self) -> Piecewise:
         """u by the root of the power, which is nearly a straight line."""
         branch = self._branch
-        values, slopes = branch.values, branch.value_slopes
+        here = branch.u >= 0.0
+        u, values, slopes = branch.u[here], branch.values[here], branch.value_slopes[here]
         power = values[:, 0] * values[:, 1]
         slope = slopes[:, 0] * values[:, 1] + values[:, 0] * slopes[:, 1]
         root = np.sqrt(power)
         # at zero power both begin as u
         by_u = np.append(np.sqrt(slopes[0, 0] * slopes[0, 1]), slope[1:] / (2.0 * root[1:]))
-        bent = root[np.isin(branch.u, branch.steps)]
-        return smooth_curve(root, branch.u, 1.0 / by_u, bent)
+        bent = root[np.isin(u, branch.steps)]
+        return smooth_curve(root, u, 1.0 / by_u, bent)
 
 
 @dataclass(frozen=True)

@@ -811,9 +811,18 @@ def given_measurement(
     Raises
     ------
     InputError
-        If it is neither, or the file is at fault.
+        If it is neither, its biases are negative where both polarities are one, or the file is at
+        fault.
     """
     if isinstance(measurement, Measurement):
+        at_rest = measurement.time_us is None
+        lowest = float(np.nanmin(measurement.bias_V, initial=0.0))
+        if at_rest and lowest < probe.lowest_bias_V:
+            raise InputError(
+                f"{measurement.path or 'measurement'}: found a bias of {lowest:g} V, expected 0 or "
+                "more: a lever shows the same with either polarity, unless thermoelectricity or a "
+                "held supply counts; turn the signs of its bias, current and voltages"
+            )
         return without_rows_at_compliance(measurement, probe.circuit)
     if isinstance(measurement, str | os.PathLike):
         return read_measurement_of(probe, measurement)
