@@ -35,24 +35,32 @@ pytestmark = pytest.mark.usefixtures("coarse_meshes")
 
 
 @pytest.fixture(scope="module")
-def calibrated(reference):
-    """The reference lever, measured with noise and calibrated as if unknown."""
-    curve = measured_curve(reference, np.random.default_rng(0))
-    return calibrate(measurement_of(curve))
+def noted(reference):
+    """The reference lever, measured with noise and calibrated as if unknown.
 
-
-def test_the_lever_as_stated_is_solved_once_from_the_cold(reference, monkeypatch):
-    """It is compared with the data, and the search begins with it."""
+    And the levers that were solved from the cold for it.
+    """
     from_the_cold, linearised = [], SimilarLevers.linearised
 
-    def noted(levers, probe, reach, near=None, names=None):
+    def noting(levers, probe, reach, near=None, names=None):
         if near is None:
             from_the_cold.append(probe)
         return linearised(levers, probe, reach, near, names)
 
-    monkeypatch.setattr(SimilarLevers, "linearised", noted)
-    calibrate(measurement_of(measured_curve(reference, np.random.default_rng(0))))
-    assert len(from_the_cold) == 1
+    curve = measured_curve(reference, np.random.default_rng(0))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SimilarLevers, "linearised", noting)
+        return calibrate(measurement_of(curve)), from_the_cold
+
+
+@pytest.fixture(scope="module")
+def calibrated(noted):
+    return noted[0]
+
+
+def test_the_lever_as_stated_is_solved_once_from_the_cold(noted):
+    """It is compared with the data, and the search begins with it."""
+    assert len(noted[1]) == 1
 
 
 def test_the_table_gives_the_true_temperature(calibrated, reference):

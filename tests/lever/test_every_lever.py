@@ -22,7 +22,6 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.monitors import MonitorMap
 from hotlever.lever.observables import Linearised, by_parameter
 from hotlever.lever.reduced.lever import ReducedLever
-from hotlever.lever.reduced.training import cached_reduction
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.space import LEVER, TIP
 from hotlever.lever3d import SolidLever
@@ -86,9 +85,7 @@ KINDS: dict[str, Callable[[pytest.FixtureRequest], One]] = {
     "reduced": lambda request: One(request.getfixturevalue("reduced"), 9.5),
     "reduced, in air": lambda request: One(request.getfixturevalue("reduced_in_air"), 9.5),
     "no reader": lambda _: One(Lever(Probe.u_shape(), COARSE), 9.5),
-    "no reader, reduced": lambda _: One(cached_reduction(Lever(Probe.u_shape(), COARSE)), 9.5),
     "solid": lambda _: One(SolidLever(Probe.reference(), SOLID), 4.0),
-    "all effects": lambda _: One(Lever(ALL, COARSE), 9.5),
     "all effects, in air": lambda _: One(Lever(ALL.in_medium("air"), COARSE), 9.5),
     "boron-doped, all effects": lambda _: One(
         Lever(p_type_probe().with_physics(Physics.model_fields), COARSE), 9.5
@@ -97,8 +94,6 @@ KINDS: dict[str, Callable[[pytest.FixtureRequest], One]] = {
     "metal film, all effects": lambda _: One(
         Lever(metal_film_probe().with_physics(Physics.model_fields), COARSE), 4.0
     ),
-    "boron-doped": lambda _: One(Lever(p_type_probe(), COARSE), 9.5),
-    "metal film": lambda _: One(Lever(metal_film_probe(), COARSE), 4.0),
     "metal film, in air": lambda _: One(Lever(metal_film_probe().in_medium("air"), COARSE), 4.0),
 }
 

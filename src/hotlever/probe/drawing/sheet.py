@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
@@ -182,10 +183,15 @@ def read_sheet(
     return sheet
 
 
+# an import reads a drawing for what it proposes, for the probe, and for what it says of it
+@lru_cache(maxsize=2)
 def _read_apart(
     content: bytes, path: str, cell: str | None, unit_um: float | None, tolerance_um: float
 ) -> dict[str, Any]:
-    """Read a file in a process of its own, see `hotlever.probe.drawing.drawing_formats`."""
+    """Read a file in a process of its own, see `hotlever.probe.drawing.drawing_formats`.
+
+    What is returned is kept for the next who reads the same content, and so not to be changed.
+    """
     options = {
         "cell": cell,
         "unit_um": unit_um,
