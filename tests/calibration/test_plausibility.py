@@ -69,9 +69,17 @@ def test_equal_rows_are_no_curve(curve):
 @pytest.mark.parametrize(
     ("bias", "current", "probe", "message"),
     [
-        (lambda v, i: v, lambda v, i: 1e3 * i, {}, r"kΩ at low bias, expected about 6\.9.*large"),
+        pytest.param(
+            *(lambda v, i: v, lambda v, i: 1e3 * i),
+            *({}, r"kΩ at low bias, expected about 6\.9.*large"),
+            marks=pytest.mark.slow,
+        ),
         (lambda v, i: v, lambda v, i: 5.0 * i, {}, r"is the current (5|4.99|5.01) times"),
-        (lambda v, i: v, lambda v, i: i, {"series_resistance_ohm": 0.0}, r"rather 5\.[56]\d* than"),
+        pytest.param(
+            *(lambda v, i: v, lambda v, i: i),
+            *({"series_resistance_ohm": 0.0}, r"rather 5\.[56]\d* than"),
+            marks=pytest.mark.slow,
+        ),
         (lambda v, i: v, lambda v, i: 1e-5 + 0.0 * i, {}, r"hardly any current flows"),
     ],
 )  # fmt: skip
@@ -105,8 +113,14 @@ def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
             *(lambda i, n: i, {"series_resistance_ohm": 5000.0}, r"resistance, .* rather 5\.[56]"),
             marks=pytest.mark.slow,
         ),
-        (lambda i, n: np.minimum(i, 0.8 * i.max()), {}, "is the current clipped"),
-        (lambda i, n: np.where(n < 0.5, i, 0.9 * i), {}, "does the current jump, .* from row 21"),
+        pytest.param(
+            *(lambda i, n: np.minimum(i, 0.8 * i.max()), {}, "is the current clipped"),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            *(lambda i, n: np.where(n < 0.5, i, 0.9 * i), {}, "current jump, .* from row 21"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )  # fmt: skip
 def test_the_likeliest_cause_is_found_by_the_model(curve, current, probe, question):

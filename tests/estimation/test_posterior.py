@@ -73,7 +73,7 @@ def fitted(lever):
 
 @pytest.fixture(scope="module")
 def posterior(fitted):
-    return sample_posterior(fitted, samples=150, processes=1, noise="common")
+    return sample_posterior(fitted, samples=100, processes=1, noise="common")
 
 
 def test_a_normal_density_is_found():
@@ -205,9 +205,9 @@ def test_posterior_agrees_with_the_covariance_of_the_fit(fitted, posterior):
 
 
 def test_posterior_says_how_far_to_trust_it(fitted, posterior):
-    assert posterior.sizes == {"draw": 150, "quantity": 4}
+    assert posterior.sizes == {"draw": 100, "quantity": 4}
     assert posterior.quantity.values.tolist() == [*fitted.names, "inversion_temperature"]
-    assert 75 < posterior.effective_sample_size.item() < 150
+    assert 50 < posterior.effective_sample_size.item() < 100
     assert posterior.attrs["fixed"].startswith("n_d = ")
     for variable in posterior.data_vars.values():
         assert {"units", "long_name"} <= set(variable.attrs)
