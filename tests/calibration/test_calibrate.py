@@ -13,7 +13,9 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.estimate import calibrate, read_calibration
+from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.estimate.knee_scaling import curve_of_law, curve_of_model
+from hotlever.estimate.options import DiagnosisOptions, Numerics
 from hotlever.estimate.power_law import EQ12, read_power_law
 from hotlever.estimate.summary import calibration_text
 from hotlever.estimate.tip_table import TABLE_COLUMNS
@@ -176,6 +178,20 @@ def test_priors_say_what_was_known_and_what_the_data_made_of_it(calibrated):
     text = calibration_text(calibrated)
     assert "as known before, since the data do not tell: " in text
     assert "gap_um" in text
+
+
+def test_what_is_far_from_its_prior_is_asked_about(calibrated, reference, monkeypatch):
+    """Of usual levers nothing is."""
+    assert not [note for note in calibrated.notes if "from what is known of" in note]
+    monkeypatch.setattr(Diagnosis, "named", lambda *_: "is it in air?")
+    easily = Numerics(diagnosis=DiagnosisOptions(doubtful_shift=0.1))
+    curve = measured_curve(reference, np.random.default_rng(0))
+    doubted = calibrate(measurement_of(curve), priors={"laws": "paper"}, numerics=easily)
+    (note,) = (note for note in doubted.notes if "from what is known of" in note)
+    assert doubted.describes_data
+    found = re.match(r"the data are \d\.\d σ from what is known of (\w+), .*; is it in air\?", note)
+    assert found is not None
+    assert found[1] in doubted.priors
 
 
 def test_nobody_is_told_to_measure_what_was_measured(calibrated):

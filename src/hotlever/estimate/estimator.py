@@ -32,7 +32,13 @@ from hotlever.estimate.tip_temperature import (
     limits_of_range,
 )
 from hotlever.estimate.uncertainty_budget import limits_of
-from hotlever.estimate.verdict import check_plausible, check_similar, no_ramp, verdict_on
+from hotlever.estimate.verdict import (
+    check_plausible,
+    check_similar,
+    doubt_of,
+    no_ramp,
+    verdict_on,
+)
 from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import of_materials, parameters_of
@@ -203,8 +209,10 @@ def calibrate(
         if result.reason and result.converged:
             cause = causes.named(fit is not None)
             result = replace(result, reason=f"{result.reason}; {cause}")
-        notes = list(dict.fromkeys([*problem.notes, *result.notes]))
-        return solution, replace(result, notes=notes)
+        notes = [*problem.notes, *result.notes]
+        if result.describes_data and (doubt := doubt_of(solution)):
+            notes.append(f"{doubt}; {causes.named(fit is not None)}")
+        return solution, replace(result, notes=list(dict.fromkeys(notes)))
 
     solution, result = in_medium(options.medium, within)
     if options.pulse is not None and result.describes_data:

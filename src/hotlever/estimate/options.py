@@ -194,8 +194,12 @@ class DiagnosisOptions:
     shift : float
         Data are not described where they, with all other priors, are so many standard deviations
         from one prior: of the nearly twenty of a lever one is, by chance, in one lever of 500.
+    doubtful_shift : float
+        Where data that are described are so many from a prior, it is asked what may be behind them:
+        in one lever of fifty by chance, and where a medium that is stated wrongly passes for a law
+        that departs.
     shift_probability : float
-        The same of all parameters together.
+        The same as `shift` of all parameters together.
     error, error_of_largest : float
         What a coarse lever may differ by from what was measured: of each current and of the
         largest.
@@ -226,6 +230,7 @@ class DiagnosisOptions:
     cold_factor: float = 2.5
     fewest_biases: int = 3
     shift: float = 3.85
+    doubtful_shift: float = 3.0
     shift_probability: float = 2e-3
     error: float = 3e-3
     error_of_largest: float = 1e-3

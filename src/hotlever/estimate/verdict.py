@@ -161,6 +161,22 @@ def no_ramp(solution: Solution) -> str:
     return ""
 
 
+def doubt_of(solution: Solution) -> str:
+    """Say which parameter data that are described ask to be far from its prior; empty if none."""
+    options = solution.residuals.numerics.diagnosis
+    name, pull = _farthest(solution)
+    if pull < options.doubtful_shift:
+        return ""
+    return f"the data are {pull:.1f} σ from what is known of {name}, {solution.priors[name].stated}"
+
+
+def _farthest(solution: Solution) -> tuple[str, float]:
+    """Return the parameter that data ask to be farthest from its prior, and how far (σ)."""
+    shifts = solution.posterior.shifts
+    name = max(shifts, key=lambda name: abs(shifts[name].pull), default="")
+    return name, abs(shifts[name].pull) if name else 0.0
+
+
 def _misfit(solution: Solution) -> str:
     """Return why data are not described by what was fitted to them; empty if they are.
 
@@ -173,14 +189,14 @@ def _misfit(solution: Solution) -> str:
         return reason
     if reason := run_of_outliers(*of_data):
         return reason
-    shifts = solution.posterior.shifts
-    name = max(shifts, key=lambda name: abs(shifts[name].pull), default="")
-    if name and abs(shifts[name].pull) > options.shift:
+    name, pull = _farthest(solution)
+    if pull > options.shift:
         return (
             f"{name}, known as {solution.priors[name].stated}, would have to be another; the "
-            f"data are {abs(shifts[name].pull):.1f} σ from it"
+            f"data are {pull:.1f} σ from it"
         )
     # as many are free to be away as the data tell of
+    shifts = solution.posterior.shifts
     dof = sum(each.contraction for each in shifts.values())
     squares = sum(each.size**2 for each in shifts.values())
     if dof > 0 and chdtrc(dof, squares) < options.shift_probability:
