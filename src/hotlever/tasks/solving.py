@@ -214,7 +214,6 @@ def simulate_in_time(
         Folder for a page of the lever in time; goes without a wave form.
     """
     from hotlever.datasets import in_a_file
-    from hotlever.lever.fields import write_fields_in_time
     from hotlever.lever.transient import simulate, with_times
     from hotlever.lever.transient.history import TIME_COLUMNS
 
@@ -259,6 +258,8 @@ def simulate_in_time(
         reporter, data, columns, output, drawn, lambda figures: figures.history_overview(curve)
     )
     if fields is not None:
+        from hotlever.lever.fields import write_fields_in_time  # its formats take long to load
+
         write_fields_in_time(meshed, kept_at, states, output_folder(fields))
     if frames is not None and film is not None and frames.states:
         _draw_film(reporter, curve, frames.states, film)

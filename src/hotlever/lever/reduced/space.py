@@ -14,7 +14,6 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from scipy.optimize import nnls
 from scipy.sparse import csr_matrix
 
 from hotlever.air.coupling import ReducedAir
@@ -71,6 +70,8 @@ def empirical_cubature(
     points : ndarray of int, shape (m,)
     weights : ndarray, shape (m,)
     """
+    from scipy.optimize import nnls  # takes longer than all levers
+
     rng = np.random.default_rng(0)
     # random combinations of the training integrals that the cubature is made to reproduce
     count = 420

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from hotlever.datasets import labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
@@ -250,6 +249,8 @@ def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | 
     row = [_REPORTED.index("max_K")]
     if values[row[0], 1] < limit_K:
         return None
+
+    from scipy.optimize import brentq  # takes longer than all levers
 
     def above(t: float) -> float:
         (highest_K,) = hermite(step.start, step.end, values[row], slopes[row], t)
