@@ -129,11 +129,16 @@ def csv_text(data: xr.Dataset, columns: Sequence[str]) -> str:
         values, (stem, _, unit) = data[name].values, name.rpartition("_")
         lines = {f"{stem}.{point}_{unit}": column for point, column in enumerate(values.T)}
         flat |= {name: values} if values.ndim == 1 else lines
+    return columns_text(flat)
+
+
+def columns_text(columns: Mapping[str, Array], digits: int = 10) -> str:
+    """Return columns of numbers as CSV text; empty where a value does not exist."""
     rows = (
-        ",".join(f"{value:.10g}" if math.isfinite(value) else "" for value in row)
-        for row in zip(*flat.values(), strict=True)
+        ",".join(f"{value:.{digits}g}" if math.isfinite(value) else "" for value in row)
+        for row in zip(*columns.values(), strict=True)
     )
-    return "\n".join([",".join(flat), *rows]) + "\n"
+    return "\n".join([",".join(columns), *rows]) + "\n"
 
 
 def frame_text(frame: Any, **options: Any) -> str:

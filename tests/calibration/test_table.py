@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimate.tip_table import (
-    even_rows,
-    interpolated,
-    table_with_budgets,
-    with_steep_rows,
-)
+from hotlever.estimate.tip_table import TipTable, even_rows, interpolated, with_steep_rows
 
 NAMES = ("bias_V", "power_mW", "tip_K")
 
@@ -24,7 +19,7 @@ def tip(bias):
 def table_of(bias, tip_K, power=None):
     power = bias**2 / 20.0 if power is None else power
     columns = {"bias_V": bias, "power_mW": power, "tip_K": tip_K}
-    return table_with_budgets(columns, {"budget_K": {"measurement": np.ones(bias.size)}})
+    return TipTable(columns, {"budget_K": {"measurement": np.ones(bias.size)}})
 
 
 @pytest.fixture
@@ -38,7 +33,7 @@ def steep():
 def test_rows_are_dense_where_the_tip_is_steep(steep):
     even = np.linspace(1.0, 10.0, 91)
     assert np.diff(tip(even)).max() > 90.0
-    assert np.diff(steep.tip_K).max() < 10.1
+    assert np.diff(steep["tip_K"]).max() < 10.1
 
 
 @pytest.mark.parametrize(
@@ -58,7 +53,7 @@ def test_the_usual_step_is_round_and_gives_fifty_rows_or_more(steep):
     for along, step in (("tip_K", 5.0), ("power_mW", 0.05), ("bias_V", 0.1)):
         rows = even_rows(steep, NAMES, along)
         assert np.diff(rows[along][1:-1]).min() == pytest.approx(step)
-    cold = steep.isel(bias=slice(0, 5))
+    cold = steep.rows(slice(0, 5))
     assert even_rows(cold, NAMES, "tip_K")["tip_K"].size > 50
 
 
@@ -76,14 +71,14 @@ def test_between_the_ends_of_a_jump_there_are_no_rows():
     for along, at in (("tip_K", [cold + 1.0, 500.0, hot - 1.0]), ("bias_V", [7.52, 7.54, 7.58])):
         assert np.isnan(interpolated(table, at, along, "bias_V")).all()
     ends = interpolated(table, [cold - 1.0, cold, hot, hot + 1.0], "tip_K", "bias_V")
-    assert interpolated(table.isel(bias=[-1]), [1.0, 10.0], "bias_V", "bias_V")[1] == 10.0
+    assert interpolated(table.rows(slice(-1, None)), [1.0, 10.0], "bias_V", "bias_V")[1] == 10.0
     np.testing.assert_allclose(ends, [7.4329, 7.5, 7.6, 7.6654], atol=1e-3)
     assert not np.any((rows["tip_K"] > cold) & (rows["tip_K"] < hot))
     assert {350.0, 760.0} <= set(rows["tip_K"])
 
 
 def test_tables_that_cannot_be_are_refused(steep):
-    bias = steep.bias_V.values
+    bias = steep["bias_V"]
     turned = table_of(bias, tip(bias), power=np.sin(bias / 4.0))
     with pytest.raises(InputError, match="does not rise all along, expected by bias"):
         even_rows(turned, NAMES, "power_mW", 0.1)

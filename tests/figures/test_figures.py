@@ -171,12 +171,13 @@ def test_page_is_self_contained(figure_by_name, tmp_path):
 
 def test_every_source_of_an_error_is_drawn_however_many_there_are():
     calibration = read_calibration(STORED / "calibration.json")
-    table = calibration.table
-    others = table.assign_coords(source=[f"other {name}" for name in table.source.values])
-    many = xr.concat([table, others], "source", data_vars="minimal", coords="minimal")
-    figure = figures.calibration_curves(replace(calibration, tabulated=many))
+    table = calibration.tip_table
+    own = table.budgets["budget_K"]
+    many = {**own, **{f"other {name}": part for name, part in own.items()}}
+    more = replace(table, budgets={"budget_K": many})
+    figure = figures.calibration_curves(replace(calibration, tabulated=more))
     lines = figure.axes[-1].get_lines()
-    assert [line.get_label() for line in lines] == [*many.source.values, "together"]
+    assert [line.get_label() for line in lines] == [*many, "together"]
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == len(lines) > 10
 
 

@@ -161,7 +161,7 @@ def settings(report: Report, name: str, along: str, value: float) -> dict[str, f
     """
     calibration = _calibration(name)
     calibration.need_described("what to set")
-    table = calibration.table
+    table = calibration.tip_table
     if along == "tip_K":
         bias = float(calibration.bias_for(value))
     elif along == "power_mW":
@@ -171,7 +171,7 @@ def settings(report: Report, name: str, along: str, value: float) -> dict[str, f
     if not np.isfinite(bias):
         return None
     row = {
-        column: float(np.interp(bias, table.bias_V, table[column]))
+        column: float(np.interp(bias, table["bias_V"], table[column]))
         for column in calibration.columns
     }
     return {**row, "bias_V": bias, **({along: value} if along != "bias_V" else {})}

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Container
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from hotlever.estimate.knee import Knee
 from hotlever.estimate.options import CalibrationOptions
 from hotlever.estimate.power_law import law_of_model, power_turns
 from hotlever.estimate.search import Solution
-from hotlever.estimate.tip_table import rms
+from hotlever.estimate.tip_table import TipTable, rms
 from hotlever.estimate.tip_temperature import tip_by_bias
 from hotlever.estimate.uncertainty_budget import budget_of_estimate
 from hotlever.lever import Branch, Lever
@@ -34,9 +33,6 @@ from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def calibrated(
@@ -64,7 +60,7 @@ def calibrated(
     probe, reason = estimate.probe, estimate.reason
     circuit, medium, at_V = probe.circuit, probe.surroundings.medium, options.at_V
     table, jumps, asymmetry = tip_by_bias(solution, options.samples, at_V, progress)
-    notes = [*estimate.notes, *what_data_lack(measured, circuit, table.tip_K.values)]
+    notes = [*estimate.notes, *what_data_lack(measured, circuit, table["tip_K"])]
     notes += [asymmetry] if asymmetry and not reason else []
     notes += [jump.note for jump in jumps]
     notes += [] if reason else what_spectra_would_do(solution, table)
@@ -94,9 +90,8 @@ def calibrated(
             "[contact] would give it one"
         )
     notes += _of_exact_edges(probe, estimate.priors)
-    bias = table.bias_V.values
-    row = int(np.nanargmax(table.tip_K) if at_V is None else np.searchsorted(bias, at_V))
-    at_row = table.isel(bias=slice(row, row + 1))
+    hottest = np.nanargmax(table["tip_K"])
+    row = int(hottest if at_V is None else np.searchsorted(table["bias_V"], at_V))
     if by_power:
         law, residual = law_of_model(vacuum, None if threshold is None else threshold.power_mW)
     return replace(
@@ -104,7 +99,7 @@ def calibrated(
         measurement=measured,
         notes=notes,
         tabulated=table,
-        gum=budget_of_estimate(solution, at_row, options.budget_of),
+        gum=budget_of_estimate(solution, table.rows(slice(row, row + 1)), options.budget_of),
         route=route,
         power_law=law,
         law_residual_K=residual,
@@ -133,7 +128,7 @@ def _hotter(solution: Solution, medium: str) -> Branch:
     return continued(searched.equations, lambda to: to.values[-1, TIP_RISE] >= rise, searched)
 
 
-def what_spectra_would_do(solution: Solution, table: xr.Dataset) -> list[str]:
+def what_spectra_would_do(solution: Solution, table: TipTable) -> list[str]:
     """Say how well a lever without tip temperatures is known, and how well it would be with some.
 
     They are spectra at even tip temperatures, with the errors that those of the paper have. There
@@ -142,11 +137,11 @@ def what_spectra_would_do(solution: Solution, table: xr.Dataset) -> list[str]:
     of_a_tip = {"tip", *OF_A_CONTACT}
     if not solution.objective.informed or of_a_tip & set(solution.residuals.observables):
         return []
-    tip, spectra = table.tip_K.values, 5
+    tip, spectra = table["tip_K"], 5
     rise = tip - solution.probe.circuit.base_temperature_K
     even = np.linspace(tip.min(), tip.max(), spectra + 1)[1:]
     spots = np.unique([int(np.argmin(np.abs(tip - each))) for each in even])
-    predicted = solution.predicted(table.bias_V.values[spots])
+    predicted = solution.predicted(table["bias_V"][spots])
     slopes = predicted.slopes[TIP][:, solution.objective.columns]
     # their thermometer's scale is an error that they share
     shared = np.outer(rise[spots], rise[spots]) * THERMOMETER**2

@@ -7,7 +7,7 @@ and differ in what was known beforehand (`hotlever.estimate.estimator`).
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
-from hotlever.datasets import frame_text, labelled
+from hotlever.datasets import columns_text, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.estimate.experiment import experiment_of
 from hotlever.estimate.file import EstimateFile, FittedParameter, rising_band
@@ -36,6 +36,7 @@ from hotlever.estimate.tip_table import (
     TABLE_COLUMNS,
     TABLES_BY,
     PulseCalibration,
+    TipTable,
     even_rows,
     interpolated,
 )
@@ -118,10 +119,10 @@ class Estimate:
         Power of the knee over the threshold of the power law; NaN without a knee or a law.
     knee : Knee
         Of the estimated lever, or as measured; NaN where there is none, or all but its power.
-    tabulated : xarray.Dataset, optional
-        What `table` returns: ``TABLE_COLUMNS`` on the dimension ``bias``, evenly spaced over the
+    tabulated : TipTable, optional
+        What `table` returns as a dataset: ``TABLE_COLUMNS``, evenly spaced in bias over the
         measured range, with more rows where the tip rises by more than 10 K from one to the next;
-        and ``budget_K``, the standard error by ``source``. With held supplies, what is shown is of
+        and ``budget_K``, the standard error by source. With held supplies, what is shown is of
         the swept one, and ``total_power_mW`` that of all. Of a tip in contact it has
         `OF_THE_CONTACT` too, and ``apex_budget_K``.
     measured_rms_K : float
@@ -158,7 +159,7 @@ class Estimate:
     k: float = np.nan
     k_stderr: float = np.nan
     knee: Knee = field(default_factory=Knee)
-    tabulated: xr.Dataset | None = None
+    tabulated: TipTable | None = None
     measured_rms_K: float = np.nan
     pulse: PulseCalibration | None = None
     gum: TemperatureBudget | None = None
@@ -216,15 +217,18 @@ class Estimate:
             "pulse": None,
             "gum": None,
         }
-        errors = ("tip_stderr_K", *STATED, *OF_THE_CONTACT[1::2], "budget_K", "apex_budget_K")
-        without["band_columns"] = {
-            name: np.full_like(values, np.nan) if name in errors else values
-            for name, values in self.band_columns.items()
-        }
-        if (rows := self.tabulated) is not None:
-            without["tabulated"] = rows.assign(
-                {error: rows[error] * np.nan for error in errors if error in rows}
-            )
+        errors = (*STATED, *OF_THE_CONTACT[1::2])
+
+        def emptied(columns: Mapping[str, Array], names: Container[str]) -> dict[str, Array]:
+            return {
+                name: np.full_like(values, np.nan) if name in names else values
+                for name, values in columns.items()
+            }
+
+        without["band_columns"] = emptied(self.band_columns, errors)
+        if (table := self.tabulated) is not None:
+            budgets = {name: emptied(parts, parts) for name, parts in table.budgets.items()}
+            without["tabulated"] = TipTable(emptied(table.columns, errors), budgets)
         return without
 
     # --- the verdict ------------------------------------------------------------------------------
@@ -258,9 +262,13 @@ class Estimate:
     def __repr__(self) -> str:
         """Say what was found: the hottest tip, if it was asked for, or the parameters."""
         if self.route:
-            hottest = self.table.isel(bias=int(np.nanargmax(self.table.tip_K)))
-            tip = value_with_error(hottest.tip_K.item(), hottest.tip_stderr_K.item())
-            found = f"{tip} K at {hottest.bias_V.item():.4g} V in {self.medium}"
+            table = self.tip_table
+            row = int(np.nanargmax(table["tip_K"]))
+            hottest, error, bias_V = (
+                float(table[name][row]) for name in ("tip_K", "tip_stderr_K", "bias_V")
+            )
+            tip = value_with_error(hottest, error)
+            found = f"{tip} K at {bias_V:.4g} V in {self.medium}"
         else:
             found = ", ".join(f"{name} {fitted}" for name, fitted in self.parameters.items())
         where = self.measurement.path or "a measurement"
@@ -413,12 +421,12 @@ class Estimate:
     @property
     def tip_temperature_uncertainty_K(self) -> float:
         """Largest standard error of the tip temperature in the table (K)."""
-        return float(np.fmax.reduce(self.table.tip_stderr_K.values))
+        return float(np.fmax.reduce(self.tip_table["tip_stderr_K"]))
 
     @property
     def knee_measured(self) -> bool:
         """Whether the knee lies in the measured range."""
-        return self.knee.measured and bool(self.knee.bias_V <= self.table.bias_V.values[-1])
+        return self.knee.measured and bool(self.knee.bias_V <= self.tip_table["bias_V"][-1])
 
     def tip_temperature(self, power_mW: ArrayLike) -> Array:
         """Return the tip temperature (K) by power (mW); NaN outside the measured range.
@@ -475,6 +483,17 @@ class Estimate:
         InputError
             If the tip was not asked for.
         """
+        return self.tip_table.dataset
+
+    @property
+    def tip_table(self) -> TipTable:
+        """What is ``tabulated``.
+
+        Raises
+        ------
+        InputError
+            If the tip was not asked for.
+        """
         if self.tabulated is None:
             raise InputError(
                 f"{self.measurement.path or 'an estimate'}: is a fit, expected a calibration, "
@@ -483,7 +502,7 @@ class Estimate:
         return self.tabulated
 
     @property
-    def heating(self) -> xr.Dataset:
+    def heating(self) -> TipTable:
         """The rows of the table that have a tip temperature, from the coldest on.
 
         Raises
@@ -491,16 +510,14 @@ class Estimate:
         InputError
             If the tip was not asked for.
         """
-        rows, known = self.table, np.isfinite(self.table.tip_K.values)
-        if not known.all():  # of rows by an array xarray asks whether it is Dask's, as of a number
-            rows = rows.isel(bias=known)
-        return rows.isel(bias=slice(int(np.argmin(rows.tip_K.values)), None))
+        known = self.tip_table.rows(np.isfinite(self.tip_table["tip_K"]))
+        return known.rows(slice(int(np.argmin(known["tip_K"])), None))
 
     @property
     def columns(self) -> list[str]:
         """The columns of the table in a file."""
         names = (*TABLE_COLUMNS, "total_power_mW", *OF_THE_CONTACT)
-        return [name for name in names if name in self.table]
+        return [name for name in names if name in self.tip_table]
 
     def table_csv(self, by: str = "temperature", step: float | None = None) -> str:
         """Return the table as CSV, to load into an instrument; that of the pulse if there is.
@@ -522,9 +539,9 @@ class Estimate:
         if self.pulse is not None:
             return self.pulse.table_csv(by, step)
         # by temperature and power from the coldest row on
-        table = self.table if by == "bias" else self.heating
+        table = self.tip_table if by == "bias" else self.heating
         rows = even_rows(table, self.columns, TABLES_BY[by][0], step)
-        return frame_text(rows, index=False, float_format="%.6g")
+        return columns_text(rows, digits=6)
 
     # --- its file ---------------------------------------------------------------------------------
 

@@ -26,7 +26,7 @@ from hotlever.estimate.options import CalibrationOptions, FitOptions, chosen
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.pulses import pulse_calibration
 from hotlever.estimate.search import Solution, solve
-from hotlever.estimate.tip_table import budgets_of, table_with_budgets
+from hotlever.estimate.tip_table import TipTable
 from hotlever.estimate.tip_temperature import (
     check_in_range,
     limits_of_range,
@@ -293,10 +293,9 @@ def _either(estimate: Estimate, other: Estimate) -> Estimate:
     estimate = replace(estimate, band_columns=band)
     if not estimate.route:
         return estimate
-    columns = {name: estimate.table[name].values for name in estimate.columns}
+    columns, of_other = dict(estimate.tip_table.columns), other.tip_table
     others = {
-        name: np.interp(columns["bias_V"], other.table.bias_V.values, other.table[name].values)
-        for name in columns
+        name: np.interp(columns["bias_V"], of_other["bias_V"], of_other[name]) for name in columns
     }
     columns["tip_low_K"] = np.minimum(columns["tip_low_K"], others["tip_low_K"])
     columns["tip_high_K"] = np.maximum(columns["tip_high_K"], others["tip_high_K"])
@@ -306,13 +305,13 @@ def _either(estimate: Estimate, other: Estimate) -> Estimate:
         choices[name] = _error_of_choice(columns[name], others[name])
         columns[error] = np.hypot(columns[error], choices[name])
     budgets = {
-        name: parts | {"medium": choices["apex_K" if name == "apex_budget_K" else "tip_K"]}
-        for name, parts in budgets_of(estimate.table).items()
+        name: {**parts, "medium": choices["apex_K" if name == "apex_budget_K" else "tip_K"]}
+        for name, parts in estimate.tip_table.budgets.items()
     }
-    table, gum = table_with_budgets(columns, budgets), estimate.gum
+    table, gum = TipTable(columns, budgets), estimate.gum
     if gum is not None and other.gum is not None:
         row = columns["bias_V"].tolist().index(gum.bias_V)
-        limits = limits_of(table.isel(bias=row), gum.of)
+        limits = limits_of(table.rows(slice(row, row + 1)), gum.of)
         gum = gum.in_either(other.gum, choices[f"{gum.of}_K"][row].item(), limits)
     return replace(estimate, tabulated=table, gum=gum)
 

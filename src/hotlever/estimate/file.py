@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -38,8 +38,7 @@ from hotlever.estimate.tip_table import (
     TABLE_COLUMNS,
     PulseCalibration,
     PulseTiming,
-    budgets_of,
-    table_with_budgets,
+    TipTable,
 )
 from hotlever.estimate.uncertainty_budget import (
     Budget,
@@ -60,9 +59,6 @@ from hotlever.quantities import FITTED, QUANTITIES, Observable
 from hotlever.records import Number, StandardError, explained, stored_as
 from hotlever.text import value_with_error, with_unit
 from hotlever.types import Array
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # --- values that stand in files in another form --------------------------------------------------
 
@@ -291,8 +287,8 @@ class PulseSection(Section):
     @classmethod
     def of(cls, pulse: PulseCalibration) -> Self:
         """Return the section of a pulse."""
-        table = {name: pulse.table[name].values for name in PULSE_COLUMNS}
-        return cls.holding(pulse.timing, table=table, **budgets_of(pulse.table))
+        table = {name: pulse.tabulated[name] for name in PULSE_COLUMNS}
+        return cls.holding(pulse.timing, table=table, **pulse.tabulated.budgets)
 
     @model_validator(mode="after")
     def _belongs_together(self, info: ValidationInfo) -> Self:
@@ -365,17 +361,17 @@ class TipFields(Section):
     @staticmethod
     def values_of(estimate: Any) -> dict[str, Any]:
         """Return the values of a calibration that it has not as they are, by field."""
-        budgets, stated = budgets_of(estimate.table), estimate.gum
+        table, stated = estimate.tip_table, estimate.gum
         values: dict[str, Any] = {
             "power_law_residual_K": estimate.law_residual_K,
             "knee": vars(estimate.knee) | {"measured": estimate.knee_measured},
             "uncertainty_budget_K": {
-                name: part.max() for name, part in budgets["budget_K"].items()
+                name: part.max() for name, part in table.budgets["budget_K"].items()
             },
-            "table": {name: estimate.table[name].values for name in estimate.columns},
+            "table": {name: table[name] for name in estimate.columns},
             "pulse": None if estimate.pulse is None else PulseSection.of(estimate.pulse),
             "gum": None,
-            **budgets,
+            **table.budgets,
         }
         if stated is None:
             return values
@@ -419,15 +415,17 @@ class TipFields(Section):
             "gum": self._budget(table),
         }
 
-    def _budget(self, table: xr.Dataset) -> TemperatureBudget | None:
+    def _budget(self, table: TipTable) -> TemperatureBudget | None:
         if self.gum is None:
             return None
-        row, tried, of = table.sel(bias=self.gum_bias_V), self.gum_monte_carlo, self.gum_of or "tip"
-        interval = None
+        row = table.rows(table["bias_V"] == self.gum_bias_V)
+        tried, of, interval = self.gum_monte_carlo, self.gum_of or "tip", None
         if tried is not None:
             interval = CoverageInterval(tried.trials, tried.low_K, tried.high_K)
         budget, value = Budget(tuple(self.gum), self.gum_correlation), row[f"{of}_K"].item()
-        return TemperatureBudget(budget, row.bias_V.item(), value, limits_of(row, of), of, interval)
+        return TemperatureBudget(
+            budget, row["bias_V"].item(), value, limits_of(row, of), of, interval
+        )
 
 
 class EstimateFile(ParameterFields, TipFields):
@@ -625,11 +623,11 @@ def _table(
     budgets: Mapping[str, Mapping[str, Array]],
     names: Sequence[str],
     along: str = "bias",
-) -> xr.Dataset:
+) -> TipTable:
     """Return the table that a file holds; columns are NaN that an older file has not."""
     unknown = np.full_like(columns[f"{along}_V"], np.nan)
     own = {name: columns.get(name, unknown) for name in names}
-    return table_with_budgets(own, budgets, along)
+    return TipTable(own, budgets, along)
 
 
 # --- reading ------------------------------------------------------------------------------------

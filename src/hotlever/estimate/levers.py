@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from scipy.special import chdtri
 
 from hotlever.datasets import frame_text, labelled
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.power_law import PowerLaw
-from hotlever.estimate.tip_table import STATED, interpolated
+from hotlever.estimate.tip_table import STATED, TipTable, interpolated
 from hotlever.materials.parameters import heading, is_of_material, parameter_named
 from hotlever.quantities import QUANTITIES
 from hotlever.text import aligned, listed, value_with_error
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Compared(NamedTuple):
@@ -46,7 +48,7 @@ class Setting(NamedTuple):
 def highest_common_bias(calibrations: Mapping[str, Estimate]) -> Setting:
     """Return the highest bias at which all levers were measured whose data are described."""
     described = [each for each in calibrations.values() if each.describes_data]
-    highest = [each.table.bias_V.values[-1] for each in described or calibrations.values()]
+    highest = [each.tip_table["bias_V"][-1] for each in described or calibrations.values()]
     return Setting("bias_V", float(min(highest, default=np.nan)))
 
 
@@ -182,6 +184,8 @@ def compared(
     InputError
         If there is no lever.
     """
+    import xarray as xr  # see `hotlever.datasets.labelled`
+
     if not results:
         raise InputError("no levers to compare, expected one or more")
     names = list(written)
@@ -348,12 +352,12 @@ def _with_error(value: float, stderr: float, scale: float, lower: float, upper: 
     return value_with_error(float(value), float(stderr), float(scale), (lower, upper))
 
 
-def _rows_along(calibration: Estimate, along: str) -> xr.Dataset | None:
+def _rows_along(calibration: Estimate, along: str) -> TipTable | None:
     """Return the rows that tell a tip temperature by bias or power; None if there are none."""
     by_bias = along == "bias_V"
     if not calibration.describes_data or not (by_bias or calibration.power_law is not None):
         return None
-    return calibration.table if by_bias else calibration.heating
+    return calibration.tip_table if by_bias else calibration.heating
 
 
 def _tip_at(calibration: Estimate, at: Setting) -> dict[str, float]:
@@ -370,7 +374,7 @@ def _why_none(calibration: Estimate, at: Setting, tip: Mapping[str, float]) -> s
         return ""
     if at.along == "power_mW" and calibration.power_law is None:
         return "its tip temperature does not follow from a power; expected a bias"
-    low, high = calibration.heating[at.along].values[[0, -1]]
+    low, high = calibration.heating[at.along][[0, -1]]
     unit = QUANTITIES[at.along].unit
     return f"{at.text} is out of its range, {low:.4g} to {high:.4g} {unit}, or where it jumps"
 
@@ -395,7 +399,7 @@ def tips_along(calibrations: Mapping[str, Estimate], along: str) -> xr.Dataset:
         for lever, each in calibrations.items()
         if (rows := _rows_along(each, along)) is not None
     }
-    edges = [float(table[along].values[end]) for table in tables.values() for end in (0, -1)]
+    edges = [float(table[along][end]) for table in tables.values() for end in (0, -1)]
     at = np.linspace(min(edges, default=0.0), max(edges, default=1.0), 200)
     columns = {
         name: np.array([interpolated(table, at, along, name) for table in tables.values()])
@@ -434,6 +438,8 @@ def levers_csv(levers: xr.Dataset, failures: Mapping[str, HotleverError] | None 
     Behind them what else `compare_levers` has on ``lever``; below them the data files of which
     nothing could be made, and why.
     """
+    import xarray as xr  # see `hotlever.datasets.labelled`
+
     columns = {
         quantity.column.item().format(kind): column.sel(quantity=quantity).reset_coords(drop=True)
         for quantity in levers.quantity

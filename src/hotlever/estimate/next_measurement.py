@@ -29,7 +29,6 @@ from hotlever.estimate.posterior import standard_errors
 from hotlever.estimate.prior_density import Coordinates, PriorDensity
 from hotlever.estimate.search import Solution
 from hotlever.estimate.surrogate import CurveSurrogate, Rows
-from hotlever.estimate.tip_table import budgets_of
 from hotlever.estimate.tip_temperature import error_of_model
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
@@ -695,7 +694,7 @@ def plan_next(
         aim_V, at_K, gradient = lever.knee()
     else:
         if at_K is None:
-            tips = tip_K[:safe] if calibration is None else calibration.table.tip_K.values
+            tips = tip_K[:safe] if calibration is None else calibration.tip_table["tip_K"]
             at_K = float(np.nanmax(tips))
         aim_V = lever.bias_for(at_K)
         _, (gradient,) = lever.tip(np.array([aim_V]))
@@ -893,10 +892,10 @@ def _errors_that_stay(
     of_model = _error_of_model(lever, bias)
     if calibration is None:
         return of_model, []
-    table, notes = calibration.table, []
+    table, notes = calibration.tip_table, []
     budget = {
-        source: np.interp(bias, table.bias_V, error)
-        for source, error in budgets_of(table)["budget_K"].items()
+        source: np.interp(bias, table["bias_V"], error)
+        for source, error in table.budgets["budget_K"].items()
     }
     if "jump" in budget and budget["jump"][-1] > 0.0:
         notes.append(

@@ -20,7 +20,7 @@ from hotlever.estimate.tip_table import (
     PULSE_COLUMNS,
     PulseCalibration,
     PulseTiming,
-    table_with_budgets,
+    TipTable,
     total_error,
 )
 from hotlever.estimate.tip_temperature import error_of_model, errors_by_source, measured_range
@@ -202,7 +202,7 @@ def _with_errors(
     columns = dict(zip(PULSE_COLUMNS, rows.T, strict=True))
     peak = MOMENTS.index("peak")
     budget = {source: part[:, peak] for source, part in parts.items()}
-    return PulseCalibration(timing, table_with_budgets(columns, {"budget_K": budget}, "height"))
+    return PulseCalibration(timing, TipTable(columns, {"budget_K": budget}, "height"))
 
 
 def _share_of_air(probe: Probe, time_us: float) -> float:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.tip_table import PulseCalibration, budgets_of
+from hotlever.estimate.tip_table import PulseCalibration, TipTable
 from hotlever.estimate.uncertainty_budget import TemperatureBudget
 from hotlever.materials.parameters import own_name, scale_of, scaled_unit
 from hotlever.probe.priors import PriorUse
@@ -16,9 +16,6 @@ from hotlever.probe.probe_parameters import parameters_of
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.text import NOT_DETERMINED, aligned, significant, value_with_error
 from hotlever.types import Array
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: What the numbers of a fit are that does not describe its data.
 NEAREST = (
@@ -123,7 +120,7 @@ def calibration_parts(calibration: Estimate) -> Parts:
     if calibration.describes_data:
         before = [basis, *_knee_lines(calibration), _law_line(calibration)]
         tables = [("", _budget_rows(calibration))]
-        if "apex_budget_K" in calibration.table:
+        if "apex_budget_K" in calibration.tip_table.budgets:
             caption = "in contact: the apex with its error by source, and the surface of the sample"
             tables.append((f"{caption} under it", _apex_rows(calibration)))
         if calibration.pulse is not None:
@@ -236,7 +233,7 @@ def _budget_rows(calibration: Estimate) -> list[list[str]]:
 
     Without a power law the bias tells more.
     """
-    table, tip = calibration.heating, calibration.heating.tip_K.values
+    table, tip = calibration.heating, calibration.heating["tip_K"]
     tells = ("V_b (V)", "bias_V") if calibration.power_law is None else ("P_l (mW)", "power_mW")
     usual = np.array([400.0, 600.0, 800.0, 900.0, 1000.0, 1100.0, 1200.0])
     temperatures = usual[(tip[0] <= usual) & (usual <= tip[-1])]
@@ -256,24 +253,24 @@ def _apex_rows(calibration: Estimate) -> list[list[str]]:
 
 def _pulse_rows(pulse: PulseCalibration) -> list[list[str]]:
     """Return heights of the pulse for some peak temperatures, with the error by source."""
-    first, last = pulse.table.peak_K.values[[0, -1]]
+    first, last = pulse.tabulated["peak_K"][[0, -1]]
     peak = np.linspace(first, last, 6)[1:].round(0 if last - first > 50 else 1)
     columns = [("peak (K)", "peak_K", 0), ("height (V)", "height_V", 3)]
     columns += [("± (K)", "peak_stderr_K", 1)]
     columns += [(f"{moment} (K)", f"{moment}_K", 0) for moment in ("end", "mean")]
-    return _rows(pulse.table, columns, np.minimum(peak, last))
+    return _rows(pulse.tabulated, columns, np.minimum(peak, last))
 
 
 def _rows(
-    table: xr.Dataset, columns: list[tuple[str, str, int]], at: Array, budget: str = "budget_K"
+    table: TipTable, columns: list[tuple[str, str, int]], at: Array, budget: str = "budget_K"
 ) -> list[list[str]]:
     """Return columns of a table as cells where the first has some values, then a budget.
 
     Of a column are given its head, its name in the table, and the digits behind the point.
     """
-    along = table[columns[0][1]].values
-    numbers = [(head, table[name].values, digits) for head, name, digits in columns]
-    numbers += [(source, error, 1) for source, error in budgets_of(table)[budget].items()]
+    along = table[columns[0][1]]
+    numbers = [(head, table[name], digits) for head, name, digits in columns]
+    numbers += [(source, error, 1) for source, error in table.budgets[budget].items()]
     cells = [
         [head, *(f"{number:.{digits}f}" for number in np.interp(at, along, values))]
         for head, values, digits in numbers
@@ -284,7 +281,7 @@ def _rows(
 def _verdict(calibration: Estimate) -> str:
     stated = calibration.tip_temperature_uncertainty_K
     word = "good" if stated <= 15.0 else "fair" if stated <= 40.0 else "rough"
-    budget = budgets_of(calibration.table)["budget_K"]
+    budget = calibration.tip_table.budgets["budget_K"]
     largest = max(budget, key=lambda source: np.fmax.reduce(budget[source]))
     text = f"which is {word}; most of it is from {largest}"
     by_law = calibration.route == "power law"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import frame_text, labelled
+from hotlever.datasets import columns_text, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.lever.transient import pulse
 from hotlever.probe import Circuit
@@ -37,30 +38,50 @@ PULSE_COLUMNS = (
 )
 
 
-def table_with_budgets(
-    columns: Mapping[str, Array], budgets: Mapping[str, Mapping[str, Array]], along: str = "bias"
-) -> xr.Dataset:
-    """Return columns on a dimension, rising in ``{along}_V``, and budgets by ``source``.
+@dataclass(frozen=True)
+class TipTable:
+    """Tip temperatures in rows that rise in ``{along}_V``, with their errors by source.
 
-    They are the standard errors of the tip, ``budget_K``, and in contact ``apex_budget_K``; both
-    have the same sources.
+    What is printed, written and interpolated is read off arrays; users have the same as `dataset`.
+
+    Attributes
+    ----------
+    columns : mapping of str to ndarray, shape (rows,)
+    budgets : mapping of str to mapping of str to ndarray, shape (rows,)
+        Standard errors (K) by source, independent of each other: of the tip ``budget_K``, and in
+        contact ``apex_budget_K``; both have the same sources.
+    along : {"bias", "height"}
     """
-    sources = list(budgets["budget_K"])
-    errors = {
-        name: (("source", along), np.array([parts[source] for source in sources]))
-        for name, parts in budgets.items()
-    }
-    coordinates = {along: columns[f"{along}_V"], "source": sources}
-    return labelled({**columns, **errors}, along, coordinates)
 
+    columns: Mapping[str, Array]
+    budgets: Mapping[str, Mapping[str, Array]]
+    along: str = "bias"
 
-def budgets_of(table: xr.Dataset) -> dict[str, dict[str, Array]]:
-    """Return the standard errors (K) of a table by source, independent of each other."""
-    return {
-        name: dict(zip(table.source.values.tolist(), table[name].values, strict=True))
-        for name in ("budget_K", "apex_budget_K")
-        if name in table
-    }
+    def __getitem__(self, name: str) -> Array:
+        return self.columns[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def rows(self, chosen: slice | Mask) -> TipTable:
+        """Return some of the rows."""
+        columns = {name: values[chosen] for name, values in self.columns.items()}
+        budgets = {
+            name: {source: part[chosen] for source, part in parts.items()}
+            for name, parts in self.budgets.items()
+        }
+        return TipTable(columns, budgets, self.along)
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """The columns on the dimension ``along``, and the budgets by ``source`` too."""
+        sources = list(self.budgets["budget_K"])
+        errors = {
+            name: (("source", self.along), np.array([parts[source] for source in sources]))
+            for name, parts in self.budgets.items()
+        }
+        coordinates = {self.along: self[f"{self.along}_V"], "source": sources}
+        return labelled({**self.columns, **errors}, self.along, coordinates)
 
 
 def total_error(parts: Mapping[str, Array]) -> Array:
@@ -69,17 +90,17 @@ def total_error(parts: Mapping[str, Array]) -> Array:
 
 
 def interpolated(
-    table: xr.Dataset, values: ArrayLike, along: str, column: str, tip: str = "tip_K"
+    table: TipTable, values: ArrayLike, along: str, column: str, tip: str = "tip_K"
 ) -> Array:
     """Return a column of a table at values of another one that rises; NaN outside and in a jump."""
-    at, rising = np.asarray(values, dtype=float), table[along].values
-    line = np.interp(at, rising, table[column].values)
+    at = np.asarray(values, dtype=float)
+    line = np.interp(at, table[along], table[column])
     return np.where(_no_jump(table, along, at, tip), line, np.nan)
 
 
-def _no_jump(table: xr.Dataset, along: str, at: Array, tip: str) -> Mask:
+def _no_jump(table: TipTable, along: str, at: Array, tip: str) -> Mask:
     """Return whether values of a column are those of a row, or lie between two near each other."""
-    rising, steps = table[along].values, np.abs(np.diff(table[tip].values))
+    rising, steps = table[along], np.abs(np.diff(table[tip]))
     # a lever jumps between rows that are much further apart than `with_steep_rows` puts them, and
     # than those beside them: tables of 0.1 have no more rows where the tip is steep
     beside = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))
@@ -110,7 +131,7 @@ def with_steep_rows(even: Array, bias: Array, tip: Array, steep_K: float = 10.0)
 
 
 def even_rows(
-    table: xr.Dataset,
+    table: TipTable,
     names: Sequence[str],
     along: str,
     step: float | None = None,
@@ -125,8 +146,8 @@ def even_rows(
 
     Parameters
     ----------
-    table : xarray.Dataset
-        From `table_with_budgets`, from the coldest row on.
+    table : TipTable
+        From the coldest row on.
     names : sequence of str
     along : str
         The column that the rows are even in.
@@ -142,7 +163,7 @@ def even_rows(
     InputError
         If the column does not rise, or there would be more than `most`.
     """
-    values, unit, meaning = table[along].values, QUANTITIES[along].unit, QUANTITIES[along].meaning
+    values, unit, meaning = table[along], QUANTITIES[along].unit, QUANTITIES[along].meaning
     if not np.all(np.diff(values) > 0.0):
         raise InputError(f"a table by {meaning}: it does not rise all along, expected by bias")
     if step is None:
@@ -159,7 +180,7 @@ def even_rows(
     even = even[(even > values[0]) & (even < values[-1])]
     even = even[_no_jump(table, along, even, tip)]
     at = np.concatenate([values[:1], even, values[-1:]])
-    return {name: np.interp(at, values, table[name].values) for name in names}
+    return {name: np.interp(at, values, table[name]) for name in names}
 
 
 def table_by_bias(
@@ -170,7 +191,7 @@ def table_by_bias(
     budgets: Mapping[str, Mapping[str, Array]],
     limits: tuple[Array, Array] | None = None,
     more: Mapping[str, Array] | None = None,
-) -> xr.Dataset:
+) -> TipTable:
     """Return the table of bias (V), current (mA) and tip temperature (K), with its errors.
 
     95 % lie between the limits, or as far away as the errors say. There may be `more` columns.
@@ -179,7 +200,7 @@ def table_by_bias(
     low, high = limits or (tip - BAND * stderr, tip + BAND * stderr)
     values = (bias, lever, current, lever * current, tip, stderr, low, high)
     columns = dict(zip(TABLE_COLUMNS, values, strict=True))
-    return table_with_budgets({**columns, **(more or {})}, budgets)
+    return TipTable({**columns, **(more or {})}, budgets)
 
 
 def rms(difference: Array) -> float:
@@ -216,13 +237,18 @@ class PulseCalibration:
     ----------
     timing : PulseTiming
         A repeated pulse is one in the cyclic steady state of its train.
-    table : xarray.Dataset
-        `PULSE_COLUMNS` on the dimension ``height``, over the heights of the calibrated range; and
-        ``budget_K``, the standard error of the peak by ``source``.
+    tabulated : TipTable
+        `PULSE_COLUMNS` over the heights of the calibrated range, and ``budget_K``, the standard
+        error of the peak by source.
     """
 
     timing: PulseTiming
-    table: xr.Dataset
+    tabulated: TipTable
+
+    @property
+    def table(self) -> xr.Dataset:
+        """What is ``tabulated``, on the dimension ``height``; ``budget_K`` by ``source`` too."""
+        return self.tabulated.dataset
 
     def tip_temperature(self, height_V: ArrayLike, moment: str = "peak") -> Array:
         """Return the tip temperature (K) by the height of the pulse (V); NaN out of range.
@@ -232,7 +258,7 @@ class PulseCalibration:
         height_V : array_like
         moment : {"peak", "end", "mean"}
         """
-        return interpolated(self.table, height_V, "height_V", _column(moment), tip="peak_K")
+        return interpolated(self.tabulated, height_V, "height_V", _column(moment), tip="peak_K")
 
     def height_for(self, tip_K: ArrayLike, moment: str = "peak") -> Array:
         """Return the height (V) of the pulse for a tip temperature (K); NaN out of range.
@@ -242,7 +268,7 @@ class PulseCalibration:
         tip_K : array_like
         moment : {"peak", "end", "mean"}
         """
-        return interpolated(self.table, tip_K, _column(moment), "height_V", tip="peak_K")
+        return interpolated(self.tabulated, tip_K, _column(moment), "height_V", tip="peak_K")
 
     def table_csv(self, by: str = "temperature", step: float | None = None) -> str:
         """Return the table as CSV, to load into an instrument; see `Estimate.table_csv`.
@@ -255,8 +281,8 @@ class PulseCalibration:
         along = {"temperature": "peak_K", "bias": "height_V"}.get(by)
         if along is None:
             raise InputError(f"a table of pulses by {by}: expected by temperature or bias")
-        rows = even_rows(self.table, PULSE_COLUMNS, along, step, tip="peak_K")
-        return frame_text(rows, index=False, float_format="%.6g")
+        rows = even_rows(self.tabulated, PULSE_COLUMNS, along, step, tip="peak_K")
+        return columns_text(rows, digits=6)
 
 
 def _column(moment: str) -> str:

@@ -9,18 +9,17 @@ still be cold, or hot already.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hotlever.datasets import quantity
 from hotlever.errors import InputError
 from hotlever.estimate.experiment import TIP, PredictionAtRest
 from hotlever.estimate.posterior import Posterior, standard_errors
 from hotlever.estimate.profile import profile_of_tip
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import (
+    TipTable,
     table_by_bias,
     total_error,
     with_steep_rows,
@@ -35,9 +34,6 @@ from hotlever.probe.surroundings import Surroundings
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: By which source of error a parameter counts that is not the lever's own.
 OF_THE_MEASUREMENT = {
@@ -58,7 +54,7 @@ def tip_by_bias(
     samples: int = 0,
     at_V: float | None = None,
     progress: Progress | None = None,
-) -> tuple[xr.Dataset, list[Jump], str]:
+) -> tuple[TipTable, list[Jump], str]:
     """Return the tip temperature of an estimated lever with its error, over the measured range.
 
     Parameters
@@ -72,7 +68,7 @@ def tip_by_bias(
 
     Returns
     -------
-    table : xarray.Dataset
+    table : TipTable
         At even biases, and more where the tip is steep, see `hotlever.estimate.tip_table`; the
         limits are as far away as the errors say, unless these do not hold.
     jumps : list of Jump
@@ -112,8 +108,8 @@ def tip_by_bias(
         branch = solution.branch
         swept = branch.x[-1] * branch.equations.observed(branch.x)[1]
         held = spline_through(branch.u, branch.equations.power(branch.x) - swept)
-        total = table.power_mW.values + held(branch.read(circuit, bias).u)
-        table["total_power_mW"] = quantity("total_power_mW", "bias", total)
+        total = table["power_mW"] + held(branch.read(circuit, bias).u)
+        table = replace(table, columns={**table.columns, "total_power_mW": total})
     return table, jumps, asymmetry
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, WrapValidator
@@ -24,7 +24,7 @@ from hotlever.estimate.posterior import CurvedQuantity
 from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.search import Solution
 from hotlever.estimate.surrogate import Rows
-from hotlever.estimate.tip_table import budgets_of
+from hotlever.estimate.tip_table import TipTable
 from hotlever.materials.departures import DEPARTURES, departure_of
 from hotlever.materials.parameters import own_name
 from hotlever.probe.parts import ProbeParts
@@ -35,9 +35,6 @@ from hotlever.records import Number
 from hotlever.text import BAND
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # --- budgets of any quantity ----------------------------------------------------------------------
 
@@ -317,32 +314,32 @@ class TemperatureBudget:
         )
 
 
-def limits_of(row: xr.Dataset, of: BudgetOf) -> tuple[float, float]:
+def limits_of(row: TipTable, of: BudgetOf) -> tuple[float, float]:
     """Return what 95 % of a temperature lie between (K), by a row of a table.
 
     Those of an apex are as much further away on one side than its errors say as the tip's.
     """
-    limits = row.tip_low_K.item(), row.tip_high_K.item()
+    limits = row["tip_low_K"].item(), row["tip_high_K"].item()
     if of == "tip":
         return limits
-    value, share = row.apex_K.item(), (row.apex_stderr_K / row.tip_stderr_K).item()
-    low, high = (value + share * (limit - row.tip_K.item()) for limit in limits)
+    value, share = row["apex_K"].item(), (row["apex_stderr_K"] / row["tip_stderr_K"]).item()
+    low, high = (value + share * (limit - row["tip_K"].item()) for limit in limits)
     return low, high
 
 
 @one_blas_thread
-def budget_of_estimate(solution: Solution, row: xr.Dataset, of: BudgetOf) -> TemperatureBudget:
+def budget_of_estimate(solution: Solution, row: TipTable, of: BudgetOf) -> TemperatureBudget:
     """Return the budget of a temperature in a row of the table of an estimated lever.
 
     Parameters
     ----------
     solution : Solution
-    row : xarray.Dataset
-        With the standard errors beside those of the parameters.
+    row : TipTable
+        One, with the standard errors beside those of the parameters.
     of : {"tip", "apex"}
     """
-    bias_V, budgets = row.bias_V.item(), budgets_of(row)
-    errors_K = budgets["apex_budget_K" if of == "apex" else "budget_K"]
+    bias_V = row["bias_V"].item()
+    errors_K = row.budgets["apex_budget_K" if of == "apex" else "budget_K"]
     model = {name: errors_K[name].item() for name in ("model", "jump") if name in errors_K}
     residuals, objective, priors = solution.residuals, solution.objective, solution.priors
     predicted = solution.predicted(np.array([bias_V]))

@@ -152,7 +152,7 @@ def calibration_page(calibration: Estimate, added: Callable[[Block], None] | Non
     names = [
         name
         for name in (*TABLE_COLUMNS, *OF_THE_CONTACT)
-        if name in calibration.table
+        if name in calibration.tip_table
         and (calibration.describes_data or not (name in STATED or "stderr" in name))
     ]
     columns = even_rows(calibration.heating, names, "tip_K", fewest=15)
