@@ -38,7 +38,7 @@ PAGES = {
 SLOW = {
     *("how-to/calibrate", "how-to/design", "how-to/fit", "how-to/levers", "how-to/uncertainty"),
     *("how-to/unknown-lever", "how-to/draw-in-python", "how-to/melting-points"),
-    *("how-to/next-measurement", "how-to/pulses"),
+    *("how-to/next-measurement", "how-to/pulses", "how-to/wire-the-lever"),
     *("examples/reference-probe", "examples/boron-lever", "examples/palladium-on-nitride"),
 }
 #: Modules whose numbers the theory page states.

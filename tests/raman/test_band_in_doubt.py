@@ -35,19 +35,19 @@ def test_a_strong_line_on_a_coarse_axis_is_found_wherever_its_pixels_lie():
 
 @pytest.mark.parametrize("band", [0.0, 45.0, 260.0])
 def test_errors_are_honest_on_a_coarse_axis_with_and_without_a_band(band):
-    spectra, centre = spectra_of_one_line(80, band=band, seed=5)
+    spectra, centre = spectra_of_one_line(50, band=band, seed=5)
     peaks = [fit_peak(spectrum.x, spectrum.y) for spectrum in spectra]
     pulls = np.array([(peak.centre - centre) / peak.centre_stderr for peak in peaks])
-    # 80 pulls: their root mean square is known to 8 %
-    assert 0.8 < np.sqrt(np.mean(pulls**2)) < 1.25
-    assert np.mean(np.abs(pulls) < 2.0) > 0.88
+    # 50 pulls: their root mean square is known to 10 %
+    assert 0.75 < np.sqrt(np.mean(pulls**2)) < 1.3
+    assert np.mean(np.abs(pulls) < 2.0) > 0.87
 
 
 def test_spectra_that_are_measured_together_are_fitted_alike():
     """Noise would have some of them beside a band, and others not."""
-    spectra, centre = spectra_of_one_line(80, band=45.0, step=3.0, seed=3)
+    spectra, centre = spectra_of_one_line(50, band=45.0, step=3.0, seed=3)
     alone = [fit_peak(spectrum.x, spectrum.y) for spectrum in spectra]
-    assert 0 < sum(peak.band is None for peak in alone) < 40
+    assert 0 < sum(peak.band is None for peak in alone) < 25
     together = [line.peak for line in measure(spectra)]
     assert all(peak.band is not None for peak in together)
     assert abs(np.mean([peak.centre for peak in together]) - centre) < 0.05
@@ -76,13 +76,13 @@ def test_an_error_holds_both_answers_by_their_weights():
 
 
 def test_an_answer_that_the_other_model_would_move_is_flagged():
-    """A faint shoulder leaves some of 60 spectra in doubt, a strong one none."""
+    """A faint shoulder leaves some of 40 spectra in doubt, a strong one none."""
     flagged = {}
     for band in (20.0, 260.0):
-        spectra, _ = spectra_of_one_line(60, band=band, step=3.4, seed=4)
+        spectra, _ = spectra_of_one_line(40, band=band, step=3.4, seed=4)
         peaks = [fit_peak(spectrum.x, spectrum.y) for spectrum in spectra]
         flagged[band] = sum("band-in-doubt" in peak.flags for peak in peaks)
-    assert flagged[20.0] >= 6
+    assert flagged[20.0] >= 4
     assert flagged[260.0] == 0
 
 
