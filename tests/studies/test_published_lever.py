@@ -35,8 +35,9 @@ def solver():
     return Solver(reference.length_um, COARSE), dict(reference.values)
 
 
-def test_readings_have_the_derivatives_of_differences(solver):
+def test_readings_have_the_derivatives_of_differences(solver, monkeypatch):
     solve, values = solver
+    monkeypatch.setattr("published_lever.OPTIONS", {MAIN: OPTIONS[MAIN]})
     here = solve.readings(values)[MAIN]
     reads = {
         "tip": lambda one: one.at_tip([500.0, 893.0, 1100.0]),
