@@ -77,7 +77,7 @@ def with_proposed(calibration, plan, measure):
     return replace(before, **columns)
 
 
-def scatter_of_the_knee(lever, count=200):
+def scatter_of_the_knee(lever, count=400):
     """Return the standard deviation of the knees (K) of levers drawn as they are known."""
     spread = np.linalg.cholesky(lever.information.covariance)[: len(lever.names)]
     drawn = spread @ np.random.default_rng(1).standard_normal((spread.shape[1], count))
@@ -124,6 +124,7 @@ def test_the_knee_moves_with_parameters_as_those_of_levers_that_have_others(name
     assert slopes[number] == pytest.approx(differences.item(), rel=2e-2, abs=0.05)
 
 
+@pytest.mark.slow
 def test_the_error_of_the_knee_is_the_scatter_of_the_knees_of_such_levers(measure):
     """Now, and as foretold of the posterior once what is proposed has been measured.
 

@@ -80,7 +80,10 @@ def test_equal_rows_are_no_curve(curve):
             *({"series_resistance_ohm": 0.0}, r"rather 5\.[56]\d* than"),
             marks=pytest.mark.slow,
         ),
-        (lambda v, i: v, lambda v, i: 1e-5 + 0.0 * i, {}, r"hardly any current flows"),
+        pytest.param(
+            *(lambda v, i: v, lambda v, i: 1e-5 + 0.0 * i, {}, r"hardly any current flows"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )  # fmt: skip
 def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
@@ -100,7 +103,9 @@ def test_data_that_cannot_be_this_probe_s_are_refused_with_the_likeliest_cause(
             *(lambda i, n: i + 0.03 * i.max(), {}, "zero of the current off"),
             marks=pytest.mark.slow,
         ),
-        (lambda i, n: i, {"medium": "air"}, "in vacuum, not in air"),
+        pytest.param(
+            *(lambda i, n: i, {"medium": "air"}, "in vacuum, not in air"), marks=pytest.mark.slow
+        ),
         pytest.param(
             *(lambda i, n: i, {"thickness_um": 0.8}, "thickness rather 0.[34]"),
             marks=pytest.mark.slow,

@@ -62,10 +62,15 @@ def of_row(row, evaluated):
     return values[row], {name: each[row] for name, each in partials.items()}
 
 
-@pytest.mark.parametrize("T", [*TEMPERATURES, *BEYOND])
+def off(found, expected, rel, absolute):
+    """By how much each value is off, as a share of what it may be."""
+    allowed = np.maximum(rel * np.abs(expected), absolute)
+    return np.abs(found - expected) / np.maximum(allowed, 1e-300)
+
+
 @pytest.mark.parametrize("name", MATERIALS)
-def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, T):
-    kind, T = MATERIALS[name], np.array([T])
+def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name):
+    kind, T = MATERIALS[name], np.array([*TEMPERATURES, *BEYOND])
     laws = {
         "heat": lambda kind, T, n, t: kind.thermal_conductivity(T, t),
         "charge": lambda kind, T, n, t: kind.electrical_conductivity(T, n),
@@ -79,7 +84,7 @@ def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, 
         value, partials = law(kind, T, *at)
         found |= set(partials)
         slope = numerical_derivative(lambda T, law=law: law(kind, T, *at)[0], T, 1e-3)
-        assert partials["T"] == pytest.approx(slope, rel=2e-6, abs=1e-9 * abs(value[0]))
+        assert (off(partials["T"], slope, 2e-6, 1e-9 * np.abs(value)) < 1.0).all()
         for parameter in kind.parameters:
             number = getattr(kind, parameter)
 
@@ -91,7 +96,7 @@ def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, 
             departure, mode = departure_of(parameter) or (None, 0)
             if isinstance(departure, SmoothFactor):
                 expected = partials.get(departure.law, 0.0) * departure.modes(T)[mode]
-            assert expected == pytest.approx(slope, rel=1e-6, abs=1e-12 * abs(value[0]))
+            assert (off(expected, slope, 1e-6, 1e-12 * np.abs(value)) < 1.0).all(), parameter
         for place, other in enumerate(("n", "thickness_um")):
             step = 1e-3 * at[place]
 
@@ -99,7 +104,7 @@ def test_all_properties_have_exact_derivatives_by_all_that_they_depend_on(name, 
                 return law(kind, T, *(*at[:place], x, *at[place + 1 :]))[0]
 
             slope = numerical_derivative(away, at[place], step)
-            assert partials.get(other, 0.0) == pytest.approx(slope, rel=1e-5, abs=1e-12)
+            assert (off(partials.get(other, 0.0), slope, 1e-5, 1e-12) < 1.0).all(), other
     # what counts in the taper alone is no argument of a law
     in_taper = {"n_d", "delta", "n_hd", *PROFILE.names}
     depends = found | {name for law in found & set(DEPARTURES) for name in DEPARTURES[law].names}
