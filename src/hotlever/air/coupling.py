@@ -298,10 +298,13 @@ class _Directions:
         count = self._count
         change = -self._near(self._lost(direction))
         image = direction - self._sampled(change)
-        if not self._images.size:
-            # only one of the two systems may ever be asked for
-            self._images = np.empty((self._most, image.size))
-            self._changes = np.empty((self._most, change.size))
+        if count == len(self._images):
+            # some ten serve most right-hand sides, and of one system alone
+            more = min(max(16, count), self._most - count)
+            self._images, self._changes = (
+                np.concatenate([each.reshape(count, new.size), np.empty((more, new.size))])
+                for each, new in ((self._images, image), (self._changes, change))
+            )
         shares = self._images[:count] @ image
         image = image - shares @ self._images[:count]
         change = change - shares @ self._changes[:count]
