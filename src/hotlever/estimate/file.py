@@ -157,7 +157,7 @@ class Section(BaseModel):
     While a file is read its path is pydantic's context, for errors.
     """
 
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, defer_build=True)
 
     @classmethod
     def holding(cls, source: object, **others: Any) -> Self:
