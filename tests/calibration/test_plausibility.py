@@ -136,6 +136,19 @@ def test_the_likeliest_cause_is_found_by_the_model(curve, current, probe, questi
     assert re.search(question, causes.likeliest())
 
 
+def test_currents_of_levers_like_the_stated_one_have_their_derivatives(curve):
+    """Of either polarity, and where the branch has ended."""
+    lever = Diagnosis(altered_measurement(curve), Probe.reference())._curve
+    bias = np.append(np.linspace(-5.0, 13.0, 30), 500.0)
+    rows = MeasuredRows(bias, np.zeros_like(bias), 5.6, np.ones(bias.size, dtype=bool))
+    away, step = 0.1 * np.random.default_rng(0).normal(size=lever.at.size), 1e-6
+    by = lever.current_by_logarithm(away, rows)
+    for number, change in enumerate(step * np.eye(away.size)):
+        ends = (lever.current(away + way * change, rows) for way in (1.0, -1.0))
+        difference = np.subtract(*ends) / (2.0 * step)
+        np.testing.assert_allclose(by[:, number], difference, atol=1e-7)
+
+
 @pytest.mark.slow
 def test_one_sweep_of_another_lever_is_no_two_sweeps(long_u_shape):
     """A U-shape of 120 µm, taken for the reference probe."""

@@ -427,10 +427,37 @@ class _Curve:
         Beyond its end the branch stays level: no lever takes such a bias. Both polarities are taken
         to show the same.
         """
-        lever, current = np.exp(self.logarithms + self.powers @ (away - self.at)).T
-        bias = np.maximum.accumulate(lever + rows.series_kohm * current)
-        size = np.interp(np.abs(rows.bias_V), np.append(0.0, bias), np.append(0.0, current))
+        outputs, bias = self._along(away, rows)
+        passed = np.append(0.0, np.maximum.accumulate(bias))
+        size = np.interp(np.abs(rows.bias_V), passed, np.append(0.0, outputs[:, 1]))
         return np.asarray(np.copysign(size, rows.bias_V))
+
+    def current_by_logarithm(self, away: Array, rows: MeasuredRows) -> Array:
+        """Return the derivatives of `current` by the logarithms, (rows, p)."""
+        outputs, bias = self._along(away, rows)
+        highest, number = np.maximum.accumulate(bias), np.arange(bias.size)
+        # where the bias falls along the branch, that of the highest point before counts
+        latest = np.maximum.accumulate(np.where(bias == highest, number, 0))
+        changes, cold = outputs[:, :, None] * self.powers, np.zeros((1, away.size))
+        current_by = np.concatenate([cold, changes[:, 1]])
+        of_bias = changes[:, 0] + rows.series_kohm * changes[:, 1]
+        bias_by = np.concatenate([cold, of_bias[latest]])
+        passed, current = np.append(0.0, highest), np.append(0.0, outputs[:, 1])
+        size = np.abs(rows.bias_V)
+        before = np.minimum(np.searchsorted(passed, size, side="right") - 1, bias.size - 1)
+        after, beyond = before + 1, size >= passed[-1]
+        width = np.where(beyond, 1.0, passed[after] - passed[before])
+        share = np.where(beyond, 1.0, (size - passed[before]) / width)[:, None]
+        steep = np.where(beyond, 0.0, (current[after] - current[before]) / width)[:, None]
+        at_before = current_by[before] - steep * bias_by[before]
+        at_after = current_by[after] - steep * bias_by[after]
+        sign = np.copysign(1.0, rows.bias_V)[:, None]
+        return np.asarray(sign * ((1.0 - share) * at_before + share * at_after))
+
+    def _along(self, away: Array, rows: MeasuredRows) -> tuple[Array, Array]:
+        """Return V_l and I_h along the branch, (n, 2), and the bias there, (n,)."""
+        outputs = np.exp(self.logarithms + self.powers @ (away - self.at))
+        return outputs, outputs @ np.array([1.0, rows.series_kohm])
 
 
 def _with_powers(probe: Probe, priors: Mapping[str, Prior]) -> tuple[str, ...]:
@@ -495,6 +522,7 @@ class Diagnosis:
         data = measured.bias_V[here], current[here]
         self._rows = MeasuredRows(*data, probe.circuit.series_kohm, np.ones(here.sum(), dtype=bool))
         self._probe, self._priors, self._names = probe, priors or None, names
+        self._curves: dict[Probe, _Curve] = {}
 
     def named(self, fitted: bool = False) -> str:
         """Return the likeliest cause in words, or that there is no single one.
@@ -606,7 +634,10 @@ class Diagnosis:
         return SimilarLevers(Lever(probe, COARSE)).linearised(probe, whole, names=every)
 
     def _solved(self, probe: Probe) -> _Curve:
-        return _Curve.of(self._linearised(probe), known_beforehand(probe, self._priors))
+        if probe not in self._curves:
+            priors = known_beforehand(probe, self._priors)
+            self._curves[probe] = _Curve.of(self._linearised(probe), priors)
+        return self._curves[probe]
 
     def _explains(self, explained: _Explanation) -> bool:
         return explained.squares < self._least_unexplained
@@ -655,20 +686,45 @@ class Diagnosis:
         beyond = options.robust_beyond
         informed = np.array([name != hypothesis.parameter for name in curve.names])
 
-        def weighted(point: Array) -> Array:
+        def rows_at(point: Array) -> tuple[MeasuredRows, Array]:
+            """Return the rows as they should have been, and their errors."""
             value = start + point[-1] if hypothesis.free else start
             rows = self._rows if hypothesis.rows is None else hypothesis.rows(self._rows, value)
             size = np.abs(rows.current_mA)
+            return rows, options.error * size + options.error_of_largest * size.max()
+
+        def away_in_errors(point: Array, rows: MeasuredRows, errors: Array) -> Array:
             missing = curve.current(point[:count] * spreads, rows) - rows.current_mA
-            missing /= options.error * size + options.error_of_largest * size.max()
-            soft = beyond * np.sqrt(np.log1p((missing / beyond) ** 2)) * np.sign(missing)
+            return np.asarray(missing / (errors * beyond))
+
+        def weighted(point: Array) -> Array:
+            rows, errors = rows_at(point)
+            missing = away_in_errors(point, rows, errors)
+            soft = beyond * np.sqrt(np.log1p(missing**2)) * np.sign(missing)
             residuals = np.where(rows.included, soft, np.sqrt(options.excluded_row))
             return np.concatenate([residuals, point[:count][informed]])
+
+        def by_point(point: Array) -> Array:
+            rows, errors = rows_at(point)
+            missing = away_in_errors(point, rows, errors)
+            root = np.sqrt(np.log1p(missing**2))
+            # soft residuals grow as the others where these are small
+            less = np.divide(np.abs(missing), root, out=np.ones_like(root), where=root > 0.0)
+            weight = rows.included * less / (1.0 + missing**2) / errors
+            by = weight[:, None] * curve.current_by_logarithm(point[:count] * spreads, rows)
+            jacobian = np.concatenate([by * spreads, np.eye(count)[informed]])
+            if not hypothesis.free:
+                return jacobian
+            # what the unknown does to the rows is not differentiated
+            moved = point.copy()
+            moved[-1] += 1e-7 * max(1.0, abs(point[-1]))
+            change = (weighted(moved) - weighted(point)) / (moved[-1] - point[-1])
+            return np.column_stack([jacobian, change])
 
         begin = np.append(curve.at / spreads, [0.0] * hypothesis.free)
         # a parameter of which nothing is known is within a factor of thirty of what was stated
         widest = np.append(np.log(30.0) / spreads, [np.inf] * hypothesis.free)
-        end = least_squares(weighted, begin, bounds=(-widest, widest), max_nfev=40)
+        end = least_squares(weighted, begin, by_point, (-widest, widest), max_nfev=40)
         away, value = end.x[:count] * spreads, start
         if hypothesis.free:
             value += float(end.x[-1])
