@@ -83,53 +83,85 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
     uneven = np.random.default_rng(0).uniform(-1.0, 1.0, len(x)) / len(x) ** 0.5
     uneven[~equations.space.is_temperature] = 0.0
     times, modes = _modes(equations, x, factors, count, uneven)
-    if not (air := equations.heat_in_air).size:
+    if not equations.heat_in_air.size:
         return times, modes
-    constants, changes = np.empty_like(times), np.empty_like(modes)
-    for mode in range(count):
-        # what goes along with the lever depends on how fast it goes
-        for _ in range(6):  # until the time constant changes by less than 1e-4
-            last = times[mode]
-            rate = 1.0 / abs(last)
-            bound = air.bound(rate) if last > 0.0 else air.taken_up(rate) / rate
-            # those with other air are nearly the same, if no other gets slower than they are
-            begin = (modes / np.linalg.norm(modes, axis=0)).sum(axis=1) + 0.01 * uneven
-            times, modes = _modes(equations, x, factors, count, begin, air.coordinates, bound)
-            if abs(times[mode] / last - 1.0) < 1e-4:
-                break
-        constants[mode], changes[:, mode] = times[mode], modes[:, mode]
-    return constants, changes
+    return _in_air(equations, x, row, factors, times, modes)
 
 
 def _modes(
-    equations: LeverEquations,
-    x: Array,
-    factors: InCircuit,
-    count: int,
-    begin: Array,
-    coordinates: Array | None = None,
-    bound: Array | None = None,
+    equations: LeverEquations, x: Array, factors: InCircuit, count: int, begin: Array
 ) -> tuple[Array, Array]:
-    """Return the slowest modes of a lever with a heat capacity (nJ/K) that goes along.
+    """Return the slowest modes of a lever without what the air takes up.
 
     Their search begins with a change (size + 1,).
     """
 
     def relaxed(change: Array) -> Array:
-        stored = equations.storage_change(x, change.reshape(-1, 1))
-        if coordinates is not None and bound is not None:
-            stored[:, 0] += coordinates.T @ (bound @ (coordinates @ change.ravel()))
-        return factors.solve(stored)[:, 0]
+        return factors.solve(equations.storage_change(x, change.reshape(-1, 1)))[:, 0]
 
     size = len(x)
     operator: Any = LinearOperator((size, size), matvec=relaxed, dtype=float)
     try:
-        # with few directions, since most searches begin next to what they find
         constants, changes = eigs(operator, count, v0=begin, ncv=2 * count + 1, tol=1e-6)
     except RuntimeError as error:
         raise ComputationError(f"no time constants were found: {error}") from error
     order = np.argsort(-np.abs(constants))
     return constants.real[order], changes.real[:, order]
+
+
+def _in_air(
+    equations: LeverEquations,
+    x: Array,
+    row: Array,
+    factors: InCircuit,
+    times: Array,
+    modes: Array,
+    accuracy: float = 1e-5,
+    most: int = 60,
+) -> tuple[Array, Array]:
+    """Return time constants and modes of a lever with the air, from those without.
+
+    The heat in the air that goes along with the lever depends on how fast it goes: a nonlinear
+    eigenvalue problem. All modes are looked for in one space, to which what each of them lacks is
+    added (Arnoldi's method; H. Voss, BIT Numer. Math. 44, 387 (2004)): at most so many directions,
+    until that is a small share of it.
+    """
+    air = equations.heat_in_air
+
+    def products(changes: Array) -> tuple[Array, Array]:
+        """Return the Jacobian, and the heat capacity of the lever, times changes."""
+        lost = equations.balance_change(x, changes[:, None])[:, 0]
+        lost[-1] = row[:, 0] @ changes
+        return lost, equations.storage_change(x, changes[:, None])[:, 0]
+
+    space = np.linalg.qr(modes)[0]
+    lost, stored = products(space)
+    constants, found = np.empty_like(times), np.empty_like(modes)
+    for mode, last in enumerate(times.tolist()):
+        while True:
+            rate = 1.0 / abs(last)
+            bound = air.bound(rate) if last > 0.0 else air.taken_up(rate) / rate
+            together = stored + air.coordinates.T @ (bound @ (air.coordinates @ space))
+            values, shares = np.linalg.eig(np.linalg.solve(space.T @ lost, space.T @ together))
+            chosen = np.argsort(-np.abs(values))[mode]
+            time, share = float(values[chosen].real), shares[:, chosen].real
+            lacking = factors.solve((together @ share - time * (lost @ share))[:, None])[:, 0]
+            size = np.linalg.norm(lacking) / (abs(time) * np.linalg.norm(share))
+            is_steady, last = abs(time / last - 1.0) < 1e-4, time
+            if is_steady and size < accuracy:
+                break
+            if space.shape[1] == most:
+                raise ComputationError("no time constants were found in air")
+            for _ in range(2):  # once leaves rounding errors
+                lacking = lacking - space @ (space.T @ lacking)
+            new = (lacking / np.linalg.norm(lacking))[:, None]
+            more = new, *products(new)
+            space, lost, stored = (
+                np.append(each, column, axis=1)
+                for each, column in zip((space, lost, stored), more, strict=True)
+            )
+        constants[mode], found[:, mode] = time, space @ share
+    return constants, found
 
 
 def time_constants(
