@@ -48,6 +48,7 @@ def test_the_true_lever_is_within_the_band(calibrated, lever):
             assert stderr < 0.1 * (value - 293.0) + 1.2
 
 
+@pytest.mark.slow
 def test_its_own_lever_has_these_temperatures(calibrated):
     own = Lever(calibrated.probe)
     heights = calibrated.pulse.table.height_V.values[[40, 90]]
@@ -61,6 +62,7 @@ def test_its_own_lever_has_these_temperatures(calibrated):
         calibrated.pulse.tip_temperature(5.0, "meen")
 
 
+@pytest.mark.slow
 def test_sources_add_up_and_a_cold_tip_is_as_sure_as_the_base(calibrated):
     table = calibrated.pulse.table
     together = np.sqrt((table.budget_K**2).sum("source"))
@@ -80,6 +82,7 @@ def test_more_heat_capacity_is_a_slower_lever(coarse, monkeypatch):
     assert slower == pytest.approx(usual, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_the_file_reads_back(calibrated, tmp_path):
     path = tmp_path / "calibration.json"
     calibrated.write(path)

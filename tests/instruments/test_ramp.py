@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import ComputationError, InputError
+from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.instruments.ramp import CurveFile, Ramp, RampOptions
 from hotlever.instruments.source_meter import Reading
 from hotlever.instruments.twin import RampCurve, TwinBench, drawn_from_priors
@@ -88,7 +89,10 @@ def test_compliance_ends_it_without_the_row(curve):
     assert [reading.bias_V for reading, _ in rows] == [1.0, 1.5]
 
 
-def test_rows_of_another_lever_end_it(curve):
+def test_rows_of_another_lever_end_it(curve, monkeypatch):
+    # what may be behind it is not what is asked here
+    monkeypatch.setattr(Diagnosis, "likeliest", lambda _: "is it another lever?")
+
     class Doubled(WithoutLine):
         def read(self) -> Reading:
             reading = super().read()
@@ -98,6 +102,7 @@ def test_rows_of_another_lever_end_it(curve):
     measured.measure(Doubled(curve), lambda *row: None)
     assert not measured.complete
     assert "of no lever like the probe" in measured.reason
+    assert measured.reason.endswith("is it another lever?")
     assert len(measured.readings) == 3
 
 

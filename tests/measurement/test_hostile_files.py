@@ -146,11 +146,11 @@ def test_what_is_unclear_is_one_line(tmp_path, name):
 
 @pytest.mark.parametrize("part", ADVERSARIAL)
 def test_no_text_takes_long(tmp_path, part):
-    long = (part * 100_000)[:100_000]
+    long = (part * 50_000)[:50_000]
     began = time.process_time()
     for text in (f"# {long}\n{IV}1,0.1\n", f"{long}\n{IV}1,0.1\n", f"{IV}1,{long}\n", f"{long}\n"):
         assert len(refused(write(tmp_path, text))) < 900  # either outcome is fine
-    assert time.process_time() - began < 30  # backtracking takes hours
+    assert time.process_time() - began < 10  # backtracking takes much longer
 
 
 def test_many_lines_above_a_header_are_read_at_once(tmp_path):
