@@ -103,9 +103,9 @@ def options_of(command):
     )
 
 
-@each_page
+@pytest.mark.parametrize("name", [*PAGES, "README"])
 def test_commands_and_options_exist(name):
-    text = PAGES[name]
+    text = PAGES.get(name) or (ROOT / "README.md").read_text(encoding="utf-8")
     for block in blocks(text, "sh", "console", ""):
         for _, (_, *words) in commands(block.content):
             command, rest = found_command(words)
