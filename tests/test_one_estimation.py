@@ -32,11 +32,9 @@ def test_fit_and_calibrate_give_the_same_parameters(data, probe):
     assert fitted.describes_data == calibration.describes_data
     names = fitted.names
     assert set(calibration.priors) >= set(names)
-    assert np.allclose(
-        fitted.probe.values(names), calibration.probe.values(names), rtol=1e-8, atol=0
-    )
-    for name in names:
-        # one posterior, of which both give what they are asked for
-        assert fitted.parameters[name].stderr == pytest.approx(
-            calibration.priors[name].posterior_spread, rel=1e-8
-        )
+    # one posterior, of which both give what they are asked for
+    stderr = np.array([fitted.parameters[name].stderr for name in names])
+    spread = [calibration.priors[name].posterior_spread for name in names]
+    np.testing.assert_allclose(stderr, spread, rtol=1e-6)
+    off = fitted.probe.values(names) - calibration.probe.values(names)
+    assert np.abs(off / stderr).max() < 1e-6
