@@ -2,14 +2,17 @@
 
 Forty mistakes are made with levers of `twins.py`, of a richer model, that differ from their
 drawing, and each file is calibrated by the command line. A mistake counts as named when what is
-said of it (notes and the closing line on standard error) has the likeliest cause in it. Then follow
-things that are no mistakes, and GOOD levers as they are: none of these may alarm.
+said of it (notes and the closing line on standard error) has the likeliest cause in it. Where a
+temperature is stated all the same, the table says how far it is off at most, and in standard errors
+(rms over the rows): a mistake that is within these does no harm. Then follow things that are no
+mistakes, and GOOD levers as they are: none of these may alarm.
 
 Run: python benchmarks/mistakes.py [GOOD] [FIRST]      (FIRST lever of the mistakes)
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -31,6 +34,7 @@ from hotlever.errors import HotleverError
 from hotlever.estimate import Measurement, calibrate
 from hotlever.probe import Probe
 from hotlever.studies.simulation_based_calibration import DEPARTURES, draw, measure
+from hotlever.text import BAND
 from hotlever.types import Array
 from problems import processor_time, table
 
@@ -49,6 +53,8 @@ class Bench:
     probe: Probe
     true: Probe
     rng: np.random.Generator
+    #: Biases (V), and the tip temperatures (K) that the lever had at these.
+    truth: tuple[Array, Array]
     comments: list[str] = field(default_factory=list)
     options: list[str] = field(default_factory=list)
     probe_text: str = ""
@@ -59,8 +65,8 @@ class Bench:
     def of_lever(cls, number: int, medium: str = "vacuum", what: str = "iv") -> Bench:
         rng = np.random.default_rng(number)
         true, nominal = draw(rng, number, medium)
-        data, _, _ = measure(true, rng, what, DEPARTED)
-        return cls(columns_of(data), nominal, true, rng, number=number)
+        data, tip, _ = measure(true, rng, what, DEPARTED)
+        return cls(columns_of(data), nominal, true, rng, (data.bias_V, tip), number=number)
 
     @property
     def bias(self) -> Array:
@@ -151,8 +157,12 @@ def other_terminal(bench: Bench) -> None:
 
 
 def remeasured(bench: Bench, true: Probe) -> Array:
-    """Return the current of another lever at the same bias, or at the last that it can take."""
-    data = measure(true, bench.rng, "iv", DEPARTED, float(bench.bias.max()))[0]
+    """Return the current of another lever at the same bias, or at the last that it can take.
+
+    From then on the bench has that lever.
+    """
+    data, tip, _ = measure(true, bench.rng, "iv", DEPARTED, float(bench.bias.max()))
+    bench.truth = data.bias_V, tip
     return np.interp(bench.bias, data.bias_V, data.current_mA)
 
 
@@ -166,8 +176,9 @@ def contact(bench: Bench) -> None:
 
 
 def half_of_another(bench: Bench) -> None:
+    own, half = bench.truth[1], bench.bias.size // 2
     other = remeasured(bench, draw(bench.rng, bench.number + 2, "vacuum")[0])
-    half = bench.bias.size // 2
+    bench.truth = bench.bias, np.append(own[:half], np.interp(bench.bias, *bench.truth)[half:])
     bench.set(I_h=np.concatenate([bench.current[:half], other[half:]]))
 
 
@@ -299,11 +310,12 @@ HARMLESS = [
 
 
 class Outcome(NamedTuple):
-    """How a command ended."""
+    """How a command ended, and how far off a tip is that it states (K, standard errors)."""
 
     status: int
     said: str
     seconds: float
+    off: str
 
 
 def run(number: int, first: int = 0) -> Outcome:
@@ -313,11 +325,31 @@ def run(number: int, first: int = 0) -> Outcome:
     mistake.make(bench)
     with tempfile.TemporaryDirectory() as folder:
         os.environ[CACHE_VARIABLE] = str(Path(folder, "cache"))
-        command = [*COMMAND, *bench.files(Path(folder))]
+        written = Path(folder, "calibration.json")
+        command = [*COMMAND, *bench.files(Path(folder)), "-o", str(written)]
         began = processor_time()
         done = subprocess.run(command, capture_output=True, text=True, check=False)
+        seconds = processor_time() - began
         said = done.stderr.replace(f"{folder}/", "")
-    return Outcome(done.returncode, said, processor_time() - began)
+        off = "" if done.returncode else error_made(written, bench.truth)
+    return Outcome(done.returncode, said, seconds, off)
+
+
+def error_made(written: Path, truth: tuple[Array, Array]) -> str:
+    """Return by how much a calibration is off at most, and in standard errors (rms)."""
+    rows = [row for row in json.loads(written.read_text())["table"] if row["tip_low_K"] is not None]
+    bias, tip, low, high = (
+        np.array([row[name] for row in rows])
+        for name in ("bias_V", "tip_K", "tip_low_K", "tip_high_K")
+    )
+    true = np.interp(bias, *truth, left=np.nan, right=np.nan)
+    off = tip - true
+    stated = np.where(off > 0, tip - low, high - tip) / BAND
+    here = np.isfinite(off)
+    if not here.any():
+        return ""
+    farthest = np.nanargmax(np.abs(off))
+    return f"{off[farthest]:+.0f} K, {np.sqrt(np.mean((off / stated)[here] ** 2)):.1f} σ"
 
 
 def good(number: int) -> tuple[int, str, float]:
@@ -342,8 +374,8 @@ def report(mistakes: list[Mistake], outcomes: list[Outcome]) -> None:
         right += named
         said = " / ".join(outcome.said.splitlines())
         rows.append((mistake.name, said[-SHOWN:], outcome.status, "yes" if named else "NO",
-                     f"{outcome.seconds:.1f}"))  # fmt: skip
-    table(("what was done", "what was said (its end)", "status", "right", "s"), rows)
+                     outcome.off, f"{outcome.seconds:.1f}"))  # fmt: skip
+    table(("what was done", "what was said (its end)", "status", "right", "off", "s"), rows)
     seconds = [outcome.seconds for outcome in outcomes]
     print(f"\nright: {right} of {len(rows)}; seconds of processor at most {max(seconds):.1f}\n")
 

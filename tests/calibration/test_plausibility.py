@@ -200,6 +200,13 @@ def test_a_lever_of_which_both_polarities_were_measured_is_no_other_one(curve):
         calibrate(both, probe=Probe.reference())
 
 
+def test_a_current_in_few_steps_is_of_no_other_lever(curve):
+    """Half a step is an error of the meter: a jump was asked about at the third row."""
+    step = curve.current_mA.max() / 20.0
+    coarse = altered_measurement(curve, current_mA=np.round(curve.current_mA / step) * step)
+    assert Diagnosis(coarse, Probe.reference()).of_another_lever() == ""
+
+
 @pytest.mark.slow
 def test_a_lever_of_which_little_is_known_is_looked_for_from_its_cold_rows():
     """Three times less doping than stated: all rows at once led away, and it was refused."""

@@ -17,6 +17,7 @@ from hotlever import Probe, sweep
 from hotlever.errors import InputError
 from hotlever.estimate import read_measurement
 from hotlever.measurement import Measurement, with_measured_circuit
+from hotlever.measurement.data import resolution_of
 
 PLAIN = "V_b (V),I_h (mA),V_r (mV),T_tip (K),dT_tip (K)\n1,0.1,50,,\n2,0.2,100,300,5\n"
 
@@ -368,3 +369,17 @@ def test_a_medium_that_nobody_says_is_noted():
     assert with_measured_circuit(Probe.reference(), unsaid, "vacuum")[1] == []
     stated = Probe.reference().in_medium("vacuum")
     assert with_measured_circuit(stated, unsaid)[1] == []
+
+
+@pytest.mark.parametrize(
+    ("values", "step"),
+    [
+        ([0.0, 0.1, 0.1, 0.3, 0.7], 0.1),
+        ([-0.2, 0.2, 0.2, np.nan, 0.4], 0.2),
+        ([0.1, 0.2, 0.3], 0.0),  # a resistor in equal steps
+        ([0.1, 0.1, 0.231, 0.4], 0.0),
+        ([0.1, 0.1], 0.0),
+    ],
+)
+def test_a_resolution_is_a_step_of_which_all_values_are_multiples(values, step):
+    assert resolution_of(np.array(values)) == pytest.approx(step)

@@ -26,6 +26,7 @@ from hotlever.lever.branch import TIP_RISE
 from hotlever.lever.continuation import continued
 from hotlever.lever.lever import COARSE, HOTTEST
 from hotlever.measurement import Measurement
+from hotlever.measurement.data import resolution_of
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import THERMOMETER
 from hotlever.probe.shapes import full_bias_name
@@ -189,14 +190,13 @@ def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -
             f"{counted(count, 'row')} with a current: few for a lever, so that the answer leans on "
             f"what was known beforehand; {few} or more would tell"
         )
-    levels = np.unique(measured.current_mA[np.isfinite(measured.current_mA)])
-    step = float(np.diff(levels).min()) if levels.size > 1 else 0.0
-    share = step / float(levels[-1]) if step else 0.0
-    # each of them is a multiple of the resolution
-    if share > 0.01 and np.allclose(levels / step, np.round(levels / step), atol=0.02):
+    current = measured.current_mA[np.isfinite(measured.current_mA)]
+    step, levels = resolution_of(current), np.unique(current).size
+    share = step / float(current.max(initial=1e-300))
+    if share > 0.01:
         remarks.append(
             f"I_h has a resolution of {step:.2g} mA only, {share:.1%} of its largest value, in "
-            f"{counted(levels.size, 'step')}"
+            f"{counted(levels, 'step')}"
         )
     hottest = float(np.nanmax(tip_K))
     if hottest < 400.0:

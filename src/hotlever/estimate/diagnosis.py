@@ -27,7 +27,7 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.materials.parameters import parameter_named
 from hotlever.measurement import Measurement
 from hotlever.measurement.compliance import is_level
-from hotlever.measurement.data import noise_about_neighbours
+from hotlever.measurement.data import noise_about_neighbours, resolution_of
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, known_beforehand
 from hotlever.probe.probe_parameters import parameters_of
@@ -523,6 +523,9 @@ class Diagnosis:
         self._rows = MeasuredRows(*data, probe.circuit.series_kohm, np.ones(here.sum(), dtype=bool))
         self._probe, self._priors, self._names = probe, priors or None, names
         self._curves: dict[Probe, _Curve] = {}
+        largest = np.abs(self._rows.current_mA).max(initial=1e-300)
+        # a current of few steps is off by half of one, whatever lever it is of
+        self._coarseness = 0.5 * resolution_of(self._rows.current_mA) / float(largest)
 
     def named(self, fitted: bool = False) -> str:
         """Return the likeliest cause in words, or that there is no single one.
@@ -683,7 +686,7 @@ class Diagnosis:
         The search is for logarithms of parameters in units of their spreads, and for the unknown.
         """
         options, spreads, count = self.options, curve.spreads, curve.spreads.size
-        beyond = options.robust_beyond
+        beyond, of_largest = options.robust_beyond, options.error_of_largest + self._coarseness
         informed = np.array([name != hypothesis.parameter for name in curve.names])
 
         def rows_at(point: Array) -> tuple[MeasuredRows, Array]:
@@ -691,7 +694,7 @@ class Diagnosis:
             value = start + point[-1] if hypothesis.free else start
             rows = self._rows if hypothesis.rows is None else hypothesis.rows(self._rows, value)
             size = np.abs(rows.current_mA)
-            return rows, options.error * size + options.error_of_largest * size.max()
+            return rows, options.error * size + of_largest * size.max()
 
         def away_in_errors(point: Array, rows: MeasuredRows, errors: Array) -> Array:
             missing = curve.current(point[:count] * spreads, rows) - rows.current_mA

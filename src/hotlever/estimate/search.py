@@ -121,7 +121,7 @@ def solve(
 class Search:
     """The searches for the lever of a problem, of which ``progress`` and ``seen`` are told.
 
-    The first may begin with the lever as `stated`; see `solve`.
+    The first may begin with the lever as ``stated``; see `solve`.
     """
 
     problem: Problem

@@ -340,3 +340,18 @@ def colder_than_base(
     """Return where a tip seems colder than its base by more than an offset or noise explain."""
     margin = np.maximum(offset_K, errors * np.nan_to_num(error_K))
     return np.asarray(tip_K < base_K - margin)
+
+
+def resolution_of(values: Array) -> float:
+    """Return the step of which all values, (n,), are multiples; 0 if there is none.
+
+    It is the smallest difference of two values, some of which are the same: a resistor in equal
+    steps has multiples too.
+    """
+    present = values[np.isfinite(values)]
+    levels = np.unique(present)
+    if not 1 < levels.size < present.size:
+        return 0.0
+    step = float(np.diff(levels).min())
+    multiples = levels / step
+    return step if np.allclose(multiples, np.round(multiples), rtol=0.0, atol=0.02) else 0.0
