@@ -48,15 +48,13 @@ def test_the_reference_probe_as_a_drawing(tmp_path, parametric, turn):
     np.testing.assert_allclose(sweep.tip_K, parametric.tip_K, atol=0.04)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("surroundings", "panels"),
     [
         ({}, (1.0, 1.5)),
         # not symmetric about the mid-plane: twice as many panels
-        pytest.param(
-            *({"surface_gap_um": 6.0, "surface_tilt_deg": 3.0, "chip": True}, (0.7, 1.0)),
-            marks=pytest.mark.slow,
-        ),
+        ({"surface_gap_um": 6.0, "surface_tilt_deg": 3.0, "chip": True}, (0.7, 1.0)),
     ],
 )
 def test_panels_of_a_slanted_lever_are_fine_enough(tmp_path, surroundings, panels):

@@ -72,6 +72,7 @@ def test_a_step_ends_at_rest(lever, bias):
     assert history.current_mA[-1] == pytest.approx(state.current_mA, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_train_on_modes_is_that_of_the_full_lever(lever):
     few = hotlever.simulate(lever, pulse(-7.0, 5.0, 20.0, 3), 60.0, at=[5.0, 25.0, 45.0])
     many = hotlever.simulate(lever, pulse(-7.0, 5.0, 20.0, 20), 400.0, at=[5.0, 25.0, 45.0])

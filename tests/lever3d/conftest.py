@@ -13,9 +13,12 @@ from hotlever.probe.solid import SolidMeshOptions
 COARSE = SolidMeshOptions(refinement=0.4, grading=0.7)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="session", params=[pytest.param("air", marks=pytest.mark.slow)])
 def in_air() -> SolidLever:
-    """The reference lever in air on a coarse mesh."""
+    """The reference lever in air on a coarse mesh, which takes ten seconds: all that ask are slow.
+
+    `tests/verification/test_open_air.py` compares the air of solids with exact solutions.
+    """
     pytest.importorskip("ngsolve")
     return SolidLever(Probe.reference().in_medium("air"), COARSE, air_order=2)
 
