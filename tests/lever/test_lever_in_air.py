@@ -7,8 +7,8 @@ import pickle
 import numpy as np
 import pytest
 
-from hotlever.air.operator import air_operator
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
+from hotlever.lever.discretisation import surrounded
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
 from hotlever.quantities import OBSERVABLES
@@ -72,8 +72,7 @@ def test_halved_panels_change_less_than_a_thousandth(lever, fine):
     probe = fine.probe
 
     def with_panels(refinement: float) -> Lever:
-        operator = air_operator(probe.layout(), refinement=refinement)
-        return Lever(probe, space=lever.space.in_air(operator))
+        return Lever(probe, space=surrounded(lever.space, probe, refinement))
 
     a, b, c = (one.sweep(BIAS) for one in (with_panels(0.7), fine, with_panels(1.4)))
     rise = b.tip_K - 293.0

@@ -199,7 +199,7 @@ class DiagnosisOptions:
         in one lever of fifty by chance, and where a medium that is stated wrongly passes for a law
         that departs.
     shift_probability : float
-        The same as `shift` of all parameters together.
+        The same as ``shift`` of all parameters together.
     error, error_of_largest : float
         What a coarse lever may differ by from what was measured: of each current and of the
         largest.
