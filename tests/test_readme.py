@@ -29,7 +29,6 @@ def test_python_example(folder, monkeypatch, capsys):
     assert len(re.findall(r"^\w+ +\d[\d.]*\([\d.]+\)", printed, re.MULTILINE)) == 6
 
 
-@pytest.mark.slow
 def test_command_line_example(run, folder):
     (example,) = blocks(README, "sh")
     assert 0 < len(commands(example.content)) == len(example.content.splitlines()) <= 10
