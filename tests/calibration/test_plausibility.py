@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,16 +13,16 @@ from documents import EXAMPLES
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, calibrate, estimator
 from hotlever.estimate.calibration import what_data_lack
-from hotlever.estimate.diagnosis import Diagnosis, MeasuredRows, _Curve, hypotheses_of
+from hotlever.estimate.diagnosis import Diagnosis, MeasuredRows, hypotheses_of
 from hotlever.estimate.knee import IVCurve
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.verdict import check_plausible
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
+from hotlever.lever.observables import Linearised
 from hotlever.measurement import read_measurement
 from hotlever.probe import Probe
-from hotlever.probe.priors import Prior
 from synthetic_curves import measured_curve, measurement_of
 from twins import little_known_lever
 
@@ -37,16 +38,16 @@ def curve(reference) -> IVCurve:
 @pytest.fixture(scope="module", autouse=True)
 def solved_once():
     """Levers as the probe is stated, and as each hypothesis has it, are solved once for all."""
-    solved, solve = {}, _Curve.of
+    solved, solve = {}, Diagnosis._linearised
 
-    def once(probe: Probe, priors: dict[str, Prior]) -> _Curve:
-        key = repr((probe, priors))
+    def once(self: Diagnosis, probe: Probe, names: Sequence[str] = ()) -> Linearised:
+        key = probe, tuple(names), repr(self._priors)
         if key not in solved:
-            solved[key] = solve(probe, priors)
+            solved[key] = solve(self, probe, names)
         return solved[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_Curve, "of", once)
+        patch.setattr(Diagnosis, "_linearised", once)
         yield
 
 
