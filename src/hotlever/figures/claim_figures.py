@@ -358,7 +358,8 @@ def knee_carried(carried: xr.Dataset, nearest: str, discrepancy_K: float) -> Fig
     Parameters
     ----------
     carried : xarray.Dataset
-        See ``hotlever.studies.published_lever.knee_suspects.carried``.
+        On ``layout`` and ``suspect``: ``moved_K``, ``shift_K`` and ``ramp_K``, see
+        `hotlever.studies.knee_study.Carried`.
     nearest : str
         The layout whose values are bars.
     discrepancy_K : float
