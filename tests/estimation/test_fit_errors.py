@@ -79,6 +79,7 @@ def test_standard_errors_follow_the_noise_of_each_observable(coarse, coarse_fast
     assert after["p"].stderr / after["p"].value < after["a0"].stderr / after["a0"].value
 
 
+@pytest.mark.slow
 def test_the_band_is_the_spread_of_repeated_experiments(coarse, coarse_fast):
     """Fits of data with new noise each scatter in tip temperature as the band says."""
     tips, errors = [], []

@@ -59,6 +59,7 @@ def test_data_of_another_lever_are_fitted_to_their_noise_or_not_described():
     assert rms < 2.0 * NOISE
 
 
+@pytest.mark.slow
 def test_at_the_optimum_no_parameter_lowers_the_sum_of_squares(reference_curve):
     def model(probe: Probe, bias: np.ndarray) -> ExperimentAtRest:
         return full_experiment(Lever(probe, COARSE), bias)
@@ -222,6 +223,7 @@ def test_a_search_in_air_of_a_lever_in_vacuum_takes_less_than_a_gigabyte(tmp_pat
     assert int(done.stdout) < 1e6
 
 
+@pytest.mark.slow
 def test_levers_that_cannot_be_drawn_bound_a_search():
     """Once the search walked until a bar was 0.6 nm long, as if the input were at fault."""
     probe = Probe.u_shape().with_(

@@ -88,6 +88,7 @@ def test_small_signals_begin_as_the_static_curve(lever):
     assert slow.impedance_real_ohm.item() == pytest.approx(lever_V, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_solid_shows_what_a_flat_lever_does(lever):
     solid = SolidLever(THERMOELECTRIC, SolidMeshOptions(refinement=0.4, grading=0.7))
     for bias in (5.0, -5.0):

@@ -169,6 +169,7 @@ def test_the_probe_of_a_file_with_tables_holds_their_values(tmp_path):
         probe.with_(**{"film.lorenz_rato": 1.2})
 
 
+@pytest.mark.slow
 def test_a_fit_finds_a_number_of_a_formula_and_the_scale_of_a_table(tmp_path):
     true = metal_film_probe(materials=STATED).with_(**{"film.alpha": 1.8e-3})
     measurement = Measurement.of_sweep(sweep_of(true, np.linspace(0.1, 0.6, 11)))

@@ -120,6 +120,7 @@ def test_the_thickening_stands_for_the_cone():
     assert sheet.current_mA.item() == pytest.approx(cone.current_mA.item(), rel=0.1)
 
 
+@pytest.mark.slow
 def test_terminals_are_whole_end_faces():
     layout = Probe.reference().layout()
     mesh = mesh_solid(layout, SolidMeshOptions(refinement=0.25))

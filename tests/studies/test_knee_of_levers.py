@@ -82,6 +82,7 @@ def test_a_coefficient_of_a_law_is_a_suspect_of_one_standard_deviation():
     assert not by_line
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse_meshes")
 def test_the_covariance_of_a_fit_gives_the_knee_a_standard_error_that_goes_with_the_noise():
     probe, noise = Probe.reference(), np.random.default_rng(0).normal(size=(2, len(RAMP)))

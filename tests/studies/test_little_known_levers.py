@@ -42,6 +42,7 @@ def some():
         return [little_known_lever(number, "vacuum") for number in NUMBERS]
 
 
+@pytest.mark.slow
 def test_a_lever_is_the_same_each_time_and_in_the_medium_that_is_asked_for(some):
     once, again, in_air = some[4], little_known_lever(10, "vacuum"), little_known_lever(10, "air")
     assert (once.true, once.nominal) == (again.true, again.nominal)
