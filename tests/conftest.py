@@ -119,22 +119,26 @@ def shared() -> Callable[..., list[Path]]:
 @pytest.fixture
 def run(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., tuple[int, str, str]]:
+) -> Iterator[Callable[..., tuple[int, str, str]]]:
     """Run the command line in an empty folder; returns exit status, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
     # how long something takes depends on the machine
     monkeypatch.setattr(output, "_lines", partial(output._lines, first_s=float("inf")))
+    ended_badly = ""
 
     def call(*arguments: str) -> tuple[int, str, str]:
+        nonlocal ended_badly
         with pytest.raises(SystemExit) as ended:
             main([str(argument) for argument in arguments])
         captured = capsys.readouterr()
         status = int(ended.value.code or 0)
-        if status == 1:  # a test that did not expect it shows what went wrong
-            sys.stderr.write(captured.err)
+        if status == 1:
+            ended_badly = captured.err
         return status, captured.out, captured.err
 
-    return call
+    yield call
+    # a test that did not expect it shows what went wrong
+    sys.stderr.write(ended_badly)
 
 
 @pytest.fixture
