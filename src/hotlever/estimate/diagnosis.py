@@ -271,10 +271,13 @@ def _of_the_resistor(rows: MeasuredRows) -> Hypothesis:
     def other(rows: MeasuredRows, kohm: float) -> MeasuredRows:
         return replace(rows, series_kohm=max(kohm, 0.0))
 
+    def asks(kohm: float) -> str:
+        if abs(kohm - stated) < 0.01 * stated:
+            return ""
+        return f"is the series resistance, with contacts, rather {kohm:.3g} than {stated:.3g} kΩ?"
+
     return Hypothesis(
-        lambda kohm: (
-            f"is the series resistance, with contacts, rather {kohm:.3g} than {stated:.3g} kΩ?"
-        ),
+        asks,
         other,
         starts=(stated, stated / 2, 0.8 * measured),
         free=True,
@@ -564,7 +567,8 @@ class Diagnosis:
         drawing, *others = _of_another_lever(self._rows, self._probe, self._curve.names)
         explanations = self._searched([drawing])
         if explanations and self._explains(explanations[0]):
-            explanations += self._searched(others)
+            # what takes no other lever to be solved may explain them as well
+            explanations += self._searched([each for each in others if each.probe is None])
         nothing, explanations = self._from_cold_rows, _likeliest_first(explanations)
         least = min((explained.squares for explained in explanations), default=np.inf)
         if self._explains(nothing) and nothing.squares < least + self.options.as_likely_difference:
