@@ -272,11 +272,12 @@ def test_temperatures_in_degrees_celsius_are_refused(curve):
     [
         (slice(20, 24), 0.0, "4 rows with a current: few for a lever"),
         (slice(None), 0.05, "a resolution of 0.05 mA only"),
+        (slice(None), -0.05, "a resolution of 0.05 mA only, 3."),
         (slice(None, 12), 0.0, "measured only up to a tip of 3"),
     ],
 )
 def test_what_the_data_lack_is_remarked(curve, reference, rows, step, remark):
-    current = np.round(curve.current_mA / step) * step if step else curve.current_mA
+    current = np.round(curve.current_mA / abs(step)) * step if step else curve.current_mA
     data = altered_measurement(curve, rows, current_mA=current)
     tips = reference.tip_temperature(curve.power_mW[rows])
     remarks = what_data_lack(data, curve.circuit, tips)

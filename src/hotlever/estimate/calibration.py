@@ -192,7 +192,7 @@ def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -
         )
     current = measured.current_mA[np.isfinite(measured.current_mA)]
     step, levels = resolution_of(current), np.unique(current).size
-    share = step / float(current.max(initial=1e-300))
+    share = step / float(np.abs(current).max(initial=1e-300))
     if share > 0.01:
         remarks.append(
             f"I_h has a resolution of {step:.2g} mA only, {share:.1%} of its largest value, in "
