@@ -36,14 +36,14 @@ test-failed: env
 	$(BIN)/python -m pytest --last-failed --last-failed-no-failures none
 
 test-slow: env
-	$(BIN)/python -m pytest -m slow -o faulthandler_timeout=3600 $(TWO)
+	$(BIN)/python -m pytest -m slow --timeout 3600 -o faulthandler_timeout=7200 $(TWO)
 
 test-app: env
 	sh tools/get_chromium.sh
 	$(BIN)/python -m pytest -m browser -p no:cacheprovider $(TWO) tests/app tests/report
 
 test-hostile: env
-	HOTLEVER_HOSTILE=1 $(BIN)/python -m pytest tests/hostile -o faulthandler_timeout=3600 -rP
+	HOTLEVER_HOSTILE=1 $(BIN)/python -m pytest tests/hostile --timeout 3600 -o faulthandler_timeout=7200 -rP
 
 test-pythons: env
 	sh tools/test_pythons.sh

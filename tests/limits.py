@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 
-def as_in_a_terminal() -> None:
-    """Let signals end a command even where these tests run under nohup or in the background."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
+def as_in_a_terminal(command: list[str], ignored: str = "") -> list[str]:
+    """Return a command that signals end even where these tests run in the background.
+
+    They are set in the new process, which then becomes the command: a function that is run between
+    fork and exec may wait for a lock that another thread had. One signal may be ignored instead.
+    """
+    prepare = (
+        "import os, signal, sys\n"
+        "for name in 'SIGINT', 'SIGTERM', 'SIGHUP':\n"
+        "    ignored = name == sys.argv[1]\n"
+        "    signal.signal(getattr(signal, name), signal.SIG_IGN if ignored else signal.SIG_DFL)\n"
+        "os.execvp(sys.argv[2], sys.argv[2:])"
+    )
+    return [sys.executable, "-I", "-S", "-c", prepare, ignored or "-", *command]
 
 
 @contextmanager

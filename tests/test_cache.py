@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from contextlib import suppress
@@ -128,6 +129,9 @@ def test_a_cache_that_may_not_be_read_or_written_only_costs_time(folder):
     for mode in (0o000, 0o500):
         child = os.fork()
         if child == 0:  # permissions do not hold for root
+            # what waits for a lock that a thread had before the fork ends here
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
+            signal.alarm(60)
             os.chmod(folder, mode)
             os.setuid(65534)
             ended = 1

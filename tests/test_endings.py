@@ -23,11 +23,9 @@ COMMAND = [sys.executable, "-c", "from hotlever.cli import main; main()"]
 LONG = ("sweep", "--bias", "1:11:10000", "-o", "a.csv")
 
 
-def start(folder: Path, *arguments: str, **options) -> subprocess.Popen:
-    options.setdefault("preexec_fn", as_in_a_terminal)
-    return subprocess.Popen(
-        [*COMMAND, *arguments], cwd=folder, stderr=subprocess.PIPE, text=True, **options
-    )
+def start(folder: Path, *arguments: str, ignored: str = "", **options) -> subprocess.Popen:
+    command = as_in_a_terminal([*COMMAND, *arguments], ignored)
+    return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, **options)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -76,24 +74,18 @@ def test_a_signal_that_comes_within_a_destructor_is_not_lost(tmp_path):
     """Python lets no exception out of one, nor of what it calls back as it imports."""
     began = time.monotonic()
     ended = subprocess.run(
-        [sys.executable, "-c", IN_A_DESTRUCTOR],
+        as_in_a_terminal([sys.executable, "-c", IN_A_DESTRUCTOR]),
         cwd=tmp_path,
         capture_output=True,
         text=True,
         check=False,
-        preexec_fn=as_in_a_terminal,
     )
     assert (ended.returncode, ended.stderr) == (1, "hotlever: stopped by the user\n")
     assert time.monotonic() - began < 20.0
 
 
 def test_an_ignored_signal_stays_ignored(tmp_path):
-    with start(
-        tmp_path,
-        *("probe", "show"),
-        stdout=subprocess.PIPE,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN),
-    ) as process:
+    with start(tmp_path, "probe", "show", ignored="SIGHUP", stdout=subprocess.PIPE) as process:
         time.sleep(0.5)
         process.send_signal(signal.SIGHUP)
         out, err = process.communicate(timeout=60)
@@ -304,5 +296,5 @@ def test_a_stop_within_exec_ends_with_the_exit_status(tmp_path, raised, status):
         f"try:\n    exec('raise {raised}')\nexcept KeyboardInterrupt:\n    raise SystemExit(1)"
     )
     (tmp_path / "stopped.py").write_text(script)
-    command = [sys.executable, "-m", "stopped"]
-    assert subprocess.run(command, cwd=tmp_path, preexec_fn=as_in_a_terminal).returncode == status
+    command = as_in_a_terminal([sys.executable, "-m", "stopped"])
+    assert subprocess.run(command, cwd=tmp_path).returncode == status

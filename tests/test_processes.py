@@ -160,9 +160,8 @@ def test_workers_and_their_folder_end_with_their_parent(tmp_path, number):
     environment = {**os.environ, "HOTLEVER_CACHE": "", "TMPDIR": str(tmp_path / "tmp")}
     command = [sys.executable, str(tmp_path / "script.py")]
     with subprocess.Popen(
-        command,
+        as_in_a_terminal(command),
         env=environment,
-        preexec_fn=as_in_a_terminal,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,

@@ -46,9 +46,9 @@ def measuring(twin, tmp_path) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """Start a process that measures; gives it, and the process that supervises."""
     script = tmp_path / "measuring.py"
     script.write_text(SCRIPT)
-    command = [sys.executable, str(script), twin.source]
+    command = as_in_a_terminal([sys.executable, str(script), twin.source])
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, preexec_fn=as_in_a_terminal, **pipes) as process:
+    with subprocess.Popen(command, **pipes) as process:
         try:
             assert process.stdout is not None
             supervisor = int(process.stdout.readline())
