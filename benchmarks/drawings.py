@@ -33,8 +33,8 @@ from hotlever.air.operator import PanelledAir
 from hotlever.air.surface import lever_surface
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
-from hotlever.lever.films import PlacedFilm
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.placed_films import PlacedFilm
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever3d import SolidLever
 from hotlever.materials import LOW_DOPED

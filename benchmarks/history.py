@@ -41,9 +41,9 @@ from hotlever.estimate import Measurement, fit
 from hotlever.estimate.experiment_in_time import ExperimentInTime
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.transient import Waveform, integrate, pulse, simulate, sine, step
-from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever.transient.sensitivities import with_sensitivities
+from hotlever.lever.transient.transient_problem import TransientProblem
 from hotlever.lever.transport import Fluxes
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe

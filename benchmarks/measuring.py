@@ -39,7 +39,7 @@ from hotlever.errors import HotleverError
 from hotlever.estimate import Measurement, calibrate
 from hotlever.estimate.next_measurement import LinearisedLever
 from hotlever.instruments.ramp import Ramp, RampOptions
-from hotlever.instruments.source_meter import Reading
+from hotlever.instruments.source_meter import MeterReading
 from hotlever.instruments.twin import RampCurve, TwinBench
 from hotlever.probe import Probe
 from problems import table
@@ -63,12 +63,12 @@ class Direct:
         """Set the bias (V)."""
         self._bias_V = bias_V
 
-    def read(self) -> Reading:
+    def read(self) -> MeterReading:
         """Return what is shown, with noise."""
         current, _, tip = self.curve.at(self._bias_V)
         self.hottest_K = max(self.hottest_K, tip)
         noisy = current * (1.0 + NOISE * self._rng.standard_normal())
-        return Reading(self._bias_V, noisy, float("nan"), False)
+        return MeterReading(self._bias_V, noisy, float("nan"), False)
 
 
 def tip_at(measured: Measurement, probe: Probe, bias_V: float) -> tuple[float, float]:

@@ -57,7 +57,7 @@ from hotlever.studies.knee_study import (
 from hotlever.studies.linear_branch import SPAN_K, BranchLine
 from hotlever.studies.published_lever.ensemble import (
     REFERENCE,
-    Layout,
+    CandidateLayout,
     probe_of,
     stored_ensemble,
     stored_layouts,
@@ -354,7 +354,7 @@ class Goal:
 # --- what a layout shows -------------------------------------------------------------------------
 
 
-def numbers_of(layout: Layout) -> dict[str, float]:
+def numbers_of(layout: CandidateLayout) -> dict[str, float]:
     """Compute what a layout shows, by the names of its columns.
 
     Raises
@@ -379,7 +379,7 @@ def numbers_of(layout: Layout) -> dict[str, float]:
     }
 
 
-def _deviations(layout: Layout) -> dict[str, float]:
+def _deviations(layout: CandidateLayout) -> dict[str, float]:
     """Return the largest deviation from each statement, over what it may be off by."""
     readings = Solver(layout.length_um, None).readings(layout.values)
     return {each.name: float(np.abs(each.deviation(readings)[0]).max()) for each in SEARCHED}
@@ -479,7 +479,7 @@ def _options(levers: dict[str, Lever]) -> dict[str, float]:
     return found
 
 
-def _errors(layout: Layout) -> dict[str, float]:
+def _errors(layout: CandidateLayout) -> dict[str, float]:
     """Errors and correlations of the options' parameters, by one noise for all observables."""
     found: dict[str, float] = {}
     names = tuple(PARAMETERS)

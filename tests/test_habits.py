@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import tomllib
+from collections import Counter
 from pathlib import Path
 
 import hotlever
@@ -56,3 +58,17 @@ def test_the_citation_is_of_this_version_and_licence():
     assert citation["license"] == project["license"]
     assert citation["title"] == project["name"]
     assert citation["abstract"] == project["description"]
+
+
+def test_names_of_modules_and_classes_are_unique():
+    """Who looks for one finds one."""
+    package = ROOT / "src" / "hotlever"
+    files = [path for path in package.rglob("*.py") if "examples" not in path.parts]
+    modules = Counter(path.stem for path in files if not path.stem.startswith("__"))
+    classes = Counter(
+        node.name
+        for path in files
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef)
+    )
+    assert [name for name, count in (modules + classes).items() if count > 1] == []

@@ -10,7 +10,7 @@ from hotlever.lever import Lever
 from hotlever.lever.air_fields import AirFields
 from hotlever.lever.lever import COARSE
 from hotlever.lever3d import SolidLever
-from hotlever.lever3d.fields import temperature_slices
+from hotlever.lever3d.solid_fields import temperature_slices
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.solid import SolidMeshOptions
 

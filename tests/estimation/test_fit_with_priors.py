@@ -14,7 +14,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, estimator, fit, read_fit
-from hotlever.estimate.noise import CommonError, errors_of_scales
+from hotlever.estimate.noise_model import CommonError, errors_of_scales
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.residuals import Residuals

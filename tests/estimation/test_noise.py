@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.estimate.noise import CommonError, relative_noise
+from hotlever.estimate.noise_model import CommonError, relative_noise
 from hotlever.estimate.residuals import Residuals
 from hotlever.measurement import Measurement
 

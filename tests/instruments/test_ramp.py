@@ -11,7 +11,7 @@ import pytest
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.instruments.ramp import CurveFile, Ramp, RampOptions
-from hotlever.instruments.source_meter import Reading
+from hotlever.instruments.source_meter import MeterReading
 from hotlever.instruments.twin import RampCurve, TwinBench, drawn_from_priors
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import read_measurement
@@ -29,10 +29,10 @@ class WithoutLine(TwinBench):
         """Set the bias (V)."""
         self.output_on, self.bias_V, self.limit_mA = True, bias_V, 10.0
 
-    def read(self) -> Reading:
+    def read(self) -> MeterReading:
         """Return what is shown."""
         bias, current, reader = self._shown()
-        return Reading(bias, self._noisy(current), self._noisy(reader), False)
+        return MeterReading(bias, self._noisy(current), self._noisy(reader), False)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_a_fold_is_a_limit_of_its_own():
 
 def test_compliance_ends_it_without_the_row(curve):
     class Limited(WithoutLine):
-        def read(self) -> Reading:
+        def read(self) -> MeterReading:
             return super().read()._replace(at_compliance=self.bias_V > 2.0)
 
     rows, measured = [], ramp([1.0, 1.5, 2.5])
@@ -94,7 +94,7 @@ def test_rows_of_another_lever_end_it(curve, monkeypatch):
     monkeypatch.setattr(Diagnosis, "likeliest", lambda _: "is it another lever?")
 
     class Doubled(WithoutLine):
-        def read(self) -> Reading:
+        def read(self) -> MeterReading:
             reading = super().read()
             return reading._replace(current_mA=5.0 * reading.current_mA)
 
@@ -128,7 +128,7 @@ def test_rows_are_on_disk_as_they_come_and_can_be_read(tmp_path):
     path = tmp_path / "iv.csv"
     with CurveFile(path, Probe.reference(), with_reader=True) as file:
         for bias in (1.0, 2.0, 3.0):
-            file.add(Reading(bias, 0.1 * bias, 0.05 * bias, False))
+            file.add(MeterReading(bias, 0.1 * bias, 0.05 * bias, False))
             assert path.read_text().endswith(f"{bias:g},{0.1 * bias:.9g},{0.05 * bias:.9g}\n")
     data = read_measurement(path)
     np.testing.assert_allclose(data.bias_V, [1.0, 2.0, 3.0])
@@ -143,9 +143,9 @@ def test_rows_are_on_disk_as_they_come_and_can_be_read(tmp_path):
 def test_a_full_disk_is_one_line(tmp_path, monkeypatch):
     path = tmp_path / "iv.csv"
     with CurveFile(path, Probe.reference(), with_reader=False) as file:
-        file.add(Reading(1.0, 0.1, float("nan"), False))
+        file.add(MeterReading(1.0, 0.1, float("nan"), False))
         full = OSError(errno.ENOSPC, "No space left on device")
         monkeypatch.setattr("os.fsync", Mock(side_effect=full))
         with pytest.raises(ComputationError, match=r"iv\.csv: cannot be written on \(No space"):
-            file.add(Reading(2.0, 0.2, float("nan"), False))
+            file.add(MeterReading(2.0, 0.2, float("nan"), False))
     assert "1,0.1\n" in path.read_text()

@@ -8,7 +8,7 @@ import pytest
 from hotlever.errors import ComputationError
 from hotlever.lever.branch import Reach
 from hotlever.lever.observables import at_fixed_bias
-from hotlever.lever.reduced.lever import estimated_error
+from hotlever.lever.reduced.reduced_lever import estimated_error
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.lever.reduced.training import ReductionOptions, reduce
 from hotlever.materials.parameters import OF_SILICON

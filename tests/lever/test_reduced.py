@@ -14,7 +14,7 @@ from hotlever.estimate import Measurement, fit
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.reduced_lever import ReducedLever
 from hotlever.lever.reduced.response_surface import ParameterDomain
 from hotlever.lever.reduced.training import cached_reduction
 from hotlever.probe import Probe

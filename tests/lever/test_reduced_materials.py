@@ -11,7 +11,7 @@ from hotlever.estimate.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.lever import estimated_error
+from hotlever.lever.reduced.reduced_lever import estimated_error
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain, is_papers
 from hotlever.lever.reduced.training import cached_reduction, known_reduction
 from hotlever.probe import Probe

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.raman import Correction, PeakOptions, fit_peak, lineshape, read_corrections
+from hotlever.raman import PeakOptions, SpectrumCorrection, fit_peak, lineshape, read_corrections
 from hotlever.raman.spectrum_tables import corrections_text
 
 X = np.arange(440.0, 600.0, 0.5)
@@ -29,7 +29,7 @@ def rows(text):
 def test_a_start_leads_to_the_weaker_line():
     y = two_lines()
     assert abs(fit_peak(X, y).centre - 489.0) < 0.5
-    by_hand = Correction(start=511.0, low=500.0, high=560.0).of(PeakOptions())
+    by_hand = SpectrumCorrection(start=511.0, low=500.0, high=560.0).of(PeakOptions())
     peak = fit_peak(X, y, by_hand)
     assert abs(peak.centre - 512.0) < 4 * peak.centre_stderr < 0.5
 
@@ -95,8 +95,8 @@ def test_what_cannot_be_is_a_line(refused, examples, tmp_path, text, message):
 
 def test_a_table_that_is_written_is_read(tmp_path):
     corrections = {
-        "tip/a, b.txt": Correction(start=516.25, low=490.0),
-        'map.txt[X=1 "Y"=2]': Correction(use=False),
+        "tip/a, b.txt": SpectrumCorrection(start=516.25, low=490.0),
+        'map.txt[X=1 "Y"=2]': SpectrumCorrection(use=False),
     }
     table = tmp_path / "by-hand.csv"
     table.write_text(corrections_text(corrections))

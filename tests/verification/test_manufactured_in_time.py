@@ -6,8 +6,8 @@ import numpy as np
 from made_up_fields import BASE, BIAS, LENGTH, WIDTH, Exact, nodal_state, silicon_strip, source
 from skfem.element import ElementTriP3
 
-from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper
+from hotlever.lever.transient.transient_problem import TransientProblem
 from hotlever.materials.heat import heat_capacity
 from hotlever.probe import Circuit
 

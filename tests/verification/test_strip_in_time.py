@@ -11,8 +11,8 @@ from skfem import MeshTri
 
 from hotlever.lever.lever import State
 from hotlever.lever.transient.modes import slowest_modes
-from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper
+from hotlever.lever.transient.transient_problem import TransientProblem
 from hotlever.materials import published
 from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Circuit, Terminal

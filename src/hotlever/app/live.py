@@ -29,7 +29,7 @@ from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.fields import current_path
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.reduced_lever import ReducedLever
 from hotlever.lever.reduced.response_surface import is_papers
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
 from hotlever.materials.departures import departure_of

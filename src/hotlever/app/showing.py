@@ -39,7 +39,7 @@ from hotlever.measurement import (
     with_measured_circuit,
 )
 from hotlever.quantities import FITTED
-from hotlever.raman import Correction, measure, read_lines, read_spectra
+from hotlever.raman import SpectrumCorrection, measure, read_lines, read_spectra
 from hotlever.raman.lineshape import WINDOW, in_window
 from hotlever.raman.series import MeasuredLine
 from hotlever.raman.spectrum import Spectrum
@@ -206,7 +206,7 @@ def spectra(report: Report, folders: Sequence[str]) -> list[str]:
 
 
 def spectrum(
-    report: Report, name: str, task: Task, corrections: Mapping[str, Correction]
+    report: Report, name: str, task: Task, corrections: Mapping[str, SpectrumCorrection]
 ) -> dict[str, Any]:
     """Return the counts of a spectrum, its fit, and what is read from it, in words.
 
@@ -217,7 +217,7 @@ def spectrum(
         As `spectra` has it.
     task : Task
         That of ``hotlever raman``, by whose thermometer it is read.
-    corrections : mapping of str to Correction
+    corrections : mapping of str to SpectrumCorrection
         By hand, which may be in no file yet.
     """
     counted, told, doubt = _spectrum(name), arguments_of(task.words), ""

@@ -21,7 +21,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.estimate.experiment import experiment_of
 from hotlever.estimate.file import EstimateFile, FittedParameter, rising_band
 from hotlever.estimate.knee import Knee
-from hotlever.estimate.noise import errors_of_scales
+from hotlever.estimate.noise_model import errors_of_scales
 from hotlever.estimate.objective import Objective
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.over_a_sample import with_distances

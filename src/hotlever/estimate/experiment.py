@@ -24,7 +24,7 @@ from hotlever.estimate.surrogate import CurveSurrogate, Rows, Surrogate
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.observables import Linearised, by_parameter
-from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.reduced_lever import ReducedLever
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
 from hotlever.lever.similar import SimilarLevers
 from hotlever.piecewise import spline_through

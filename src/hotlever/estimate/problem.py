@@ -14,7 +14,7 @@ import numpy as np
 from hotlever.errors import InputError
 from hotlever.estimate.experiment import Experiment, ExperimentAtRest, Model, experiment_of
 from hotlever.estimate.experiment_in_time import ExperimentInTime, known_in_time
-from hotlever.estimate.noise import errors_of_scales
+from hotlever.estimate.noise_model import errors_of_scales
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.prior_density import FLAT, PriorDensity

@@ -13,7 +13,7 @@ from copy import copy
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.estimate.noise import CommonCovariance, CommonError, DataErrors, steepness_of
+from hotlever.estimate.noise_model import CommonCovariance, CommonError, DataErrors, steepness_of
 from hotlever.estimate.options import Numerics, Weights
 from hotlever.measurement import Measurement
 from hotlever.probe.priors import PriorShift

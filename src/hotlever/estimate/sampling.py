@@ -35,7 +35,7 @@ from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.posterior import Posterior
 from hotlever.estimate.profile import ErrorProfile, hotter_rows
 from hotlever.estimate.surrogate import ReducedSurrogate
-from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.reduced_lever import ReducedLever
 from hotlever.materials import full_name
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import parameters_of, usual_parameters

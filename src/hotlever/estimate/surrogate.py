@@ -31,7 +31,7 @@ from hotlever.lever.observables import (
     observed_by,
     with_changes,
 )
-from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.reduced_lever import ReducedLever
 from hotlever.piecewise import Piecewise, crossing, spline_values
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.probe_parameters import parameters_of

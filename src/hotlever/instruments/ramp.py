@@ -22,7 +22,7 @@ import numpy as np
 from hotlever.errors import ComputationError, HotleverError, InputError, counted
 from hotlever.estimate.next_measurement import LinearisedLever, hottest_tips, plan_next
 from hotlever.estimate.row_by_row import RowByRow
-from hotlever.instruments.source_meter import Reading
+from hotlever.instruments.source_meter import MeterReading
 from hotlever.instruments.supervisor import Supervisor
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
@@ -73,7 +73,7 @@ class RampOptions:
 
 
 @dataclass(frozen=True)
-class Step:
+class NextBias:
     """A bias to take, with the tip temperature expected there, and one not exceeded with 99 %.
 
     The latter may be known to first order alone, `hotlever.estimate.likely_levers`.
@@ -100,8 +100,8 @@ class Ramp:
 
     Attributes
     ----------
-    readings : list of Reading
-    steps : list of Step
+    readings : list of MeterReading
+    steps : list of NextBias
         What was known of each before it was taken.
     reason : str
         Why no other bias was taken.
@@ -134,14 +134,14 @@ class Ramp:
         self._probe, self._bias = probe, bias
         self._spacing = float(np.diff(bias).mean()) if bias.size > 1 else float(bias[0])
         self._lever = RowByRow(probe, priors)
-        self.readings: list[Reading] = []
-        self.steps: list[Step] = []
+        self.readings: list[MeterReading] = []
+        self.steps: list[NextBias] = []
         self.reason, self.complete = "", True
 
     def measure(
         self,
         instrument: Supervisor,
-        record: Callable[[Reading, Step], None],
+        record: Callable[[MeterReading, NextBias], None],
         wait: Callable[[float], None] = time.sleep,
     ) -> None:
         """Measure row by row; what was measured so far stays known if that fails.
@@ -182,7 +182,7 @@ class Ramp:
 
     # --- what is known ----------------------------------------------------------------------------
 
-    def measurement(self, *more: Reading) -> Measurement:
+    def measurement(self, *more: MeterReading) -> Measurement:
         """Return the rows so far, and more, as a measurement."""
         bias, current, reader, _ = np.array([*self.readings, *more], dtype=float).T
         nothing = np.full(bias.size, np.nan)
@@ -190,7 +190,7 @@ class Ramp:
             bias, current, reader, nothing, nothing, medium=self._probe.surroundings.medium
         )
 
-    def _update(self, *more: Reading) -> None:
+    def _update(self, *more: MeterReading) -> None:
         """Bring what is known up to date by the rows so far, and more."""
         if len(self.readings) + len(more) < self.options.unknown_rows:
             return
@@ -227,7 +227,7 @@ class Ramp:
             limits[there] = hottest_tips(known, bias_V[there], known.likely)
         return limits
 
-    def _next_step(self) -> Step | None:
+    def _next_step(self) -> NextBias | None:
         """Return what to take next; None, with the reason, if nothing."""
         last_V = max((reading.bias_V for reading in self.readings), default=0.0)
         if self.reason:
@@ -242,7 +242,7 @@ class Ramp:
             return None
         at, known = np.array([bias]), self.known
         limit = self._tip_limits(at).item()
-        return Step(bias, known.tip(at)[0].item(), limit, known.likely.first_order)
+        return NextBias(bias, known.tip(at)[0].item(), limit, known.likely.first_order)
 
     @property
     def tells(self) -> bool:
@@ -337,7 +337,7 @@ class CurveFile:
         """Write a line of words."""
         self._write(f"# {text}")
 
-    def add(self, reading: Reading) -> None:
+    def add(self, reading: MeterReading) -> None:
         """Write a row, the first one behind what heads the columns."""
         if not self._has_heads:
             quantities = [QUANTITIES[name] for name in self._names]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pyvisa.resources import MessageBasedResource
 
 
-class Reading(NamedTuple):
+class MeterReading(NamedTuple):
     """What instruments show at one bias.
 
     Attributes
@@ -33,7 +33,7 @@ class Reading(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Dialect:
+class CommandSet:
     """The SCPI commands of some source meters.
 
     Attributes
@@ -56,8 +56,8 @@ class Dialect:
 
 
 #: Of Keithley's (their reference manuals 2450-901-01 and 2400S-900-01, sections on SCPI).
-DIALECTS = {
-    "Keithley 2450, 2460, 2461, 2470": Dialect(
+COMMAND_SETS = {
+    "Keithley 2450, 2460, 2461, 2470": CommandSet(
         r"MODEL 24(50|60|61|70)\b",
         (
             "*RST",
@@ -71,7 +71,7 @@ DIALECTS = {
         ':READ? "defbuffer1", SOUR, READ',
         ":SOUR:VOLT:ILIM:TRIP?",
     ),
-    "Keithley 2400, 2410, 2420, 2425, 2430, 2440": Dialect(
+    "Keithley 2400, 2410, 2420, 2425, 2430, 2440": CommandSet(
         r"MODEL 24(00|10|20|25|30|40)\b",
         (
             "*RST",
@@ -158,14 +158,14 @@ class SourceMeter:
     ----------
     resource, identity : str
         Its VISA resource name, and what it says of itself.
-    dialect : Dialect
+    dialect : CommandSet
     source : pyvisa.resources.MessageBasedResource
     reader : pyvisa.resources.MessageBasedResource or None
     """
 
     resource: str
     identity: str
-    dialect: Dialect
+    dialect: CommandSet
     source: MessageBasedResource
     reader: MessageBasedResource | None = None
 
@@ -182,12 +182,13 @@ class SourceMeter:
             source = lines.enter_context(closing(open_line(resource, timeout_s)))
             identity = _asked(source, "*IDN?", resource)
             dialect = next(
-                (each for each in DIALECTS.values() if re.search(each.model, identity, re.I)), None
+                (each for each in COMMAND_SETS.values() if re.search(each.model, identity, re.I)),
+                None,
             )
             if dialect is None:
                 raise InputError(
                     f"{resource}: found {excerpt(identity, 60)!r}, expected a source meter whose "
-                    f"commands are known: {'; '.join(DIALECTS)}"
+                    f"commands are known: {'; '.join(COMMAND_SETS)}"
                 )
             voltmeter = None if reader is None else open_line(reader, timeout_s)
             lines.pop_all()
@@ -218,7 +219,7 @@ class SourceMeter:
         self._send(f":SOUR:VOLT {bias_V:.7g}")
         self._check()
 
-    def read(self) -> Reading:
+    def read(self) -> MeterReading:
         """Read bias, current and the voltage of the reader.
 
         Raises
@@ -233,7 +234,7 @@ class SourceMeter:
         if self.reader is not None:
             # of voltmeters of all makers (SCPI-1999, volume 2, MEASure)
             (reader_V,) = self._numbers(self.reader, ":MEAS:VOLT:DC?", 1)
-        return Reading(bias_V, 1e3 * current_A, reader_V, tripped != 0.0)
+        return MeterReading(bias_V, 1e3 * current_A, reader_V, tripped != 0.0)
 
     def turn_off(self) -> bool:
         """Turn the output off; return whether the source confirms it."""

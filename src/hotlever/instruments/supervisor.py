@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from hotlever.errors import HotleverError, InstrumentError, unforeseen_error
-from hotlever.instruments.source_meter import Reading, SourceMeter, load_lines
+from hotlever.instruments.source_meter import MeterReading, SourceMeter, load_lines
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,9 @@ class Supervisor:
         """Set the bias (V)."""
         self._ask(bias_V)
 
-    def read(self) -> Reading:
+    def read(self) -> MeterReading:
         """Return what the instruments show."""
-        reading: Reading = self._ask("read")
+        reading: MeterReading = self._ask("read")
         return reading
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:

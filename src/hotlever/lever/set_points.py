@@ -138,13 +138,13 @@ def hold(
     if not targets.size or not (np.isfinite(targets) & (targets > 0.0)).all():
         raise InputError(f"held {held}: expected finite set points above 0 {HELD[held].unit}")
     branch, failure = as_far_as_possible(lambda: lever.branch(np.inf, progress))
-    held_states = _Along(lever, branch, HELD[held]).held_at(targets)
+    held_states = _HeldAlong(lever, branch, HELD[held]).held_at(targets)
     if failure is not None:
         held_states.data.attrs["notes"] += f"\nno hotter state was looked for: {failure}"
     return held_states
 
 
-class _Along:
+class _HeldAlong:
     """A quantity along a branch, as far as the swept supply heats the lever."""
 
     def __init__(self, lever: Lever, branch: Branch, quantity: HeldQuantity) -> None:

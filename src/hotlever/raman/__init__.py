@@ -13,7 +13,7 @@ from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.series import calibrate_from, measure, read_lines
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.spectrum_reading import read_spectra, read_spectrum
-from hotlever.raman.spectrum_tables import Correction, read_corrections
+from hotlever.raman.spectrum_tables import SpectrumCorrection, read_corrections
 from hotlever.raman.thermometer import (
     Point,
     RamanCalibration,

@@ -29,11 +29,11 @@ from hotlever.raman.lineshape import (
     SIGMA_PER_FWHM,
     At,
     Band,
+    FittedLine,
     LineProblem,
     NoSiliconLine,
     Peak,
     PeakOptions,
-    Solution,
     in_window,
     observed_width,
     width_of,
@@ -287,7 +287,7 @@ def _coarse_background(x: Array, y: Array) -> tuple[float, float]:
 
 def _refine(
     problem: LineProblem, start: Array, use: Mask, variance: Array, passes: int = 8
-) -> Solution:
+) -> FittedLine:
     """Fit, judge noise and spikes by the fit, and again until neither changes."""
     y, p = problem.y, start
     settled = False
@@ -298,7 +298,7 @@ def _refine(
         if not np.all(np.isfinite(value)):
             break
         used, assumed = use, variance
-        so_far = Solution(problem, p, value, variance, use)
+        so_far = FittedLine(problem, p, value, variance, use)
         # how far the true line may differ from the model before that is taken for a cosmic ray:
         # where the fit leaves noise alone, where it does not, and on a coarse axis, where pixels
         # and the instrument's response shape the line
@@ -318,10 +318,12 @@ def _refine(
     # settled, the weights of the last pass are within 2 %: the errors take the newest scale
     if not settled:
         p = problem.solve(p, variance, use)
-    return Solution(problem, p, problem.evaluate(p)[0], variance, use)
+    return FittedLine(problem, p, problem.evaluate(p)[0], variance, use)
 
 
-def _with_band(plain: Solution, band_fwhm: float = 25.0, spread: float = 0.6) -> Solution | None:
+def _with_band(
+    plain: FittedLine, band_fwhm: float = 25.0, spread: float = 0.6
+) -> FittedLine | None:
     """The best fit with a broad band on the low side, or None if there is none.
 
     A soft prior holds ln fwhm of the band within a spread of that of `band_fwhm`, cm⁻¹.
@@ -352,14 +354,14 @@ def _with_band(plain: Solution, band_fwhm: float = 25.0, spread: float = 0.6) ->
     return max(filter(_sound, fits), key=lambda fit: _gain(plain, fit), default=None)
 
 
-def _gain(plain: Solution, richer: Solution) -> float:
+def _gain(plain: FittedLine, richer: FittedLine) -> float:
     """Drop of chi-square with a band, on the samples that both fits use."""
     both, y = richer.use & plain.use, plain.problem.y
     drop = (y - plain.value) ** 2 - (y - richer.value) ** 2
     return float(np.sum(drop[both] / richer.variance[both]))
 
 
-def _sound(fitted: Solution) -> bool:
+def _sound(fitted: FittedLine) -> bool:
     """Whether the band is one: positive, on the low side, beside a line of sane width."""
     p = fitted.p
     return bool(
@@ -371,7 +373,7 @@ def _sound(fitted: Solution) -> bool:
     )
 
 
-def _peak(solution: Solution) -> Peak | None:
+def _peak(solution: FittedLine) -> Peak | None:
     """Read the result off the solution and flag what a user should know; None if it is no line."""
     problem, p, x = solution.problem, solution.p, solution.problem.x
     if np.isnan(p).any():

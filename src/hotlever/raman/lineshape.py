@@ -209,7 +209,7 @@ class LineProblem:
 
 
 @dataclass(frozen=True)
-class Solution:
+class FittedLine:
     """Parameters that fit a spectrum, the curve, the noise it leaves, and the samples used."""
 
     problem: LineProblem

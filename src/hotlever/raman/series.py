@@ -15,7 +15,7 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.raman.line_fit import fit_peak, with_hidden_top
 from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.spectrum import Spectrum, aliases
-from hotlever.raman.spectrum_tables import Correction, of_spectrum
+from hotlever.raman.spectrum_tables import SpectrumCorrection, of_spectrum
 from hotlever.raman.thermometer import Point, RamanCalibration, Thermometer, calibrate_raman
 from hotlever.steps import each
 from hotlever.types import Progress
@@ -40,7 +40,7 @@ class MeasuredLine:
 
     spectrum: Spectrum
     peak: Peak | None
-    correction: Correction = field(default_factory=Correction)  #: by hand
+    correction: SpectrumCorrection = field(default_factory=SpectrumCorrection)  #: by hand
 
     @property
     def window(self) -> tuple[float, float]:
@@ -53,14 +53,14 @@ class MeasuredLine:
         if not self.correction.use:
             return ["left-out"]
         flags = ["no-line"] if self.peak is None else list(self.peak.flags)
-        return flags if self.correction == Correction() else [*flags, "by-hand"]
+        return flags if self.correction == SpectrumCorrection() else [*flags, "by-hand"]
 
 
 def measure(
     spectra: Sequence[Spectrum],
     options: PeakOptions | None = None,
     progress: Progress | None = None,
-    corrections: Mapping[str, Correction] | None = None,
+    corrections: Mapping[str, SpectrumCorrection] | None = None,
 ) -> list[MeasuredLine]:
     """Fit the silicon line of each spectrum.
 
@@ -73,7 +73,7 @@ def measure(
     options : PeakOptions, optional
     progress : callable, optional
         Called with (spectra done, in all).
-    corrections : mapping of Correction, optional
+    corrections : mapping of SpectrumCorrection, optional
         By hand, by the name of the spectrum; see `read_corrections`.
 
     Returns
@@ -93,7 +93,7 @@ def measure(
     return lines if options.band_evidence is not None else _together(lines, options)
 
 
-def _line(spectrum: Spectrum, correction: Correction, options: PeakOptions) -> MeasuredLine:
+def _line(spectrum: Spectrum, correction: SpectrumCorrection, options: PeakOptions) -> MeasuredLine:
     peak = None
     if correction.use:
         with suppress(NoSiliconLine):
@@ -176,7 +176,7 @@ def calibrate_from(
     temperatures: dict[str, float] | None = None,
     progress: Progress | None = None,
     source: str = "hot-plate series",
-    corrections: Mapping[str, Correction] | None = None,
+    corrections: Mapping[str, SpectrumCorrection] | None = None,
 ) -> tuple[RamanCalibration, list[MeasuredLine]]:
     """Calibrate from hot-plate spectra, each with its temperature by header or file name.
 

@@ -70,7 +70,7 @@ def read_temperatures(path: str | os.PathLike[str]) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Correction:
+class SpectrumCorrection:
     """Of one spectrum; what is left out is as for all."""
 
     start: float | None = None  #: the line's place, cm⁻¹, near enough for the fit to begin there
@@ -83,7 +83,7 @@ class Correction:
 
         Examples
         --------
-        >>> Correction(start=516.0, high=540.0).of(PeakOptions()).window
+        >>> SpectrumCorrection(start=516.0, high=540.0).of(PeakOptions()).window
         (440.0, 540.0)
         """
         low, high = options.window
@@ -92,12 +92,12 @@ class Correction:
         return replace(options, start=start, window=window)
 
 
-def corrections_text(corrections: Mapping[str, Correction]) -> str:
+def corrections_text(corrections: Mapping[str, SpectrumCorrection]) -> str:
     """Return the table that `read_corrections` reads.
 
     Examples
     --------
-    >>> print(corrections_text({"tip_04.txt": Correction(start=516.5)}), end="")
+    >>> print(corrections_text({"tip_04.txt": SpectrumCorrection(start=516.5)}), end="")
     file,start_cm-1,from_cm-1,to_cm-1,use
     tip_04.txt,516.5,,,yes
     """
@@ -111,7 +111,7 @@ def corrections_text(corrections: Mapping[str, Correction]) -> str:
     return written.getvalue()
 
 
-def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
+def read_corrections(path: str | os.PathLike[str]) -> dict[str, SpectrumCorrection]:
     """Read a table of corrections: one row for each spectrum that needs one.
 
     Parameters
@@ -145,7 +145,7 @@ def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
             f"{table.where(-1)}: found {excerpt(', '.join(table.names))}, expected the column file "
             f"and any of {', '.join(COLUMNS[1:])}, each once"
         )
-    corrections: dict[str, Correction] = {}
+    corrections: dict[str, SpectrumCorrection] = {}
     nothing = np.full(len(table.rows), np.nan)
     numbers = [
         table.numbers(heads.index(name), name) if name in heads else nothing
@@ -160,7 +160,7 @@ def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
         use = cells[heads.index("use")].strip().lower() if "use" in heads else ""
         if use not in ("", "yes", "no"):
             raise InputError(f"{table.where(row)}: use: found '{excerpt(use)}', expected yes or no")
-        corrections[name] = Correction(start, low, high, use != "no")
+        corrections[name] = SpectrumCorrection(start, low, high, use != "no")
         try:
             corrections[name].of(PeakOptions())
         except InputError as error:
@@ -168,14 +168,16 @@ def read_corrections(path: str | os.PathLike[str]) -> dict[str, Correction]:
     return corrections
 
 
-def of_spectrum(spectrum: Spectrum, corrections: Mapping[str, Correction]) -> Correction:
+def of_spectrum(
+    spectrum: Spectrum, corrections: Mapping[str, SpectrumCorrection]
+) -> SpectrumCorrection:
     """Return what is said of a spectrum, the row with the most folders before its name first."""
     names = _names(spectrum) if corrections else []
-    return next((corrections[name] for name in names if name in corrections), Correction())
+    return next((corrections[name] for name in names if name in corrections), SpectrumCorrection())
 
 
 def check_corrections(
-    corrections: Mapping[str, Correction], spectra: Iterable[Spectrum], where: str
+    corrections: Mapping[str, SpectrumCorrection], spectra: Iterable[Spectrum], where: str
 ) -> list[str]:
     """Check that there is a spectrum for each correction.
 

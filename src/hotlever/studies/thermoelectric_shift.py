@@ -31,7 +31,7 @@ from hotlever.errors import ComputationError
 from hotlever.lever import Lever, State
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.laws import LawsAtPoints
+from hotlever.lever.laws_at_points import LawsAtPoints
 from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP
 from hotlever.lever.transport import Fluxes, Properties, dot

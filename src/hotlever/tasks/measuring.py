@@ -18,8 +18,8 @@ from hotlever.tasks.parsing import check_number, parse_bias, parse_temperature
 from hotlever.units import setting
 
 if TYPE_CHECKING:
-    from hotlever.instruments.ramp import Ramp, Step
-    from hotlever.instruments.source_meter import Reading
+    from hotlever.instruments.ramp import NextBias, Ramp
+    from hotlever.instruments.source_meter import MeterReading
     from hotlever.probe import Probe
 
 #: The source that is no instrument.
@@ -97,7 +97,7 @@ def measure_lever(
         CurveFile(output, like, of_reader is not None) as file,
     ):
 
-        def record(reading: Reading, step: Step) -> None:
+        def record(reading: MeterReading, step: NextBias) -> None:
             file.add(reading)
             reporter.tell(_row(len(ramp.readings), reading, step))
             reporter.show("rows", _rows(ramp))
@@ -154,7 +154,7 @@ def _instruments(
         reporter.note(f"the tip of this twin was {twin.hottest_K:.0f} K at its hottest")
 
 
-def _row(number: int, reading: Reading, step: Step) -> str:
+def _row(number: int, reading: MeterReading, step: NextBias) -> str:
     """Return a row in words."""
     how = "to first order" if step.first_order else "with 99 %"
     return (

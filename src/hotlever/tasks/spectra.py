@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hotlever.raman.lineshape import PeakOptions
     from hotlever.raman.series import MeasuredLine
     from hotlever.raman.spectrum import Spectrum
-    from hotlever.raman.spectrum_tables import Correction
+    from hotlever.raman.spectrum_tables import SpectrumCorrection
     from hotlever.raman.thermometer import RamanCalibration, Thermometer
 
 
@@ -166,7 +166,7 @@ class Thermometry:
     thermometer: Thermometer | None = None
     hot_plate: Sequence[MeasuredLine] = ()
     spectra: Sequence[Spectrum] = ()
-    corrections: Mapping[str, Correction] = field(default_factory=dict)
+    corrections: Mapping[str, SpectrumCorrection] = field(default_factory=dict)
     corrected_by: str = ""  #: name of the table
 
     def measure(self, paths: Sequence[Path]) -> tuple[list[MeasuredLine], xr.Dataset]:
@@ -224,7 +224,7 @@ def _measure(
     reporter: Reporter,
     spectra: Sequence[Spectrum],
     options: PeakOptions,
-    corrections: Mapping[str, Correction],
+    corrections: Mapping[str, SpectrumCorrection],
     label: str,
 ) -> list[MeasuredLine]:
     """Fit the lines of spectra; those of many that have none are noted."""

@@ -15,8 +15,8 @@ from hotlever.lever.transient import (
     with_times,
 )
 from hotlever.lever.transient.modes import slowest_modes
-from hotlever.lever.transient.problem import TransientProblem
 from hotlever.lever.transient.runge_kutta import Stepper
+from hotlever.lever.transient.transient_problem import TransientProblem
 from hotlever.probe import Circuit
 
 

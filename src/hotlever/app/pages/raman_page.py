@@ -30,7 +30,7 @@ from hotlever.app.project import CORRECTIONS
 from hotlever.app.session import Job, Session, Task
 from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
-from hotlever.raman import Correction, read_corrections
+from hotlever.raman import SpectrumCorrection, read_corrections
 from hotlever.raman.spectrum_tables import corrections_text
 
 
@@ -291,11 +291,11 @@ class OneSpectrum:
     def _correct(self, **what: Any) -> Awaitable[None] | None:
         """Take a correction, which is written when all are measured, and show what follows."""
         corrections = dict(self._page.chosen["corrections"])
-        before = corrections.pop(self._name, Correction())
+        before = corrections.pop(self._name, SpectrumCorrection())
         after = replace(before, **what)
         if after == before:
             return None
-        if after != Correction():
+        if after != SpectrumCorrection():
             corrections[self._name] = after
         self._page.chosen["corrections"] = corrections
         self._turn += 1
@@ -319,7 +319,7 @@ class OneSpectrum:
             return
         if turn != self._turn or self._all.is_deleted:  # another one has been chosen meanwhile
             return
-        correction = corrections.get(name, Correction())
+        correction = corrections.get(name, SpectrumCorrection())
         self._quiet = True
         for key, number in self._numbers.items():
             number.set_value(getattr(correction, key))

@@ -12,9 +12,9 @@ from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.lever.equations import ELECTRICAL_OUTPUTS
 from hotlever.lever.lever import Lever
 from hotlever.lever.observables import Linearised
-from hotlever.lever.reduced.lever import ReducedLever
+from hotlever.lever.reduced.reduced_lever import ReducedLever
+from hotlever.lever.reduced.reduced_space import ReducedSpace, empirical_cubature
 from hotlever.lever.reduced.response_surface import ParameterDomain, ResponseSurface
-from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
 from hotlever.materials import full_name
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import of_materials

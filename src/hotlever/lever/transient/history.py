@@ -15,8 +15,8 @@ from hotlever.lever.dataset import in_a_file, probe_attributes, range_notes
 from hotlever.lever.lever import State
 from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.observables import with_following
-from hotlever.lever.transient.problem import MONITORED, TransientProblem
-from hotlever.lever.transient.runge_kutta import Step, Stepper, hermite
+from hotlever.lever.transient.runge_kutta import Stepper, TimeStep, hermite
+from hotlever.lever.transient.transient_problem import MONITORED, TransientProblem
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.types import Array, Progress
 
@@ -44,7 +44,7 @@ def time_steps(
     tolerance_K: float,
     start: State | None = None,
     stops: Sequence[float] = (),
-) -> Iterator[tuple[Piece, Step]]:
+) -> Iterator[tuple[Piece, TimeStep]]:
     """Give the steps of a lever under a wave form, each with the piece it belongs to.
 
     Steps end at all stops (µs) on the way.
@@ -193,7 +193,7 @@ class _Recorder:
         self.bias: list[float] = []
         self.values: list[Array] = []
 
-    def add(self, piece: Piece, step: Step) -> float | None:
+    def add(self, piece: Piece, step: TimeStep) -> float | None:
         """Add the rows of a step; return when silicon melts, if it does."""
         values, slopes = self._read(step)
         if not self.time and (self._report_times is None or self._report_times[0] == 0.0):
@@ -210,7 +210,7 @@ class _Recorder:
             self._add(piece, step, values, slopes, t)
         return melts
 
-    def _add(self, piece: Piece, step: Step, values: Array, slopes: Array, t: float) -> None:
+    def _add(self, piece: Piece, step: TimeStep, values: Array, slopes: Array, t: float) -> None:
         self.time.append(t)
         self.bias.append(piece.bias(t))
         self.values.append(hermite(step.start, step.end, values, slopes, t))
@@ -220,7 +220,7 @@ class _Recorder:
             x, in_air, _ = np.split(step.between(t), [own, both])
             self._callback(t, State(self._lever, x, in_air))
 
-    def _read(self, step: Step) -> tuple[Array, Array]:
+    def _read(self, step: TimeStep) -> tuple[Array, Array]:
         """Return values and slopes (per µs) at both ends of the next step, each (9 + rows, 2).
 
         Behind what is `_REPORTED` come the rows of the monitors.
@@ -244,7 +244,7 @@ class _Recorder:
         return values, np.concatenate(by_time)
 
 
-def _melts(step: Step, values: Array, slopes: Array, limit_K: float) -> float | None:
+def _melts(step: TimeStep, values: Array, slopes: Array, limit_K: float) -> float | None:
     """Return when the hottest place reaches a limit within a step."""
     row = [_REPORTED.index("max_K")]
     if values[row[0], 1] < limit_K:

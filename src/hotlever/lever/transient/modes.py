@@ -26,7 +26,7 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import State
 from hotlever.lever.space import LEVER
 from hotlever.lever.transient.history import integrate
-from hotlever.lever.transient.problem import InCircuit
+from hotlever.lever.transient.transient_problem import InCircuit
 from hotlever.lever.transient.waveform import Waveform, step, switched_off
 from hotlever.threads import one_blas_thread
 from hotlever.types import Array

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from hotlever.lever.equations import LeverEquations
-from hotlever.lever.laws import LawsAtPoints
+from hotlever.lever.laws_at_points import LawsAtPoints
 from hotlever.lever.lever import State
-from hotlever.lever.reduced.space import ReducedSpace, empirical_cubature
+from hotlever.lever.reduced.reduced_space import ReducedSpace, empirical_cubature
 from hotlever.lever.space import Space
 from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind
@@ -136,7 +136,7 @@ class TabulatedLaws(LawsAtPoints):
     ) -> tuple[Properties, dict[str, Properties]]:
         """Return the properties; derivatives by parameters are not looked up.
 
-        See `hotlever.lever.laws.LawsAtPoints.properties`.
+        See `hotlever.lever.laws_at_points.LawsAtPoints.properties`.
         """
         if tuple(names) != ("T",):
             return super().properties(T, names)
@@ -146,7 +146,7 @@ class TabulatedLaws(LawsAtPoints):
         return now, {"T": by_T}
 
     def heat_density(self, T: Array) -> tuple[Array, Array]:
-        """See `hotlever.lever.laws.LawsAtPoints.heat_density`."""
+        """See `hotlever.lever.laws_at_points.LawsAtPoints.heat_density`."""
         values, slopes = self._look_up(T)
         return values[-1], slopes[-1]
 

@@ -186,7 +186,7 @@ ARK436L2SA = Tableau(
 )
 
 
-class LinearSolver(Protocol):
+class StageSolver(Protocol):
     """A factorised Jacobian."""
 
     def solve(self, right_hand_side: Array) -> Array:
@@ -194,7 +194,7 @@ class LinearSolver(Protocol):
         ...
 
 
-class Problem(Protocol):
+class SteppedProblem(Protocol):
     """What is stepped in time, for one column of unknowns (size + 1, 1).
 
     Attributes
@@ -218,7 +218,7 @@ class Problem(Protocol):
         """Return what is lost per unit of time, or the algebraic residual, (size + 1, 1)."""
         ...
 
-    def factorised(self, x: Array, rate: float) -> LinearSolver:
+    def factorised(self, x: Array, rate: float) -> StageSolver:
         """Return the factorised Jacobian of ``rate × storage + residual``."""
         ...
 
@@ -232,7 +232,7 @@ class Problem(Protocol):
 
 
 @dataclass(frozen=True)
-class Step:
+class TimeStep:
     """A step, and what is between its ends.
 
     Attributes
@@ -242,12 +242,12 @@ class Step:
     x, slopes : ndarray, shape (size + 1, 2)
         The unknowns at both ends, and their derivatives by time.
     monitored, monitored_slopes : ndarray, shape (k, 2)
-        `Problem.monitored` at both ends, and their derivatives by time.
+        `SteppedProblem.monitored` at both ends, and their derivatives by time.
     added : ndarray, shape (k,)
         Their integrals over the step.
     stages : ndarray, shape (size + 1, stages)
         The unknowns at the start and in each stage.
-    factors : LinearSolver
+    factors : StageSolver
         Of the Jacobian of all stages, nearly.
     """
 
@@ -259,7 +259,7 @@ class Step:
     monitored_slopes: Array
     added: Array
     stages: Array
-    factors: LinearSolver
+    factors: StageSolver
 
     def between(self, t: float) -> Array:
         """Return the unknowns at a time within the step, (size + 1, 1)."""
@@ -276,13 +276,13 @@ def hermite(start: float, end: float, values: Array, slopes: Array, t: float) ->
 
 
 class Stepper:
-    """Steps a problem from one time to another, restarting where its `Problem.residual` jumps.
+    """Steps a problem from one time to another; restarts where its `SteppedProblem.residual` jumps.
 
     Parameters
     ----------
-    problem : Problem
+    problem : SteppedProblem
     tolerance : float
-        Largest estimated error of a step, by `Problem.norm`.
+        Largest estimated error of a step, by `SteppedProblem.norm`.
     options : StepperOptions, optional
 
     Attributes
@@ -294,7 +294,7 @@ class Stepper:
     """
 
     def __init__(
-        self, problem: Problem, tolerance: float, options: StepperOptions | None = None
+        self, problem: SteppedProblem, tolerance: float, options: StepperOptions | None = None
     ) -> None:
         self._problem, self._tolerance = problem, tolerance
         self._options = options = options or StepperOptions()
@@ -311,7 +311,7 @@ class Stepper:
         longest: float,
         first: float | None = None,
         stops: Sequence[float] = (),
-    ) -> Iterator[Step]:
+    ) -> Iterator[TimeStep]:
         """Give the steps from one time to another, none longer than a given one.
 
         What is stored at `x` is kept, the algebraic rows are fulfilled first. The length of the
@@ -355,7 +355,7 @@ class Stepper:
         here, soon = problem.monitored(np.hstack([x, x + moment * slope])).T
         return _Reached(t, x, slope, stored, flow, here, (soon - here) / moment)
 
-    def _step(self, here: _Reached, then: float) -> tuple[Step, _Reached, float]:
+    def _step(self, here: _Reached, then: float) -> tuple[TimeStep, _Reached, float]:
         """Try a step; return it, what it reaches, and its error."""
         length = then - here.t
         problem, rate, root = self._problem, 1.0 / (ARK436L2SA.diagonal * length), None
@@ -380,7 +380,7 @@ class Stepper:
         there = _Reached(
             then, root.x, slope, root.stored, flows[:, -1:], monitored[:, -1], monitored_slopes
         )
-        step = Step(
+        step = TimeStep(
             here.t,
             then,
             states[:, [0, -1]],
@@ -447,7 +447,7 @@ class _Root:
 
     x: Array
     stored: Array
-    factors: LinearSolver
+    factors: StageSolver
     left: float
 
 

@@ -19,8 +19,8 @@ from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.newton import refined
 from hotlever.lever.observables import observed, observed_by
 from hotlever.lever.transient.history import checked_times, time_steps
-from hotlever.lever.transient.problem import TransientProblem
-from hotlever.lever.transient.runge_kutta import ARK436L2SA, INSTANT_RATE, LinearSolver, Step
+from hotlever.lever.transient.runge_kutta import ARK436L2SA, INSTANT_RATE, StageSolver, TimeStep
+from hotlever.lever.transient.transient_problem import TransientProblem
 from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import dimensions_of, parameters_of
@@ -98,7 +98,7 @@ def with_sensitivities(
                 f"no derivatives in time by {name} are known, expected parameters of materials, "
                 "series_resistance_ohm or gas_conductivity"
             )
-    rows, along, stops = [], _Along(lever, names), times.tolist()
+    rows, along, stops = [], _SensitivitiesAlong(lever, names), times.tolist()
     for piece, step in time_steps(lever, waveform, float(times[-1]), tolerance_K, stops=stops):
         first = along.time is None
         along.add(piece, step)
@@ -126,7 +126,7 @@ def with_sensitivities(
     )
 
 
-class _Along:
+class _SensitivitiesAlong:
     """Derivatives of the unknowns (rows, 1, k) that go along with the steps."""
 
     def __init__(self, lever: Lever, names: Sequence[str]) -> None:
@@ -135,7 +135,7 @@ class _Along:
         self.time: float | None = None
         self.slopes_at_start = np.empty((len(OBSERVABLES), len(self._names)))
 
-    def add(self, piece: Piece, step: Step) -> None:
+    def add(self, piece: Piece, step: TimeStep) -> None:
         """Go on over the next step."""
         x = step.x[:, :1]
         problem = TransientProblem(self._lever.equations, self._lever.circuit, piece.bias)
@@ -159,7 +159,7 @@ class _Along:
         self._flow = -problem.change(x, self._changes, 0.0) - residual
         self._stored = problem.storage_change(x, self._changes) + stored
 
-    def _over(self, problem: TransientProblem, step: Step) -> None:
+    def _over(self, problem: TransientProblem, step: TimeStep) -> None:
         """Differentiate each stage of a step."""
         length = step.end - step.start
         rate, flows = 1.0 / (ARK436L2SA.diagonal * length), [self._flow]
@@ -178,7 +178,7 @@ class _Along:
         self._changes, self._stored, self._flow = changes, stored, flows[-1]
 
     def _solved(
-        self, problem: TransientProblem, x: Array, right: Array, rate: float, factors: LinearSolver
+        self, problem: TransientProblem, x: Array, right: Array, rate: float, factors: StageSolver
     ) -> Array:
         """Solve with factors of a state nearby."""
         return refined(

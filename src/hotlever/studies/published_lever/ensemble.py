@@ -35,7 +35,7 @@ REFERENCE = "reference"
 FOLDER = files("hotlever") / "studies" / "published_lever"
 
 
-class Layout(Record):
+class CandidateLayout(Record):
     """One layout of the paper's lever."""
 
     name: str = Field(description="by its length, or by what it is")
@@ -57,12 +57,12 @@ def probe_of(length_um: float, values: Mapping[str, float], option: str) -> Prob
     return Probe.reference().with_(length_um=length_um, **values, **material.model_dump())
 
 
-def reference(names: Iterable[str]) -> Layout:
+def reference(names: Iterable[str]) -> CandidateLayout:
     """Return the layout of the reference probe, by the names of its values."""
     probe = Probe.reference()
     values = dict(zip(names, probe.values(list(names)).tolist(), strict=True))
     length = probe.values(["length_um"]).item()
-    return Layout(name=REFERENCE, length_um=length, values=values, drawn=False, square=0.0)
+    return CandidateLayout(name=REFERENCE, length_um=length, values=values, drawn=False, square=0.0)
 
 
 def stored_table(name: str, *keys: str) -> pd.DataFrame:
@@ -72,10 +72,10 @@ def stored_table(name: str, *keys: str) -> pd.DataFrame:
 
 
 @cache
-def stored_layouts() -> dict[str, Layout]:
+def stored_layouts() -> dict[str, CandidateLayout]:
     """Return the layouts by name: the reference, those that suit best, those after drawn errors."""
     stored: dict[str, Any] = tomllib.loads((FOLDER / "layouts.toml").read_text(encoding="utf-8"))
-    found = [Layout.from_values(each, "layouts.toml") for each in stored["layout"]]
+    found = [CandidateLayout.from_values(each, "layouts.toml") for each in stored["layout"]]
     return {each.name: each for each in [reference(found[0].values), *found]}
 
 

@@ -22,8 +22,8 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.newton import NewtonOptions, NewtonResult
 from hotlever.lever.observables import Linearised, at_fixed_bias
+from hotlever.lever.reduced.reduced_space import ReducedSpace
 from hotlever.lever.reduced.response_surface import ParameterDomain, ResponseSurface
-from hotlever.lever.reduced.space import ReducedSpace
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.solved_states import Constrained, solve_at
 from hotlever.lever.space import TIP

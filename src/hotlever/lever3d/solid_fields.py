@@ -17,7 +17,7 @@ from hotlever.errors import InputError
 from hotlever.files import whole_file
 from hotlever.lever.fields import Surface, fields_file, seen_from_above, write_fields
 from hotlever.lever.lever import State
-from hotlever.lever3d.lever import SolidLever, surface_nodes
+from hotlever.lever3d.solid_lever import SolidLever, surface_nodes
 from hotlever.lever3d.still_air import ngsolve
 from hotlever.materials.air import temperature_from_kirchhoff
 from hotlever.probe.solid import material_names

@@ -85,7 +85,7 @@ class WithStores:
 
 
 class TransientProblem:
-    """See the module's text and `hotlever.lever.transient.runge_kutta.Problem`.
+    """See the module's text and `hotlever.lever.transient.runge_kutta.SteppedProblem`.
 
     The unknowns are those of the lever (size + 1) and below them the temperatures of the stores in
     the air, if it takes up heat itself.
