@@ -34,7 +34,7 @@ from hotlever.air.surface import lever_surface
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.placed_films import PlacedFilm
+from hotlever.lever.layers_at_points import PlacedFilm
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever3d import SolidLever
 from hotlever.materials import LOW_DOPED

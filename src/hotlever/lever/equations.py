@@ -29,8 +29,8 @@ from hotlever.air.stores import HeatInAir
 from hotlever.contact.law import ContactLaw, contact_of
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.laws_at_points import LawsAtPoints
+from hotlever.lever.layers_at_points import Rim
 from hotlever.lever.newton import refined
-from hotlever.lever.placed_films import Rim
 from hotlever.lever.space import LEVER, TIP, Constraint, Factors, Space, SurfaceTangent
 from hotlever.lever.terminals import Terminals
 from hotlever.lever.transport import (

@@ -21,7 +21,7 @@ from hotlever.air.operator import AirOperator
 from hotlever.air.stores import HeatInAir
 from hotlever.lever.elements import FacetPoints, FiniteElements, LinearMap, numbered
 from hotlever.lever.factorisation import FactorisationOptions
-from hotlever.lever.placed_films import Rim, placed_films
+from hotlever.lever.layers_at_points import Rim, placed_films
 from hotlever.lever.space import Constraint, Space, SurfaceTangent
 from hotlever.lever.sparse_jacobian import ElementLosses, SparseJacobian
 from hotlever.lever.transport import Tangent

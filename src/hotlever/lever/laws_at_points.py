@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from hotlever.errors import ComputationError
-from hotlever.lever.placed_films import PlacedFilm, Rim
+from hotlever.lever.layers_at_points import PlacedFilm, Rim
 from hotlever.lever.space import Space
 from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind, full_name

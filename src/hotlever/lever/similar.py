@@ -13,10 +13,10 @@ from hotlever.lever.branch import Branch, Reach
 from hotlever.lever.continuation import ContinuationOptions, continued
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
+from hotlever.lever.layers_at_points import PlacedFilm, thickness_at
 from hotlever.lever.lever import Lever
 from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.observables import Linearised
-from hotlever.lever.placed_films import PlacedFilm, thickness_at
 from hotlever.lever.solved_states import solve_at
 from hotlever.lever.transport import Motion
 from hotlever.probe import Probe

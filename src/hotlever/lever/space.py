@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.lever.elements import FiniteElements, LinearMap
-from hotlever.lever.placed_films import PlacedFilm, Rim
+from hotlever.lever.layers_at_points import PlacedFilm, Rim
 from hotlever.lever.transport import Fields, Fluxes, Tangent
 from hotlever.types import Array, Index, Mask
 

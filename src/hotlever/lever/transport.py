@@ -249,8 +249,7 @@ class Motion:
     tip : ndarray, shape (nodes,)
         Of the weights that give the rise of the tip temperature.
     rim : tuple of ndarray, shape (k, 1)
-        Of the surface at the points of each film of a `hotlever.lever.placed_films.Rim`, over their
-        weights.
+        Of the surface at the points of each film of a `layers_at_points.Rim`, over their weights.
     """
 
     strain: Array

@@ -19,7 +19,7 @@ from scipy.sparse import csr_matrix
 from hotlever.air.coupling import ReducedAir
 from hotlever.lever.elements import LinearMap
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.placed_films import Rim, at_some
+from hotlever.lever.layers_at_points import Rim, at_some
 from hotlever.lever.space import Constraint, Space, SurfaceTangent
 from hotlever.lever.transport import Tangent
 from hotlever.types import Array, Index, Mask
