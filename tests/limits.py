@@ -5,7 +5,9 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+
+import psutil
 
 
 def as_in_a_terminal(command: list[str], ignored: str = "") -> list[str]:
@@ -22,6 +24,26 @@ def as_in_a_terminal(command: list[str], ignored: str = "") -> list[str]:
         "os.execvp(sys.argv[2], sys.argv[2:])"
     )
     return [sys.executable, "-I", "-S", "-c", prepare, ignored or "-", *command]
+
+
+def processes_below(
+    process: psutil.Process | None = None, word: str = "spawn_main"
+) -> list[psutil.Process]:
+    """Return what a process, or this one, has started, directly or not, by a word of its command.
+
+    What has ended is none, whether or not somebody has waited for it; by default the word is that
+    of processes that are started by spawn.
+    """
+    with suppress(psutil.NoSuchProcess):
+        every = (process or psutil.Process()).children(recursive=True)
+        return [one for one in every if any(word in part for part in _command_of(one))]
+    return []
+
+
+def _command_of(process: psutil.Process) -> list[str]:
+    with suppress(psutil.NoSuchProcess):
+        return process.cmdline()
+    return []
 
 
 @contextmanager

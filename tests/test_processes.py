@@ -16,7 +16,7 @@ import pytest
 
 from hotlever.errors import ComputationError, InputError
 from hotlever.processes import Patience, WorkerDiedError, local_executor, run_all
-from limits import as_in_a_terminal
+from limits import as_in_a_terminal, processes_below
 
 # --- tasks --------------------------------------------------------------------------------------
 
@@ -62,11 +62,6 @@ def fail(kind: str) -> None:
 def workers():
     with local_executor(2) as processes:
         yield processes
-
-
-def children() -> list[psutil.Process]:
-    processes = psutil.Process().children(recursive=True)
-    return [process for process in processes if "spawn_main" in " ".join(process.cmdline())]
 
 
 # --- tests --------------------------------------------------------------------------------------
@@ -129,8 +124,8 @@ def test_nobody_can_connect_to_them():
     before = psutil.Process().net_connections("inet")
     with local_executor(2):
         assert psutil.Process().net_connections("inet") == before
-        assert len(children()) >= 2
-        assert not any(process.net_connections("inet") for process in children())
+        assert len(processes_below()) >= 2
+        assert not any(process.net_connections("inet") for process in processes_below())
 
 
 def test_a_task_that_cannot_be_sent_is_an_error(workers):
@@ -144,11 +139,12 @@ SCRIPT = """
 import os, sys
 from hotlever.processes import local_executor, run_all
 sys.path.insert(0, {folder!r})
-from test_processes import children, slow
+from limits import processes_below
+from test_processes import slow
 if __name__ == "__main__":
     with local_executor(2) as workers:
         for _ in run_all(workers, slow, [(0.01,), (0.01,), (60.0,), (60.0,)]):
-            print(*(process.pid for process in children()), flush=True)
+            print(*(process.pid for process in processes_below()), flush=True)
 """
 
 

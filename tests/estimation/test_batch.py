@@ -12,7 +12,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-import psutil
 import pytest
 
 import experiments
@@ -21,6 +20,7 @@ from hotlever.estimate import FitOptions
 from hotlever.estimate.many import Batch, fit_many, lever_names
 from hotlever.lever import Lever
 from hotlever.processes import Patience
+from limits import processes_below
 
 BIAS = np.linspace(2, 11, 7)
 #: Two parameters are left to find: the fits are not what is tested.
@@ -66,14 +66,6 @@ def levers(texts: list[str], tmp_path: Path) -> list[Path]:
     return paths
 
 
-def workers() -> list[psutil.Process]:
-    return [
-        child
-        for child in psutil.Process().children(recursive=True)
-        if any("spawn_main" in word for word in child.cmdline())
-    ]
-
-
 def found(batch: Batch) -> list[float]:
     return [fit.parameters["c_kappa"].value for fit in batch.results.values()]
 
@@ -83,7 +75,7 @@ def test_killing_a_worker_loses_nothing(levers, tmp_path):
 
     def kill_one(done: int, total: int) -> None:
         if done == 1:
-            killed.append(workers()[0])
+            killed.append(processes_below()[0])
             killed[0].kill()
 
     batch = fit_many(levers, tmp_path / "out", None, OPTIONS, processes=2, progress=kill_one)
@@ -91,7 +83,7 @@ def test_killing_a_worker_loses_nothing(levers, tmp_path):
     assert batch.exit_status == 0
     assert list(batch.results) == ["lever-0", "lever-1", "lever-2"]
     assert found(batch) == pytest.approx(TRUTHS, abs=1e-3)
-    assert workers() == []
+    assert processes_below() == []
 
 
 def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
@@ -104,7 +96,7 @@ def test_what_was_stopped_goes_on_and_bad_files_are_said(levers, run, tmp_path):
         fit_many(levers, out, None, OPTIONS, processes=1, progress=stop)
     written = {path: path.read_text() for path in out.iterdir()}
     assert len(written) == 2
-    assert workers() == []
+    assert processes_below() == []
 
     (tmp_path / "bad.csv").write_text("V_b (V),I_h (mA)\n1,high\n")
     (tmp_path / "few.csv").write_text("V_b (V),I_h (mA),T_tip (K)\n1,0.1,\n,,\n2,,\n")

@@ -22,6 +22,7 @@ import pytest
 from size import SHARE, cases
 
 from hotlever.lever import Lever
+from limits import processes_below
 
 COMMAND = [sys.executable, "-m", "hotlever"]
 #: How many there are with ``make test-hostile``: of batches on this machine and on a cluster, and
@@ -83,14 +84,6 @@ def same(content: Any, expected: Any) -> bool:
     return bool(content == expected)
 
 
-def below(process: psutil.Process, word: str = "spawn_main") -> list[psutil.Process]:
-    """Processes that it started, by a word of their command."""
-    with suppress(psutil.NoSuchProcess):
-        every = process.children(recursive=True)
-        return [one for one in every if any(word in part for part in one.cmdline())]
-    return []
-
-
 def write_levers(lever: Lever, folder: Path) -> list[str]:
     bias, names = np.linspace(2.0, 11.0, 9), [f"lever-{number}.csv" for number in range(6)]
     for number, name in enumerate(names):
@@ -132,7 +125,7 @@ class Cluster:
 
     def kill(self, rng: np.random.Generator) -> str:
         scheduler, nannies = (psutil.Process(one.pid) for one in self._processes)
-        workers = below(nannies)
+        workers = processes_below(nannies)
         if not workers or rng.random() < 0.15:
             scheduler.kill()
             return "scheduler"
@@ -157,7 +150,7 @@ class Local:
 
     def kill(self, rng: np.random.Generator) -> str:
         """Return what was killed, if anything was there."""
-        workers = below(psutil.Process())
+        workers = processes_below()
         if workers:
             workers[rng.integers(len(workers))].kill()
         return "worker" if workers else ""
