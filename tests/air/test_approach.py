@@ -50,9 +50,12 @@ def check(first: np.ndarray, second: np.ndarray, motion: np.ndarray) -> None:
 
     there = Panels(second[None])
     square = square_distances(fixed, there)
-    found = moving.near_pairs(fixed, there, pair, pair)[0]
-    assert found == pytest.approx(slope(near, 1e-4), rel=1e-7)
-    assert moving.far_pairs(fixed, there, square)[0, 0] == pytest.approx(slope(far, 1e-4), rel=1e-7)
+    value, change = moving.near_pairs(fixed, there, pair, pair)[:, 0]
+    assert value == pytest.approx(near(0.0), rel=1e-13)
+    assert change == pytest.approx(slope(near, 1e-4), rel=1e-7)
+    value, change = moving.far_pairs(fixed, there, square)[:, 0, 0]
+    assert value == pytest.approx(far(0.0), rel=1e-13)
+    assert change == pytest.approx(slope(far, 1e-4), rel=1e-7)
 
 
 @pytest.mark.parametrize("one", range(3))

@@ -76,7 +76,7 @@ def test_points_of_both_serve_pairs_that_are_apart(other):
     def approach(offsets):
         return offsets[..., 2] / length(offsets) ** 3
 
-    (found,) = Approach(motion).near_pairs(first, second, pair, pair)
+    _, (found,) = Approach(motion).near_pairs(first, second, pair, pair)
     assert found == pytest.approx(by_gauss(first, second, approach), rel=3e-3)
 
 

@@ -64,23 +64,24 @@ class Laplace:
 
 
 class Approach:
-    """The kernel m·∇(1/R), the derivative of 1/R by a motion m of the second point.
+    """The kernel 1/R and m·∇(1/R), its derivative by a motion m of the second point, side by side.
 
-    See `hotlever.air.single_layer.Kernel`.
+    See `hotlever.air.single_layer.Kernel`. The two are made of the same distances, logarithms and
+    angles, so that the second takes a third of what it would take alone.
 
     Parameters
     ----------
     motion : ndarray, shape (3,)
     """
 
-    shape: tuple[int, ...] = ()
+    shape: tuple[int, ...] = (2,)
     dtype, far = Laplace.dtype, Laplace.far
 
     def __init__(self, motion: Array) -> None:
         self._motion, self._upwards = motion, not motion[:2].any()
 
     def far_pairs(self, first: Panels, second: Panels, square: Array) -> Array:
-        """Return the integrals over distant pairs: the derivative of the same expansion."""
+        """Return the integrals over distant pairs, (2, n, m): an expansion and its derivative."""
         inverse, middle = 1.0 / np.maximum(square, COINCIDENT), first.centres.mean(axis=0)
         at, others_at = first.centres - middle, second.centres - middle
         along = np.subtract.outer(at @ self._motion, others_at @ self._motion)
@@ -88,39 +89,43 @@ class Approach:
         mine, others = (panels.moments @ self._motion for panels in (first, second))
         turned = at @ others.T - mine @ others_at.T
         turned += np.subtract.outer((at * mine).sum(axis=1), (others_at * others).sum(axis=1))
-        spread, both = spreads(first, second), traces(first, second)
-        slope = along * (1.0 + inverse * (7.5 * spread * inverse - 1.5 * both))
-        slope -= 3.0 * turned * inverse
-        return np.asarray(np.outer(first.areas, second.areas) * slope * inverse**1.5)
+        spread, both = 1.5 * spreads(first, second) * inverse, 0.5 * traces(first, second)
+        expanded = np.empty((2, *square.shape))
+        expanded[0] = 1.0 + inverse * (spread - both)
+        expanded[1] = along * (inverse + inverse**2 * (5.0 * spread - 3.0 * both))
+        expanded[1] -= 3.0 * turned * inverse**2
+        expanded *= np.outer(first.areas, second.areas) * np.sqrt(inverse)
+        return expanded
 
     def near_pairs(self, first: Panels, second: Panels, i: Index, j: Index) -> Array:
-        """Return the integrals: closed for rectangles in one frame that move upwards."""
+        """Return the integrals, (2, n): closed for rectangles in one frame that move upwards."""
 
         def over_panel(points: Array, corners: Array) -> Array:
             sides = _seen_from(points, corners)
             in_plane = ((sides.outward @ self._motion) * sides.inverse).sum(axis=-1)
-            return in_plane + (sides.normal @ self._motion) * np.sign(sides.height) * sides.angle
+            facing = (sides.normal @ self._motion) * np.sign(sides.height)
+            return np.stack([sides.potential, in_plane + facing * sides.angle])
 
         def between_points(offsets: Array) -> Array:
+            inverse = 1.0 / _length(offsets)
             along = np.tensordot(self._motion, offsets, axes=1)
-            return np.asarray(along / _length(offsets) ** 3)
+            return np.stack([inverse, along * inverse**3])
 
         apart = separations(first, second, i, j) >= Laplace.apart
         closed = ~apart & _in_one_frame(first, second, i, j) & self._upwards
         others = ~(apart | closed)
-        result = np.empty(len(i))
-        result[apart] = pairs_by_points_of_both(
+        result = np.empty((2, len(i)))
+        result[:, apart] = pairs_by_points_of_both(
             first, second, i[apart], j[apart], between_points, 2
         )
-        result[closed] = self._motion[2] * _raised_rectangle_pairs(
-            first.chosen(i[closed]), second.chosen(j[closed])
-        )
-        result[others] = pairs_by_points(
+        rising = _rectangles(first.chosen(i[closed]), second.chosen(j[closed]), rising=True)
+        result[:, closed] = rising * np.array([[1.0], [self._motion[2]]])
+        result[:, others] = pairs_by_points(
             first.chosen(i[others]),
             second.chosen(j[others]),
             over_panel,
             Laplace.orders,
-            odd=True,
+            swapped=(1.0, -1.0),
         )
         return result
 
@@ -155,8 +160,7 @@ def potential(points: Array, corners: Array) -> Array:
     ndarray, shape (...)
         µm.
     """
-    sides = _seen_from(points, corners)
-    return (sides.across * sides.inverse).sum(axis=-1) - np.abs(sides.height) * sides.angle
+    return _seen_from(points, corners).potential
 
 
 class _Sides(NamedTuple):
@@ -168,6 +172,12 @@ class _Sides(NamedTuple):
     normal: Array  #: of the plane, (..., 3)
     height: Array  #: of the point above the plane (µm), (...)
     angle: Array  #: solid angle, (...)
+
+    @property
+    def potential(self) -> Array:
+        """∫ 1/R over the polygon (µm), (...)."""
+        around = (self.across * self.inverse).sum(axis=-1)
+        return np.asarray(around - np.abs(self.height) * self.angle)
 
 
 def _seen_from(points: Array, corners: Array) -> _Sides:
@@ -235,15 +245,25 @@ def rectangle_pairs(first: Panels, second: Panels) -> Array:
     ndarray, shape (n,)
         µm³.
     """
-    result = np.empty(len(first))
+    return np.asarray(_rectangles(first, second, rising=False)[0])
+
+
+def _rectangles(first: Panels, second: Panels, *, rising: bool) -> Array:
+    """Return what `rectangle_pairs` does, (1, n), or it and its change as the second rises."""
+    result = np.empty((1 + rising, len(first)))
     for pairs, (normal, other_normal), d in _by_orientation(first, second):
         if normal == other_normal:
             u, v = (axis for axis in range(3) if axis != normal)
-            result[pairs] = _parallel(d[:, u], d[:, v], d[0, normal])
+            by = (u, v, normal).index(2) if rising else None
+            result[:, pairs] = _parallel(d[:, u], d[:, v], d[0, normal], by)
         else:
             shared = 3 - normal - other_normal
+            by = (shared, other_normal, normal).index(2) if rising else None
             # along the normal of one rectangle only the other extends
-            result[pairs] = _perpendicular(d[:, shared], d[[0, 1], other_normal], d[[0, 2], normal])
+            sides = d[:, shared], d[[0, 1], other_normal], d[[0, 2], normal]
+            result[:, pairs] = _perpendicular(*sides, by)
+    # the differences fall as the second rises
+    result[1:] *= -1.0
     return result
 
 
@@ -273,98 +293,56 @@ def _by_orientation(
                 yield pairs, (normal, other_normal), differences[..., pairs]
 
 
-def _parallel(u: Array, v: Array, w: Array) -> Array:
-    """Return ∫∫ 1/R over parallel rectangles: differences (4, n) along both sides, distance."""
+def _parallel(u: Array, v: Array, w: Array, by: int | None) -> Array:
+    """Return ∫∫ 1/R over parallel rectangles: differences (4, n) along both sides, distance.
+
+    And its derivative by the number of one of these; the first is not asked for.
+    """
     a, b, c = u[:, None], v[None, :], np.abs(w)
     aa, bb, cc = a * a, b * b, c * c
     distance = np.sqrt(aa + bb + cc)
-    terms = 0.5 * (bb - cc) * a * _asinh(a, bb + cc)
-    terms += 0.5 * (aa - cc) * b * _asinh(b, aa + cc)
+    of_a, of_b = _asinh(a, bb + cc), _asinh(b, aa + cc)
+    angle = np.arctan2(a * b, c * distance)
+    terms = 0.5 * (bb - cc) * a * of_a
+    terms += 0.5 * (aa - cc) * b * of_b
     terms -= (aa + bb - 2.0 * cc) * distance / 6.0
-    terms -= a * b * c * np.arctan2(a * b, c * distance)
-    total: Array = np.einsum("u,v,uvn->n", _TWICE, _TWICE, terms)
-    return total
+    terms -= a * b * c * angle
+    both = [terms]
+    if by == 1:
+        both.append(a * b * of_a + 0.5 * (aa - cc) * of_b - 0.5 * b * distance - a * c * angle)
+    elif by == 2:
+        both.append(np.sign(w) * (c * (distance - a * of_a - b * of_b) - a * b * angle))
+    return np.stack([np.einsum("u,v,uvn->n", _TWICE, _TWICE, each) for each in both])
 
 
-def _perpendicular(u: Array, v: Array, w: Array) -> Array:
+def _perpendicular(u: Array, v: Array, w: Array, by: int | None) -> Array:
     """Return ∫∫ 1/R over rectangles at right angles.
 
     Differences along the side that both share (4, n), and (2, n) along the other side of the
-    first and of the second rectangle.
+    first and of the second rectangle. And its derivative by the number of one of these.
     """
     a, b, c = u[:, None, None], v[None, :, None], w[None, None, :]
     aa, bb, cc = a * a, b * b, c * c
     distance = np.sqrt(aa + bb + cc)
-    terms = (aa / 2 - cc / 6) * c * _asinh(b, aa + cc)
-    terms += (aa / 2 - bb / 6) * b * _asinh(c, aa + bb)
-    terms += a * b * c * _asinh(a, bb + cc)
+    of_a, of_b, of_c = _asinh(a, bb + cc), _asinh(b, aa + cc), _asinh(c, aa + bb)
+    angle_a, angle_b, angle_c = (
+        np.arctan(product / np.where(np.abs(below) < _TINY, _TINY, below))
+        for product, below in ((b * c, a * distance), (a * c, b * distance), (a * b, c * distance))
+    )
+    terms = (aa / 2 - cc / 6) * c * of_b
+    terms += (aa / 2 - bb / 6) * b * of_c
+    terms += a * b * c * of_a
     terms -= b * c * distance / 3.0
-    for power, product, height in (
-        (aa * a / 6, b * c, a),
-        (a * bb / 2, a * c, b),
-        (a * cc / 2, a * b, c),
-    ):
-        below = height * distance
-        terms -= power * np.arctan(product / np.where(np.abs(below) < _TINY, _TINY, below))
-    total: Array = np.einsum("u,v,w,uvwn->n", _TWICE, _ONCE, _ONCE, terms)
-    return total
-
-
-def _raised_rectangle_pairs(first: Panels, second: Panels) -> Array:
-    """Return the derivatives by the height of the second of rectangles in one frame, (n,)."""
-    result = np.empty(len(first))
-    for pairs, (normal, other_normal), d in _by_orientation(first, second):
-        if normal == other_normal == 2:
-            terms = _apart(*_grid(d, 0, 1), d[0, 2])
-            total = np.einsum("u,v,uvn->n", _TWICE, _TWICE, terms)
-        elif normal == other_normal:
-            terms = _aside(*_grid(d, 1 - normal, 2), d[0, normal])
-            total = np.einsum("u,v,uvn->n", _TWICE, _TWICE, terms)
-        else:
-            # along the normal of one rectangle only the other extends
-            shared = 3 - normal - other_normal
-            a = d[:, shared][:, None, None]
-            b, c = d[[0, 1], other_normal][None, :, None], d[[0, 2], normal][None, None, :]
-            if shared == 2:
-                terms = _box(a, b, c)
-            else:
-                terms = _aside(a, c, b) if other_normal == 2 else _aside(a, b, c)
-            total = np.einsum("u,v,w,uvwn->n", _TWICE, _ONCE, _ONCE, terms)
-        # the differences fall as the second rises
-        result[pairs] = -total
-    return result
-
-
-def _grid(d: Array, u: int, v: int) -> tuple[Array, Array]:
-    return d[:, u][:, None], d[:, v][None, :]
-
-
-def _apart(a: Array, b: Array, c: Array) -> Array:
-    """Return −∫∫∫∫ c/R³ by a and b twice each, at the distance c."""
-    aa, bb, cc = a * a, b * b, c * c
-    distance = np.sqrt(aa + bb + cc)
-    size = np.abs(c)
-    terms = size * (distance - a * _asinh(a, bb + cc) - b * _asinh(b, aa + cc))
-    return np.asarray(np.sign(c) * (terms - a * b * np.arctan2(a * b, size * distance)))
-
-
-def _aside(a: Array, b: Array, c: Array) -> Array:
-    """Return ∫∫∫ 1/R by a twice and b once, at the distance c."""
-    aa, bb, cc = a * a, b * b, c * c
-    distance = np.sqrt(aa + bb + cc)
-    terms = a * b * _asinh(a, bb + cc) + 0.5 * (aa - cc) * _asinh(b, aa + cc) - 0.5 * b * distance
-    return np.asarray(terms - a * np.abs(c) * np.arctan2(a * b, np.abs(c) * distance))
-
-
-def _box(a: Array, b: Array, c: Array) -> Array:
-    """Return ∫∫∫ 1/R by a, b and c once each."""
-    total = np.zeros(np.broadcast_shapes(a.shape, b.shape, c.shape))
-    distance = np.sqrt(a * a + b * b + c * c)
-    for u, v, w in ((a, b, c), (b, c, a), (c, a, b)):
-        total += u * v * _asinh(w, u * u + v * v)
-        below = np.abs(u) * distance
-        total -= 0.5 * u * np.abs(u) * np.arctan2(v * w, below)
-    return total
+    terms -= a * (aa / 6 * angle_a + bb / 2 * angle_b + cc / 2 * angle_c)
+    both = [terms]
+    if by == 0:
+        angles = aa * angle_a + bb * angle_b + cc * angle_c
+        both.append(a * b * of_c + b * c * of_a + c * a * of_b - 0.5 * angles)
+    elif by == 1:
+        both.append(a * c * of_a + 0.5 * (aa - bb) * of_c - 0.5 * c * distance - a * b * angle_b)
+    elif by == 2:
+        both.append(a * b * of_a + 0.5 * (aa - cc) * of_b - 0.5 * b * distance - a * c * angle_c)
+    return np.stack([np.einsum("u,v,w,uvwn->n", _TWICE, _ONCE, _ONCE, each) for each in both])
 
 
 def _asinh(length: Array, square: Array) -> Array:

@@ -23,7 +23,7 @@ from scipy.sparse import csr_matrix
 
 from hotlever.air.bodies import BaseLine, chip_panels
 from hotlever.air.laplace import Approach, Laplace, layer_potential
-from hotlever.air.panels import IDENTITY, Mirror, Panels, mirror_group
+from hotlever.air.panels import Mirror, Panels, mirror_group
 from hotlever.air.single_layer import Numbers, Screened, single_layer_matrix
 from hotlever.cache import cache_file, store_arrays, stored
 from hotlever.errors import ComputationError, InputError
@@ -186,9 +186,12 @@ class PanelledAir:
         jump[own] = surroundings.jump_length_um(surroundings.jump_temperature_K)
         self._over_thickness = float(jump[0]) / layout.thickness_um
         if below:
+            # the images move twice as far as the surface, along its normal
+            motion = (np.eye(3) - below[0].matrix) @ np.array([0.0, 0.0, -1.0])
+            layer, self._layer_by_gap = single_layer_matrix(
+                self.panels, Approach(motion), below, progress
+            )
             # at other distances the lever itself is the same
-            images = [mirror for mirror in self.mirrors if mirror is not IDENTITY]
-            layer = single_layer_matrix(self.panels, Laplace(), images, progress)
             layer += bodies.layer
         else:
             layer = single_layer_matrix(self.panels, Laplace(), self.mirrors, progress)
@@ -265,7 +268,7 @@ class PanelledAir:
         if math.isnan(self._gap):
             return operator
         # the largest products of matrices here, of which no more than six digits are asked
-        sites, change = len(heat), self._by_unknowns(self._layer_by_gap()).astype(np.float32)
+        sites, change = len(heat), self._by_unknowns(self._layer_by_gap).astype(np.float32)
         by_theta, others = by_theta.astype(np.float32), others.astype(np.float32)
         # the change is symmetric: half of what is between the other unknowns on either side
         half = others.T @ (
@@ -278,13 +281,6 @@ class PanelledAir:
             matrix_by_gap=0.5 * (more + more.T),
             filling_by_gap=float(-2.0 * (1.0 - jumped) * per_heat * more.sum()),
         )
-
-    def _layer_by_gap(self) -> Array:
-        """Return the derivative of the single layer by the gap: the images move."""
-        below = self.mirrors[-1]
-        # twice as far as the surface, along its normal
-        motion = (np.eye(3) - below.matrix) @ np.array([0.0, 0.0, -1.0])
-        return np.asarray(single_layer_matrix(self.panels, Approach(motion), [below]))
 
     def admittances(self, q: Numbers, shapes: Array) -> Numbers:
         """Return the heat lost (mW) where θ changes in time, as it is tested with some shapes.

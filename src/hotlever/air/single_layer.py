@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hotlever.air.panels import (
     COINCIDENT,
@@ -179,8 +179,7 @@ def pairs_by_points(
     second: Panels,
     over_panel: Callable[[Array, Array], Numbers],
     orders: Sequence[tuple[int, float]],
-    *,
-    odd: bool = False,
+    swapped: ArrayLike = 1.0,
 ) -> Numbers:
     """Integrate over pairs of any panels: exactly over the larger, by Gauss points over the other.
 
@@ -192,8 +191,8 @@ def pairs_by_points(
     orders : sequence of (int, float)
         Gauss points per direction, and up to how many times the sum of their radii the centroids of
         two panels are apart for which they suffice.
-    odd : bool
-        Whether the kernel changes its sign where the two panels change places.
+    swapped : array_like
+        By what each function of the kernel is multiplied where the two panels change places.
 
     Returns
     -------
@@ -214,7 +213,7 @@ def pairs_by_points(
             integrals.append(np.einsum("nq,...nq->...n", weights, values))
             numbers.append(pairs)
     whole = np.concatenate(integrals, axis=-1)[..., np.argsort(np.concatenate(numbers))]
-    return np.where(first.radii > second.radii, -whole, whole) if odd else whole
+    return np.where(smaller[:, 0, 0], whole, np.expand_dims(swapped, -1) * whole)
 
 
 # --- air that takes up heat -----------------------------------------------------------------------

@@ -315,7 +315,9 @@ def best_resolved(data: xr.Dataset, noise: NoiseOptions) -> list[list[str]]:
     density = data.resolution_nm_per_rtHz
     if not np.isfinite(density.values).any():
         return []
-    best = data.isel(density.argmin(...))
+    # xarray's own argmin would import Dask, where that is there
+    place = np.unravel_index(np.nanargmin(density.values), density.shape)
+    best = data.isel(dict(zip(density.dims, map(int, place), strict=True)))
     resolution = float(best.resolution_nm_per_rtHz)
     whole = resolution * np.sqrt(noise.high_Hz - noise.low_Hz)
     where = f"{float(best.surface_gap_um):.4g} µm, {float(best.bias_V):.4g} V"
