@@ -29,6 +29,18 @@ def test_priors_are_about_the_circuit_of_the_measurement(reference):
     assert own.parameters["series_resistance_ohm"].value == pytest.approx(3000.0, rel=5e-3)
 
 
+def test_no_limit_is_below_the_base_of_a_lever_of_which_next_to_nothing_is_known(reference):
+    """A heater cools nothing; what is below the stated base is what is not known of that."""
+    curve = measured_curve(reference, np.random.default_rng(0), noise=0.01, points=8, to_V=4.0)
+    calibration = calibrate(measurement_of(curve), priors={"c_kappa": "×/ 4", "a0": "×/ 2"})
+    table = calibration.table
+    base_K = calibration.probe.circuit.base_temperature_K
+    limit = base_K - 1.96 * table.budget_K.sel(source="base temperature").values
+    assert (table.tip_low_K.values >= np.minimum(limit, table.tip_K.values) - 1e-3).all()
+    # an error the same either way would reach below it
+    assert (table.tip_K.values - 1.96 * table.tip_stderr_K.values < limit).any()
+
+
 @pytest.mark.slow
 def test_edges_that_are_off_together_are_known_by_one_prior():
     """Each dimension by itself would have to be many times its tolerance away.

@@ -99,6 +99,9 @@ def tip_by_bias(
         high = np.where(here, np.maximum(high, jump.hot_K), high)
         either = here * (jump.hot_K - jump.cold_K) / (2.0 * BAND)
         parts["jump"] = np.hypot(parts.get("jump", 0.0), either)
+    # nothing cools a tip below its base, as far as that is known
+    coldest = circuit.base_temperature_K - BAND * parts.get("base temperature", 0.0)
+    low = np.minimum(np.maximum(low, coldest), tip)
     more, budgets = dict[str, Array](), {"budget_K": parts}
     if probe.contact is not None:
         more, budgets["apex_budget_K"] = _at_the_contact(solution, predicted, parts)
