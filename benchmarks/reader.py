@@ -1,8 +1,10 @@
-"""A reader over a surface: its slope, plates near each other, noise, and levers beside each other.
+"""A reader over a surface: its slope, panels, plates, noise, and levers beside each other.
 
-python benchmarks/reader.py [slopes|plates|noise|levers]
+python benchmarks/reader.py [slopes|panels|plates|noise|levers]
 
 slopes: the derivative by the distance against differences of fourth order.
+panels: what is read with panels of several sizes, against those of two thirds of the usual size in
+free space.
 plates: the heat from the middle of a wide lever against κ/z and, with jumps, κ/(z + g + g');
 and what one jump length for 600 K is off, against plates whose jumps are by the gas at each.
 noise: Johnson noise of 2.5 kΩ at 600 K; temperature fluctuations against equipartition.
@@ -33,7 +35,7 @@ from hotlever.materials.air import (
     thermal_conductivity_of_air,
 )
 from hotlever.probe.drawing import Drawing, Layer, rectangle
-from problems import table
+from problems import EXAMPLE, table
 
 OVER = Probe.reference().with_(medium="air", accommodation=1.0, surface_gap_um=1.0)
 HEATED = {
@@ -62,6 +64,32 @@ def slopes() -> None:
             off = [abs(a / (weights @ b) - 1.0) for a, b in zip(found, (voltage, ohm), strict=True)]
             rows.append([name, f"{gap:g}", f"{found[0]:.5g}", *(f"{each:.0e}" for each in off)])
     table(["read at", "distance (µm)", "dV/dz (V/µm)", "off", "d ln R/dz off"], rows)
+
+
+def panels() -> None:
+    """Print how far what is read is from that of fine panels."""
+    published = Probe.coerce(EXAMPLE.with_name("uiuc-lever.toml"))
+    published = published.with_(accommodation=1.0, surface_gap_um=1.0)
+    cases = {
+        "reference": (OVER, 8.0, (0.3, 1.0)),
+        "reference, no jump": (Probe.reference().with_(medium="air"), 8.0, (0.2,)),
+        "reference, reader at 2 V": (OVER.with_(**HEATED), 6.0, (0.5,)),
+        "reference, 2°, chip": (OVER.with_(chip=True, surface_tilt_deg=2.0), 8.0, (5.0,)),
+        "uiuc-lever": (published, 4.0, (0.2, 1.0, 5.0)),
+    }
+    rows = []
+    for name, (probe, bias, gaps) in cases.items():
+        for gap in gaps:
+            over, found = probe.with_(surface_gap_um=gap), []
+            for size in (1.5, 1.0, 0.7, 0.5):
+                mesh = replace(COARSE, panels=size, panels_over_surface=size)
+                data = over_surface(Lever(over, mesh), [gap], [bias])
+                rise = data.tip_K.item() - BASE
+                found.append([data[key].item() for key in ("reader_V", "dV_dz_V_per_um")] + [rise])
+                if size < 1.5:
+                    off = np.array(found[-1]) / found[0] - 1.0
+                    rows.append([name, f"{gap:g}", f"{size:g}", *(f"{each:.0e}" for each in off)])
+    table(["lever", "distance (µm)", "panels", "V off", "dV/dz off", "rise off"], rows)
 
 
 def wide_plate() -> Probe:
@@ -205,7 +233,7 @@ def rise_by_power(lever: Lever) -> float:
 
 
 if __name__ == "__main__":
-    chosen = sys.argv[1:] or ["slopes", "plates", "noise", "levers"]
-    for name in chosen:
-        {"slopes": slopes, "plates": plates, "noise": noise, "levers": levers}[name]()
+    parts = {"slopes": slopes, "panels": panels, "plates": plates, "noise": noise, "levers": levers}
+    for name in sys.argv[1:] or parts:
+        parts[name]()
         print()

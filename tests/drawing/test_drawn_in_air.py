@@ -60,7 +60,10 @@ def test_the_reference_probe_as_a_drawing(tmp_path, parametric, turn):
 def test_panels_of_a_slanted_lever_are_fine_enough(tmp_path, surroundings, panels):
     """It has an arc and a hole."""
     probe = pointed(tmp_path).with_(medium="air", **surroundings)
-    coarse, fine = (Lever(probe, MeshOptions(panels=one)).sweep([3.0, 9.0]) for one in panels)
+    coarse, fine = (
+        Lever(probe, MeshOptions(panels=one, panels_over_surface=one)).sweep([3.0, 9.0])
+        for one in panels
+    )
     np.testing.assert_allclose(coarse.tip_K - 293.0, fine.tip_K - 293.0, rtol=1e-3)
     np.testing.assert_allclose(coarse.air_heat_mW, fine.air_heat_mW, rtol=2e-3)
     np.testing.assert_allclose(coarse.current_mA, fine.current_mA, rtol=1e-4)

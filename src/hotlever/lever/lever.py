@@ -67,8 +67,6 @@ class Lever:
     space : FullSpace
         Mesh and operators, which levers of one shape share.
     equations : LeverEquations
-    panels : float
-        How fine the panels of the surface are, where there is air.
 
     Examples
     --------
@@ -93,7 +91,7 @@ class Lever:
         if space is None and mesh is None:
             space = chosen_space(self.probe)
         mesh = mesh or MeshOptions()
-        self.panels = mesh.panels
+        self._panels = mesh.panels, min(mesh.panels, mesh.panels_over_surface)
         self.space = space or flat_space(self.probe.layout(), mesh, self.probe.wiring)
         if self.space.air.medium != self.medium:
             self.space = self._surrounded(self.space, progress)
@@ -106,6 +104,11 @@ class Lever:
     def _surrounded(self, space: FullSpace, progress: Progress | None = None) -> FullSpace:
         """Return a space in the probe's surroundings."""
         return surrounded(space, self.probe, self.panels, progress)
+
+    @property
+    def panels(self) -> float:
+        """How fine the panels of the lever are, where there is air."""
+        return self._panels[self.probe.surroundings.surface_gap_um is not None]
 
     @property
     def circuit(self) -> Circuit:

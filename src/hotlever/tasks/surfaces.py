@@ -315,24 +315,29 @@ def best_resolved(data: xr.Dataset, noise: NoiseOptions) -> list[list[str]]:
     density = data.resolution_nm_per_rtHz
     if not np.isfinite(density.values).any():
         return []
-    # xarray's own argmin would import Dask, where that is there
+    # by its values: at one point xarray would import Dask, which takes as long as to solve a lever
     place = np.unravel_index(np.nanargmin(density.values), density.shape)
-    best = data.isel(dict(zip(density.dims, map(int, place), strict=True)))
-    resolution = float(best.resolution_nm_per_rtHz)
+    number = dict(zip(density.dims, place, strict=True))
+
+    def best(name: str) -> Any:
+        column = data[name]
+        return column.values[tuple(number[dim] for dim in column.dims if dim in number)]
+
+    resolution = float(best("resolution_nm_per_rtHz"))
     whole = resolution * np.sqrt(noise.high_Hz - noise.low_Hz)
-    where = f"{float(best.surface_gap_um):.4g} µm, {float(best.bias_V):.4g} V"
+    where = f"{best('surface_gap_um'):.4g} µm, {best('bias_V'):.4g} V"
     rows = [
-        ["resolved best", f"{where}, tip at {float(best.tip_K):.0f} K"],
+        ["resolved best", f"{where}, tip at {best('tip_K'):.0f} K"],
         ["resolution", f"{1e3 * resolution:.3g} pm/√Hz, {whole:.3g} nm in the band"],
-        ["noise", f"{1e9 * float(best.noise_V_per_rtHz):.3g} nV/√Hz, of its square"],
+        ["noise", f"{1e9 * best('noise_V_per_rtHz'):.3g} nV/√Hz, of its square"],
     ]
-    for source in best.source.values.tolist():
-        share = float((best.source_V_per_rtHz.sel(source=source) / best.noise_V_per_rtHz) ** 2)
+    shares = (best("source_V_per_rtHz") / best("noise_V_per_rtHz")) ** 2
+    for source, share in zip(data.source.values.tolist(), shares.tolist(), strict=True):
         if share:
             rows.append([f"  {source}", f"{100 * share:.3g} %"])
     if not noise.hooge:
         rows.append(["  1/f noise", "not counted (--hooge)"])
-    if np.isfinite(best.crosstalk_V_per_V):
-        per_V, per_mW = float(best.crosstalk_V_per_V), float(best.crosstalk_V_per_mW)
+    per_V, per_mW = best("crosstalk_V_per_V"), best("crosstalk_V_per_mW")
+    if np.isfinite(per_V):
         rows.append(["cross-talk of the heater", f"{per_V:.3g} V/V, {per_mW:.3g} V/mW"])
     return rows
