@@ -294,8 +294,10 @@ def ends(count: int) -> None:
 
 if __name__ == "__main__":
     words = sys.argv[1:]
+    if words[:1] not in (["levers"], ["ends"]):
+        sys.exit(__doc__)
     number = int(words[1]) if len(words) > 1 else None
-    if words[:1] == ["ends"]:
+    if words[0] == "ends":
         ends(number or 50)
     else:
         levers(number or 10, Path(words[2]) if len(words) > 2 else None)
