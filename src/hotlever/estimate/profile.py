@@ -135,19 +135,23 @@ def _solved_near(
     """Solve the lever that a pulled objective leads to, and return what is near it.
 
     It is moved again from there until that moves it little; None if that does not end. No trial is
-    rejected, as a search would: what is near a lever that lies too far off knows the way back.
+    rejected, as a search would: what is near a lever that lies too far off knows the way back. But
+    where the second does not move it half as little as the first, both lead to each other.
     """
     objective, at = posterior.objective, posterior.at
     optimum = objective.point(at.probe)
     # lengths in standard errors of the parameters
     errors = np.sqrt(np.diag(posterior.covariance)) / objective.coordinates.rates(optimum)
-    near = Subproblem(objective, at)
+    near, last = Subproblem(objective, at), np.inf
     for count in range(most + 1):
         there, _ = near.of(penalised).minimum()
         step_length = np.linalg.norm((there - near.origin) / errors)
         moved = np.linalg.norm((near.origin - optimum) / errors)
         if count and step_length < closeness * moved:
             return near
+        if count > 1 and step_length > 0.5 * last:
+            return None
+        last = step_length
         if count < most:
             try:
                 solved = experiment.predict(objective.at(near.at.probe, there), near.at)

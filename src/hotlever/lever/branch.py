@@ -163,9 +163,15 @@ class Branch:
         u: Array,
         roots: NewtonResult,
         parametrisation: Parametrisation = NATURAL,
+        *,
+        fresh: bool = False,
     ) -> Branch:
-        """Return the branch of states that were found at some points u, and differentiate them."""
-        along = equations.along(roots.x, roots.factors, parametrisation.constraint(u))
+        """Return the branch of states that were found at some points u, and differentiate them.
+
+        Their factors may be fresh, see `LeverEquations.along`.
+        """
+        constraint = parametrisation.constraint(u)
+        along = equations.along(roots.x, roots.factors, constraint, fresh=fresh)
         rate = parametrisation.rate(u, equations.space, roots.x)
         return cls.of(equations, u, roots.x, rate * along)
 
@@ -176,9 +182,11 @@ class Branch:
         u: Array,
         roots: NewtonResult,
         parametrisation: Parametrisation = NATURAL,
+        *,
+        fresh: bool = False,
     ) -> Branch:
         """Return the same, beginning without power if their points do."""
-        branch = cls.of_roots(equations, u, roots, parametrisation)
+        branch = cls.of_roots(equations, u, roots, parametrisation, fresh=fresh)
         if parametrisation is not NATURAL:
             return replace(branch, stated_parametrisation=parametrisation)
         cold = cls.cold(equations, equations.cold()[0])

@@ -452,10 +452,17 @@ class LeverEquations:
             lambda right: factors.solve(right, states), missing, right_hand_side, scale, 1e-6
         )
 
-    def along(self, x: Array, factors: Factors, constraint: Constraint = TIP) -> Array:
-        """Return the derivative of states by the tip temperature (K) or another constraint."""
+    def along(
+        self, x: Array, factors: Factors, constraint: Constraint = TIP, *, fresh: bool = False
+    ) -> Array:
+        """Return the derivative of states by the tip temperature (K) or another constraint.
+
+        The factors may be those of states nearby, or fresh: those of the states themselves.
+        """
         unit = np.zeros_like(x)
         unit[-1] = 1.0
+        if fresh:
+            return factors.solve(unit, np.arange(x.shape[1]))
         return self.solve_linear(x, factors, unit, constraint)
 
     def cold(self) -> tuple[Array, Array]:

@@ -148,13 +148,13 @@ class SimilarLevers:
             parametrisation, solved = near.branch.parametrisation, near.branch.solved
             u, guess = near.branch.u[solved], near.states(probe)[:, solved]
             newton = ContinuationOptions().newton
-            roots = solve_at(equations, u, guess, newton, near.factors, parametrisation)
-            # one Jacobian serves a last step and the slopes along the branch and by parameters
+            # one Jacobian serves a last step and the slopes along the branch and by parameters; the
+            # step squares what is left before it
+            nearly = NewtonOptions(tolerance=float(np.sqrt(newton.tolerance)))
+            roots = solve_at(equations, u, guess, nearly, near.factors, parametrisation)
             factors = equations.factorised(roots.x, parametrisation.constraint(u))
-            roots = solve_at(
-                equations, u, roots.x, NewtonOptions(), factors, parametrisation, fresh=True
-            )
-            branch = Branch.whole(equations, u, roots, parametrisation)
+            roots = solve_at(equations, u, roots.x, newton, factors, parametrisation, fresh=True)
+            branch = Branch.whole(equations, u, roots, parametrisation, fresh=True)
         return Linearised.of(probe, names, branch, reach, factors=factors)
 
 
