@@ -142,10 +142,10 @@ def _solved_near(
     optimum = objective.point(at.probe)
     # lengths in standard errors of the parameters
     errors = np.sqrt(np.diag(posterior.covariance)) / objective.coordinates.rates(optimum)
-    near, last = Subproblem(objective, at), np.inf
+    near, last = Subproblem(objective, at), float("inf")
     for count in range(most + 1):
         there, _ = near.of(penalised).minimum()
-        step_length = np.linalg.norm((there - near.origin) / errors)
+        step_length = float(np.linalg.norm((there - near.origin) / errors))
         moved = np.linalg.norm((near.origin - optimum) / errors)
         if count and step_length < closeness * moved:
             return near

@@ -479,8 +479,8 @@ class LeverEquations:
         nothing = np.zeros((self.space.size + 1, 1))
         unit = nothing.copy()
         unit[-1] = 1.0
-        factors = self.factorised(nothing, LEVER)
-        first = self.solve_linear(nothing, factors, unit, LEVER)
+        factors, one = self.factorised(nothing, LEVER), np.arange(1)
+        first = factors.solve(unit, one)
         # how the equations bend along it, by their derivatives on either side, where a lever is
         # nearly cold
         near_V = 1e-3
@@ -488,7 +488,7 @@ class LeverEquations:
         bent -= self.balance_change(-near_V * first, first)
         bent *= -0.25 / near_V
         bent[-1] = 0.0
-        second = self.solve_linear(nothing, factors, bent, LEVER)
+        second = factors.solve(bent, one)
         per_square_volt = self.space.tip_rise(second)
         return first / np.sqrt(per_square_volt), second / per_square_volt
 

@@ -101,11 +101,19 @@ class SmoothFactor(Departure):
 
     def departed(self, T: Array, coefficients: Sequence[float]) -> tuple[Array, Array]:
         """Return exp(δ) at temperatures (K), and the derivative of δ by the temperature."""
-        series = np.asarray(coefficients) @ self._modes
-        position = _position(T)
+        powers = np.asarray(coefficients) @ self._powers
         inside = np.clip(T, FORMULA_FROM, FORMULA_TO)
-        slope = chebyshev.chebval(position, chebyshev.chebder(series)) * (2.0 / _WIDTH) / inside
-        return np.exp(chebyshev.chebval(position, series)), np.where(inside == T, slope, 0.0)
+        position = _position(inside)
+        # Horner's scheme for both at once, in place: laws are evaluated more often than all else
+        delta, slope = np.full_like(position, powers[-1]), np.zeros_like(position)
+        for power in powers[-2::-1]:
+            slope *= position
+            slope += delta
+            delta *= position
+            delta += power
+        slope *= (2.0 / _WIDTH) * (inside == T)
+        slope /= inside
+        return np.exp(delta), slope
 
     @property
     def variance_left(self) -> float:
@@ -122,6 +130,11 @@ class SmoothFactor(Departure):
         points, weights = leggauss(40)
         low, high = np.log(self.low_K), np.log(self.high_K)
         return low + 0.5 * (points + 1.0) * (high - low), 0.5 * weights
+
+    @cached_property
+    def _powers(self) -> Array:
+        """Coefficients of the powers of the position in each mode, (modes, degree + 1)."""
+        return np.array([chebyshev.cheb2poly(mode) for mode in self._modes])
 
     @cached_property
     def _modes(self) -> Array:
