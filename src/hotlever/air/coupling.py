@@ -215,12 +215,12 @@ class AirSolver:
             at_sites = air.sampling @ x
             if taken_up is None:
                 return np.asarray(at_sites)
-            return np.append(at_sites, air.stores.coordinates @ x)
+            return np.append(at_sites, air.stores.shares(x))
 
         def spread(lost: Array, t: Array) -> Array:
             weak = air.spreading @ lost
             if taken_up is not None:
-                weak += (taken_up @ t[sites:]) @ air.stores.coordinates
+                weak += air.stores.tested(taken_up @ t[sites:])
             return np.asarray(weak)
 
         def lost(t: Array) -> Array:

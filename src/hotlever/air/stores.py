@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hotlever.air.operator import PanelledAir
-from hotlever.types import Array
+from hotlever.types import Array, Index
 
 
 @dataclass(frozen=True)
@@ -135,6 +135,17 @@ class HeatInAir:
         """What each store holds, by modes (µm³), (stores, m, m)."""
         return np.asarray(self.stores.conductances / self.stores.rates[:, None, None])
 
+    @cached_property
+    def _between_rises(self) -> tuple[Index, Array]:
+        """The unknowns that count, rises of the temperature, and their columns of coordinates."""
+        rises = np.flatnonzero(self.coordinates.any(axis=0))
+        return rises, np.ascontiguousarray(self.coordinates[:, rises])
+
+    def shares(self, x: Array) -> Array:
+        """Return the shares of the modes in states of the lever, (m, ...)."""
+        rises, coordinates = self._between_rises
+        return np.asarray(coordinates @ x[rises])
+
     @classmethod
     def nothing(cls, size: int) -> HeatInAir:
         """Return that of surroundings that take up nothing, for a lever of `size` unknowns."""
@@ -169,18 +180,21 @@ class HeatInAir:
 
     def follows(self, x: Array) -> Array:
         """Return the temperatures to which the stores tend, (size, n), for states of the lever."""
-        shares = self.coordinates @ x
+        shares = self.shares(x)
         repeated = shares[None].repeat(len(self._rates), axis=0)
         return repeated.reshape(len(self._rates) * len(shares), *x.shape[1:])
 
     def held(self, x: Array, in_air: Array) -> Array:
         """Return the heat in the air (nJ) by mode, (m, n), for the temperatures of its stores."""
         heat = np.einsum("kij,kjn->in", self._volumes, self._by_store(in_air))
-        return self.capacity * (heat + self.stores.volume @ (self.coordinates @ x))
+        return self.capacity * (heat + self.stores.volume @ self.shares(x))
 
     def tested(self, by_mode: Array) -> Array:
-        """Return heat by mode (m, n) as the weak equations test it, (size + 1, n)."""
-        return np.asarray(self.coordinates.T @ by_mode)
+        """Return heat by mode (m, ...) as the weak equations test it, (size + 1, ...)."""
+        rises, coordinates = self._between_rises
+        weak = np.zeros((self.coordinates.shape[1], *by_mode.shape[1:]))
+        weak[rises] = coordinates.T @ by_mode
+        return weak
 
     def heat(self, by_mode: Array) -> tuple[Array, Array]:
         """Return all of the heat, and its part that is tested at the leg ends, for heat by mode."""

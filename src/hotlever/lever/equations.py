@@ -126,6 +126,7 @@ class LeverEquations:
         self.footprint = Rim.nothing(space.size) if contact is None else space.footprint
         self._polarity = 1.0
         self._latest: tuple[Array, tuple[Fields, Properties, Properties], Evaluated] | None = None
+        self._stored: tuple[Array, tuple[Array, Array]] | None = None
         self.scale = np.where(space.is_temperature, 1.0, 0.01)[:, None]
         self.step_limit = np.where(space.is_temperature, 60.0, 5.0)[:, None]
 
@@ -240,16 +241,27 @@ class LeverEquations:
         stores: HeatInAir = self.space.air.stores
         return stores
 
+    def heat_density(self, x: Array) -> tuple[Array, Array]:
+        """Return the heat stored at the points of states (nJ/µm²), and its slope by T, (points, n).
+
+        See `LawsAtPoints.heat_density`.
+        """
+        T = self.at(x)[0].T
+        # a step in time asks at the same states for what is stored and how that changes
+        if self._stored is None or self._stored[0] is not T:
+            self._stored = T, self.laws.heat_density(T)
+        return self._stored[1]
+
     def storage(self, x: Array) -> Array:
         """Return the heat stored in states (nJ), tested as the balance is, (size + 1, n).
 
         In time the balance is what it loses per µs.
         """
-        return self._only_heat(self.laws.heat_density(self.at(x)[0].T)[0])
+        return self._only_heat(self.heat_density(x)[0])
 
     def storage_change(self, x: Array, change: Array) -> Array:
         """Return how `storage` changes by one change of each state, or by several."""
-        by_T = self.laws.heat_density(self.at(x)[0].T)[1]
+        by_T = self.heat_density(x)[1]
         rise = self.space.temperature.at_points(change)[0]
         heat = (by_T if change.ndim == 2 else by_T[..., None]) * rise
         return self._only_heat(heat)
@@ -300,7 +312,7 @@ class LeverEquations:
         """
         tangent = self.tangent(x)
         if per_us:
-            stored = per_us * self.laws.heat_density(self.at(x)[0].T)[1]
+            stored = per_us * self.heat_density(x)[1]
             tangent = replace(tangent, heat_source_T=tangent.heat_source_T + stored)
         taken_up = self.heat_in_air.taken_up(per_us) if per_us else None
         slopes = {points: by["T"] for points, (_, by) in self.losses(x).items()}
@@ -500,12 +512,12 @@ class LeverEquations:
 
     def observed(self, x: Array) -> Array:
         """Return V_l (V), I_h (mA) and V_r (V, NaN without a reader), shape (3, n)."""
-        current = self.balance(x)[-1]
+        current = self.space.weak_form(self.fluxes(x))[-1]
         return np.stack([x[-1], current, self.space.reader_voltage(x)])
 
     def observed_change(self, x: Array, change: Array) -> Array:
         """Return how `observed` changes with the unknowns, to first order."""
-        current = self.balance_change(x, change)[-1]
+        current = self.space.weak_form(self.flux_changes(x, change))[-1]
         return np.stack([change[-1], current, self.space.reader_voltage(change)])
 
     def observed_gradient(self, x: Array) -> Array:
@@ -588,7 +600,7 @@ def heat_left(equations: LeverEquations, x: Array) -> Array:
 def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
     """Return the heat in states (nJ), (n,), and its part that is tested at the leg ends."""
     space = equations.space
-    (heat,) = space.weighted(equations.laws.heat_density(equations.at(x)[0].T)[0][None])
+    (heat,) = space.weighted(equations.heat_density(x)[0][None])
     return heat.sum(axis=0), space.end_test[0] @ heat
 
 

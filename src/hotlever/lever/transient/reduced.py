@@ -158,7 +158,7 @@ def _integrands(lever: Lever, space: ReducedSpace, x: Array) -> Iterator[Array]:
     T = space.temperature.matrix.reshape(space.temperature.kinds, weights.size, -1)
     V = space.potential.matrix.reshape(space.potential.kinds, weights.size, -1)
     fluxes = equations.fluxes(x)
-    stored = equations.laws.heat_density(equations.at(x)[0].T)[0]
+    stored = equations.heat_density(x)[0]
     power = float(np.max(-fluxes.heat_source.T @ weights))
     heat, volt = float(np.max(stored.T @ weights)), float(np.abs(x[-1]).max())
     ends = full.end_test
