@@ -126,9 +126,13 @@ def two_at_a_time(judged: Callable[[int], Any], numbers: list[int]) -> Iterator[
     """Judge levers on two processes; give each when it is done."""
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         running = [pool.submit(judged, number) for number in numbers]
-        for done, future in enumerate(as_completed(running), start=1):
-            print(f"{done} of {len(numbers)}", file=sys.stderr)
-            yield future.result()
+        try:
+            for done, future in enumerate(as_completed(running), start=1):
+                print(f"{done} of {len(numbers)}", file=sys.stderr)
+                yield future.result()
+        finally:
+            # what is raised is said at once, not when all others are done
+            pool.shutdown(cancel_futures=True)
 
 
 def main(

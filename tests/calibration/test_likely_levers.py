@@ -80,6 +80,15 @@ def test_where_too_few_count_the_tip_may_be_as_hot_as_either_way_says(known):
     assert hottest_tips(known, bias, known.likely) < tangent
 
 
+def test_a_step_that_leads_far_too_far_shows_nothing(known):
+    """A ramp of a right lever ended with an internal error, where one overflowed."""
+    likely = known.likely
+    size = likely._known.before.shape[1]
+    shown, by = likely._residuals(np.outer([0.0, 1.0, 1e3, np.inf, np.nan], np.ones(size)))
+    assert np.isfinite(shown).all(axis=1).tolist() == [True, True, False, False, False]
+    assert np.isfinite(by).all()
+
+
 @pytest.mark.parametrize("of_priors", [True, False])
 def test_the_tips_are_those_of_the_levers_that_were_drawn(known, of_priors):
     lever = LinearisedLever.of_priors(Probe.reference()) if of_priors else known

@@ -263,8 +263,13 @@ class LikelyLevers:
         counts = known.weights > 0.0
         if not counts.any():
             return np.zeros((len(x), 0)), np.zeros((len(x), 0, x.shape[1]))
+        # a step that goes far too far, by a factor of 10²¹, shows nothing, and is no nearer
+        factors = np.where(self._coordinates.positive, x[:, :size], 0.0)
+        near = np.asarray(np.isfinite(x).all(axis=1) & (np.abs(factors) < 50.0).all(axis=1))
+        x = np.where(near[:, None], x, 0.0)
         point = self._point + x[:, :size]
         values, slopes = self._at_rows(self._coordinates.values(point))
+        values[~near] = np.nan
         slopes = slopes * self._coordinates.rates(point)[:, None, None]
         weights, of_scales = known.weights[counts], known.scales[counts]
         shown = values[:, counts] + x[:, size:] @ of_scales.T
