@@ -152,8 +152,9 @@ def test_the_medium_that_is_asked_for_wins_over_what_the_file_says(cold, calibra
     assert cold.medium is None
     in_air = calibrate(replace(cold, medium="vacuum"), medium="air")
     assert in_air.medium == "air"
-    # factors begin with the pivots of earlier matrices, so that rounding errors differ
-    np.testing.assert_allclose(in_air.table.tip_K, calibrated_in("air").table.tip_K, rtol=1e-8)
+    # factors begin with the pivots of earlier matrices, and rounding decides how many steps a state
+    # of a coarse lever takes; vacuum would be tens of kelvins away
+    np.testing.assert_allclose(in_air.table.tip_K, calibrated_in("air").table.tip_K, rtol=1e-6)
     expected_note = "medium: air, as asked, although the data file says vacuum"
     assert [note for note in in_air.notes if "medium" in note] == [expected_note]
 
