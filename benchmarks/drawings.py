@@ -45,7 +45,7 @@ from hotlever.probe.drawing.shape import build_layout
 from hotlever.probe.shapes import ThreeLeg
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K
-from hotlever.threads import one_blas_thread
+from hotlever.work import one_blas_thread
 from problems import BIAS, box, drawn_reference, processor_seconds, table
 
 REFERENCE = ThreeLeg.reference()

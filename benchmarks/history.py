@@ -49,7 +49,7 @@ from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, default_priors, draw_values
 from hotlever.quantities import observables_of
-from hotlever.threads import one_blas_thread
+from hotlever.work import one_blas_thread
 from problems import table
 
 #: What is fitted, and what is known of the heat capacity beforehand.

@@ -35,14 +35,13 @@ PACKAGES = {f"hotlever.{path.parent.name}" for path in SOURCE.glob("*/__init__.p
 #: From the ground up: what stands on a floor imports of those below it, and nothing beside it but
 #: on the floors of single modules.
 FLOORS = {
-    "ground": ("colours", "errors", "memory", "threads", "types"),
+    "ground": ("errors", "types", "work"),
     "numbers and files": (
         "files",
         "piecewise",
         "quantities",
         "records",
         "spieser2017",
-        "steps",
         "units",
     ),
     "texts": ("cache", "datasets", "text"),

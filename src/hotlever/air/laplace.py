@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from hotlever.air.panels import COINCIDENT, Panels, spreads, traces
 from hotlever.air.single_layer import pairs_by_points, pairs_by_points_of_both, separations
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
+from hotlever.work import one_blas_thread
 
 #: Stands for zero below a fraction whose factor vanishes there.
 _TINY = 1e-150

@@ -30,8 +30,8 @@ from hotlever.air.panels import (
     square_distances,
     traces,
 )
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index, Progress
+from hotlever.work import one_blas_thread
 
 # Real or complex, as the kernel is.
 Numbers = NDArray[Any]

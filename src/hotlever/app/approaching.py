@@ -25,13 +25,12 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.reader import Reader, Signal, at_distance, over_surface, reading_notes
 from hotlever.probe import Layout, Probe
 from hotlever.probe.shapes import Shape
-from hotlever.steps import each
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.common_steps import make_lever, notes_of
 from hotlever.tasks.parsing import parse_bias, parse_distances
 from hotlever.tasks.surfaces import jumping_at_tip, over_a_surface, reader_noise
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
+from hotlever.work import each, one_blas_thread
 
 #: What is read off by the distance.
 _READ = tuple(name for name in Signal._fields if not name.startswith(("source", "crosstalk")))

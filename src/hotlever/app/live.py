@@ -22,8 +22,8 @@ from PIL import Image
 
 from hotlever.app.session import Task, probe_of, surrounded_probe
 from hotlever.app.workers import Report
-from hotlever.colours import HEAT
 from hotlever.errors import ComputationError, HotleverError
+from hotlever.figures.style import HEAT
 from hotlever.lever import Branch, Lever
 from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.fields import current_path
@@ -39,8 +39,8 @@ from hotlever.probe.probe_parameters import of_materials
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.common_steps import make_lever
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
+from hotlever.work import one_blas_thread
 
 
 class _Map:

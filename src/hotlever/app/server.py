@@ -25,7 +25,7 @@ from hotlever.app.pages.start import StartPage, serve_pictures
 from hotlever.app.project import LARGEST_FILE, Project
 from hotlever.app.session import Session
 from hotlever.errors import InputError
-from hotlever.memory import give_back
+from hotlever.work import give_back
 
 #: The address that is served, and the names that a browser may have for it.
 

@@ -26,7 +26,7 @@ from hotlever.probe.tip import EXAMPLE, OUT_OF_CONTACT
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.common_steps import make_lever
 from hotlever.tasks.surfaces import contact_notes, in_contact
-from hotlever.threads import one_blas_thread
+from hotlever.work import one_blas_thread
 
 #: By lever out of contact the last state in contact, from which the next one is solved.
 _near: WeakKeyDictionary[Lever, State] = WeakKeyDictionary()

@@ -26,8 +26,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from hotlever.errors import HotleverError, unforeseen_error
-from hotlever.memory import give_back
 from hotlever.types import Progress
+from hotlever.work import give_back
 
 #: Hears what a call tells: of which kind it is, and what.
 Heard = Callable[[str, Any], None]

@@ -32,8 +32,8 @@ from hotlever.probe.priors import THERMOMETER
 from hotlever.probe.shapes import full_bias_name
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.spieser2017 import RAMAN_ERROR_K
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.work import one_blas_thread
 
 
 def calibrated(

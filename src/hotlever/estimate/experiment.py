@@ -31,9 +31,9 @@ from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.quantities import FITTED
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Mask, Progress
 from hotlever.units import MOST_BIAS
+from hotlever.work import one_blas_thread
 
 #: Where predictions have the tip temperature.
 TIP = list(FITTED).index("tip")

@@ -18,8 +18,8 @@ from scipy.optimize import curve_fit, minimize
 from hotlever.errors import InputError, counted
 from hotlever.lever import Branch
 from hotlever.probe import Circuit
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array
+from hotlever.work import one_blas_thread
 
 
 class KneePoint(NamedTuple):

@@ -21,8 +21,8 @@ from hotlever.estimate.surrogate import CurveSurrogate
 from hotlever.lever.branch import TIP_RISE
 from hotlever.lever.observables import observed, observed_by
 from hotlever.probe import Circuit
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array
+from hotlever.work import one_blas_thread
 
 
 @dataclass(frozen=True)

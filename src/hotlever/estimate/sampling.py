@@ -40,9 +40,9 @@ from hotlever.materials import full_name
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import parameters_of, usual_parameters
 from hotlever.processes import local_processes
-from hotlever.steps import each
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
+from hotlever.work import each
 
 #: Quantiles (%) of a predictive band: median, 68 % and 95 %.
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)

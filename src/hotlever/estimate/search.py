@@ -15,7 +15,6 @@ from functools import cached_property
 
 import numpy as np
 
-from hotlever import memory
 from hotlever.errors import ComputationError
 from hotlever.estimate.experiment import (
     Experiment,
@@ -38,6 +37,7 @@ from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, PriorUse, default_priors
 from hotlever.probe.probe_parameters import dimensions_of, parameters_of
 from hotlever.types import Array, Progress
+from hotlever.work import give_back
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def solve(
         If the lever cannot be solved at the start, or the search does not settle.
     """
     began = time.perf_counter()
-    memory.give_back()  # what an earlier one used
+    give_back()  # what an earlier one used
     search, experiment = Search(problem, progress, seen, stated), problem.experiment
     if isinstance(experiment, ExperimentAtRest):
         optimum = search.from_anywhere(experiment)

@@ -36,8 +36,8 @@ from hotlever.piecewise import Piecewise, crossing, spline_values
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import OBSERVABLES
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
+from hotlever.work import one_blas_thread
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,8 @@ from hotlever.probe.probe_parameters import parameters_of
 from hotlever.quantities import FITTED, OBSERVABLES
 from hotlever.records import Number
 from hotlever.text import BAND
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
+from hotlever.work import one_blas_thread
 
 # --- budgets of any quantity ----------------------------------------------------------------------
 

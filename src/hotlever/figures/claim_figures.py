@@ -11,8 +11,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hotlever import spieser2017 as paper
-from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILION
-from hotlever.figures.style import COLOURS, LINES, axis_label, beside, figure, parameter_label
+from hotlever.figures.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREEN,
+    LINES,
+    ORANGE,
+    PURPLE,
+    VERMILION,
+    axis_label,
+    beside,
+    figure,
+    parameter_label,
+)
 from hotlever.studies.linear_branch import Regression
 from hotlever.studies.parameter_consistency import largest_deviation
 from hotlever.studies.published_lever.ensemble import ANY, REFERENCE, Ensemble

@@ -16,15 +16,21 @@ from matplotlib.ticker import MaxNLocator
 from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
-from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.levers import tips_along
 from hotlever.estimate.next_measurement import SURE, Plan
 from hotlever.estimate.options import DiagnosisOptions
 from hotlever.estimate.tip_table import PulseCalibration
 from hotlever.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
     LINES,
     MEASURED,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
     are_numbered,
     axis_label,
     curve,

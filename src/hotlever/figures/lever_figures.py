@@ -14,13 +14,20 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatter
 
-from hotlever.colours import BLACK, BLUE, GREEN, HEAT, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.contact.picture import contact_picture
 from hotlever.estimate.power_law import EQ12, PowerLaw
 from hotlever.figures.style import (
+    BLACK,
+    BLUE,
     COLOURS,
+    GREEN,
+    HEAT,
     LINES,
     MEASURED,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
     axis_label,
     bridge_beside,
     curve,

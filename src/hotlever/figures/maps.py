@@ -25,12 +25,14 @@ from matplotlib.tri import Triangulation
 from PIL import Image
 
 from hotlever.air.panels import Panels
-from hotlever.colours import BLACK, HEAT, VERMILION
 from hotlever.errors import InputError
 from hotlever.figures.probe_figures import outlines
 from hotlever.figures.style import (
+    BLACK,
     COLOURS,
+    HEAT,
     STYLE,
+    VERMILION,
     axis_label,
     beside,
     curve,

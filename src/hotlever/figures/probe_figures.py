@@ -17,8 +17,19 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.tri import Triangulation
 
-from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
-from hotlever.figures.style import COLOURS, axis_label, entitle, figure
+from hotlever.figures.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    axis_label,
+    entitle,
+    figure,
+)
 from hotlever.materials import HIGH_DOPED
 from hotlever.probe import Layout, ProbeMesh, Region
 from hotlever.studies.design import label_of

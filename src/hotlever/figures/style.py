@@ -15,7 +15,6 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hotlever.colours import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION
 from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, whole_file
 from hotlever.materials.parameters import parameter_named
@@ -24,6 +23,11 @@ from hotlever.quantities import QUANTITIES
 if TYPE_CHECKING:
     import xarray as xr
 
+#: Okabe and Ito's colours, safe for colour-blind readers, in print and in the browser.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+#: matplotlib's colour map of temperatures.
+HEAT = "inferno"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 #: Lines that can be told apart, more of them than there are colours.
 LINES = [(line, colour) for line in ("-", "--") for colour in COLOURS]

@@ -18,8 +18,8 @@ from hotlever.lever.observables import sensitivities_of
 from hotlever.lever.transient import Waveform, simulate
 from hotlever.probe import Probe
 from hotlever.probe.tip import OUT_OF_CONTACT
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.work import one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -30,9 +30,9 @@ from hotlever.materials import Kind
 from hotlever.materials.air import heat_capacity_of_air, thermal_conductivity_of_air
 from hotlever.probe import Circuit, Layout, MeshOptions, Probe, Wiring, mesh_layout
 from hotlever.probe.surroundings import Surroundings
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index, Progress
 from hotlever.units import PER_CM3_TO_NANO_PER_UM3, PER_CM_TO_MILLI_PER_UM
+from hotlever.work import one_blas_thread
 
 
 @lru_cache(maxsize=4)

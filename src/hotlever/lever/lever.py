@@ -33,8 +33,8 @@ from hotlever.materials import Material
 from hotlever.probe import Circuit, MeshOptions, Probe
 from hotlever.probe.chip import in_pulses
 from hotlever.probe.probe_parameters import usual_parameters
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.work import one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr

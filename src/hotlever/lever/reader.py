@@ -20,8 +20,8 @@ from hotlever.lever.dataset import checked_bias, probe_attributes
 from hotlever.lever.lever import Lever
 from hotlever.lever.noise import SOURCES, NoiseOptions, Response, spectral_densities
 from hotlever.probe import Probe
-from hotlever.steps import each
 from hotlever.types import Array, Progress
+from hotlever.work import each
 
 if TYPE_CHECKING:
     import xarray as xr

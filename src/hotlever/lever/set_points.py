@@ -23,8 +23,8 @@ from hotlever.lever.lever import Lever, State
 from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.solved_states import solve_at
 from hotlever.piecewise import Piecewise
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.work import one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -23,8 +23,8 @@ from hotlever.probe import Probe
 from hotlever.probe.layout import BorderTaper, Layout, Taper
 from hotlever.probe.moving import Movement, MovingMesh
 from hotlever.probe.probe_parameters import dimensions_of, usual_parameters
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
+from hotlever.work import one_blas_thread
 
 
 class SimilarLevers:

@@ -17,8 +17,8 @@ from hotlever.raman.lineshape import NoSiliconLine, Peak, PeakOptions
 from hotlever.raman.spectrum import Spectrum, aliases
 from hotlever.raman.spectrum_tables import SpectrumCorrection, of_spectrum
 from hotlever.raman.thermometer import Point, RamanCalibration, Thermometer, calibrate_raman
-from hotlever.steps import each
 from hotlever.types import Progress
+from hotlever.work import each
 
 if TYPE_CHECKING:
     import xarray as xr

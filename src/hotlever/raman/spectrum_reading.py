@@ -25,9 +25,9 @@ from hotlever.raman.spectrum import (
     temperature_in_name,
 )
 from hotlever.raman.text_layout import pick_spectra, require_line
-from hotlever.steps import each
 from hotlever.tables import find_tables
 from hotlever.types import Array, Progress
+from hotlever.work import each
 
 
 def read_spectrum(path: str | os.PathLike[str]) -> Spectrum:

@@ -15,8 +15,8 @@ from hotlever.lever.transient.frequency_domain import harmonics
 from hotlever.lever.transient.modes import Source
 from hotlever.materials.parameters import sentence
 from hotlever.report.report_page import Page
-from hotlever.steps import each
 from hotlever.types import Array, Progress
+from hotlever.work import each
 
 
 def transient_page(

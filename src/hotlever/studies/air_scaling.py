@@ -24,9 +24,8 @@ from hotlever.datasets import labelled
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
-from hotlever.steps import each
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.work import each, one_blas_thread
 
 #: Tip temperatures (K) at which k is compared.
 COLD, HOT = 330.0, 1006.0

@@ -20,8 +20,8 @@ from hotlever.materials.parameters import parameter_named
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
-from hotlever.steps import each
 from hotlever.types import Array, Progress
+from hotlever.work import each
 
 #: What follows from a design; k is the power of the knee in air over that in vacuum.
 QUANTITIES = (

@@ -47,9 +47,9 @@ from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.silicon import intrinsic_density, inversion_temperature
 from hotlever.probe import Probe, Tip
 from hotlever.raman.thermometer import published_raman_calibration
-from hotlever.steps import each
 from hotlever.studies.simulation_based_calibration import MinimosMaterial
 from hotlever.types import Array, Progress
+from hotlever.work import each
 
 #: Plausible tips of lithography probes, cones: height (µm) and half-angle (degrees).
 SIZES = ((0.5, 15.0), (0.5, 30.0), (0.7, 20.0), (1.0, 15.0), (1.0, 30.0))

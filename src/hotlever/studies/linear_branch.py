@@ -31,9 +31,9 @@ from hotlever.probe import Probe
 from hotlever.probe.drawing import Drawing, Layer
 from hotlever.probe.shapes import Shape, ThreeLeg, UShape
 from hotlever.spieser2017 import HOTTEST_TIP_K, KNEE_PREDICTED_K
-from hotlever.steps import each
 from hotlever.types import Array, Progress
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
+from hotlever.work import each
 
 #: How far above its knee (K) each lever is followed: as far as the paper's was.
 SPAN_K = HOTTEST_TIP_K - KNEE_PREDICTED_K

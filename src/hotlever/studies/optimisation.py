@@ -36,8 +36,8 @@ from hotlever.lever.transient.modes import slowest_modes
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.file_sections import field_of
 from hotlever.probe.probe_parameters import parameters_of
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.work import one_blas_thread
 
 #: Quantities of the knee, and what they are of any state.
 OF_THE_KNEE = {

@@ -24,7 +24,6 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
 from hotlever.spieser2017 import HOTTEST_TIP_K, NOMINAL_DOPING, PUBLISHED_VALUES, RAMP
-from hotlever.steps import each
 from hotlever.studies.simulation_based_calibration import (
     LaboratoryOptions,
     MinimosMaterial,
@@ -32,6 +31,7 @@ from hotlever.studies.simulation_based_calibration import (
     values_from_priors,
 )
 from hotlever.types import Array, Progress
+from hotlever.work import each
 
 #: What each twin has in place of the reference probe's dimensions (µm).
 GEOMETRIES: dict[str, dict[str, float]] = {

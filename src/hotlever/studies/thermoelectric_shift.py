@@ -39,8 +39,8 @@ from hotlever.materials import HIGH_DOPED, LOW_DOPED
 from hotlever.materials.kinds import Kind, LowDopedSilicon, PSilicon
 from hotlever.probe import Probe, Taper
 from hotlever.probe.drawing import Drawing, Layer, rectangle
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array
+from hotlever.work import one_blas_thread
 
 #: The heats, and the halves of the heater in which they are set free, by the terminal beyond.
 HEATS, SIDES = ("Thomson", "Peltier"), ("supply", "ground")

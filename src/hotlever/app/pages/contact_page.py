@@ -16,9 +16,9 @@ from hotlever.app.pages.frame import caption, flat_button
 from hotlever.app.pages.live_page import LivePage, slider
 from hotlever.app.pages.task_page import MEDIA
 from hotlever.app.session import Task
-from hotlever.colours import BLUE, PURPLE, VERMILION
 from hotlever.contact.picture import ContactPicture
 from hotlever.errors import InputError
+from hotlever.figures.style import BLUE, PURPLE, VERMILION
 from hotlever.materials.catalogue import sample_names
 from hotlever.probe.tip import parsed_layers
 

@@ -13,7 +13,7 @@ import numpy as np
 from nicegui import ui
 
 from hotlever.app.pages.frame import caption
-from hotlever.colours import BLUE, HEAT, VERMILION
+from hotlever.figures.style import BLUE, HEAT, VERMILION
 from hotlever.quantities import OBSERVABLES, QUANTITIES
 
 #: What is drawn on a light page and on a dark one.

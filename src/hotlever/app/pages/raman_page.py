@@ -28,8 +28,8 @@ from hotlever.app.pages.frame import (
 from hotlever.app.pages.task_page import DrawnPage
 from hotlever.app.project import CORRECTIONS
 from hotlever.app.session import Job, Session, Task
-from hotlever.colours import BLUE, GREEN, VERMILION
 from hotlever.errors import HotleverError
+from hotlever.figures.style import BLUE, GREEN, VERMILION
 from hotlever.raman import SpectrumCorrection, read_corrections
 from hotlever.raman.spectrum_tables import corrections_text
 

@@ -14,7 +14,7 @@ from hotlever.app.pages import plots
 from hotlever.app.pages.frame import caption
 from hotlever.app.pages.live_page import LivePage
 from hotlever.app.session import Task
-from hotlever.colours import BLUE, VERMILION
+from hotlever.figures.style import BLUE, VERMILION
 
 
 class ReaderPlots:

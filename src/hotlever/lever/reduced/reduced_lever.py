@@ -28,8 +28,8 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.solved_states import Constrained, solve_at
 from hotlever.lever.space import TIP
 from hotlever.probe import Circuit, Probe
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Index
+from hotlever.work import one_blas_thread
 
 #: What is stored of a response surface.
 _OF_SURFACE = ("u", "coefficients", "grows", "scale")

@@ -18,9 +18,8 @@ from hotlever.lever.reduced.response_surface import ParameterDomain, ResponseSur
 from hotlever.materials import full_name
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import of_materials
-from hotlever.steps import each
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.work import each, one_blas_thread
 
 
 @dataclass(frozen=True)

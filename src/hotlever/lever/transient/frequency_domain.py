@@ -30,9 +30,8 @@ from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.reduced import space_of_modes
 from hotlever.lever.transient.waveform import step
 from hotlever.probe import Circuit
-from hotlever.steps import each
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.work import each, one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -28,8 +28,8 @@ from hotlever.lever.space import LEVER
 from hotlever.lever.transient.history import integrate
 from hotlever.lever.transient.transient_problem import InCircuit
 from hotlever.lever.transient.waveform import Waveform, step, switched_off
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array
+from hotlever.work import one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,8 +16,8 @@ from hotlever.lever.space import Space
 from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind
 from hotlever.probe.surroundings import Physics
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array
+from hotlever.work import one_blas_thread
 
 if TYPE_CHECKING:
     from hotlever.lever.lever import Lever

@@ -25,8 +25,8 @@ from hotlever.lever.transient.waveform import Piece, Waveform
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import dimensions_of, parameters_of
 from hotlever.quantities import OBSERVABLES
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array
+from hotlever.work import one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr

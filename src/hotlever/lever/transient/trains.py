@@ -30,8 +30,8 @@ from hotlever.lever.transient.history import (
 )
 from hotlever.lever.transient.reduced import on_all_nodes, reduced_in_time
 from hotlever.lever.transient.waveform import Polyline, Waveform
-from hotlever.threads import one_blas_thread
 from hotlever.types import Array, Progress
+from hotlever.work import one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,10 +18,10 @@ from scipy.stats import norm, qmc
 
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.probe.priors import Prior, as_known, default_priors
-from hotlever.steps import each
 from hotlever.studies.validation.case import Case, StoredPrediction
 from hotlever.text import BAND
 from hotlever.types import Array, Progress
+from hotlever.work import each
 
 #: Levers that are drawn from the priors of a case.
 DRAWS = 64

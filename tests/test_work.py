@@ -8,7 +8,7 @@ import scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from hotlever.estimate import knee
-from hotlever.threads import one_blas_thread
+from hotlever.work import one_blas_thread
 
 
 def blas_threads() -> set[int]:
