@@ -33,7 +33,7 @@ from hotlever.lever import Lever
 from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe
-from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.mesh import SolidMeshOptions
 from hotlever.probe.surroundings import Surroundings
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, K_IN_AIR
 from hotlever.studies.air_scaling import HOT, error_of_one_factor, find_scale_factor

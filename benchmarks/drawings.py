@@ -52,7 +52,7 @@ REFERENCE = ThreeLeg.reference()
 #: Of the diffusion in the plane: largest edge in the heater (share of its width), and time steps.
 FINE, STEPS = MeshOptions(heater=0.02, lever=0.05), 400
 #: What has to be loaded for a probe by its dimensions, and for one that is drawn.
-LOADED = {"parametric": "hotlever.probe.probe", "drawn": "hotlever.probe.drawing.parametric"}
+LOADED = {"parametric": "hotlever.probe.probe", "drawn": "hotlever.probe.drawing.kit"}
 #: By how much edges are shifted (µm).
 SHIFT = 0.1
 #: Biases of levers in air (V).

@@ -160,7 +160,7 @@ def test_a_plate_with_a_cone_against_three_dimensions():
     from netgen.occ import Axes, Axis, Box, OCCGeometry, Pnt, WorkPlane, X, Y, Z
 
     from hotlever.lever3d.still_air import OpenAir
-    from hotlever.probe.solid import in_a_sphere
+    from hotlever.probe.mesh import in_a_sphere
 
     cone = Tip(height_um=3.0, half_angle_deg=10.0, apex_radius_um=0.05, in_air=True, kappa=PERFECT)
     section = WorkPlane(Axes((2, 1, -0.2), Y, X))

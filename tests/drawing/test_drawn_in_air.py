@@ -12,7 +12,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever3d import SolidLever
 from hotlever.lever3d.solid_fields import temperature_slices
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.mesh import SolidMeshOptions
 
 BIAS = np.linspace(1.0, 11.0, 6)
 TURNED_TIP = turned(np.array(TIP)[:, None])[:, 0]

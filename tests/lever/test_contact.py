@@ -25,8 +25,8 @@ from hotlever.lever.transient import pulse, simulate, step
 from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe
+from hotlever.probe.mesh import SolidMeshOptions
 from hotlever.probe.probe_parameters import usual_parameters
-from hotlever.probe.solid import SolidMeshOptions
 from hotlever.probe.tip import OUT_OF_CONTACT
 from hotlever.tasks.surfaces import what_the_current_tells
 

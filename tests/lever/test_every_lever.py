@@ -27,7 +27,7 @@ from hotlever.lever.space import LEVER, TIP
 from hotlever.lever3d import SolidLever
 from hotlever.materials import PARAMETERS, published
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.mesh import SolidMeshOptions
 from hotlever.probe.surroundings import Physics
 from of_materials import metal_film_probe, p_type_probe
 

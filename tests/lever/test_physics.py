@@ -12,7 +12,7 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.reduced.training import can_be_reduced
 from hotlever.lever.transient import pulse, spectrum, step
 from hotlever.lever3d import SolidLever
-from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.mesh import SolidMeshOptions
 from of_materials import p_type_probe
 
 #: What is asked here is so on any mesh.

@@ -16,7 +16,7 @@ from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever3d import SolidLever
 from hotlever.materials import heat as heat_laws
 from hotlever.probe import MeshOptions, Probe
-from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.mesh import SolidMeshOptions
 from hotlever.probe.surroundings import Physics
 from of_materials import metal_film_probe, p_type_probe
 

@@ -11,12 +11,7 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse, simulate
 from hotlever.probe import Probe
-from hotlever.probe.chip import (
-    in_pulses,
-    mean_inverse_distance,
-    spreading_K_per_mW,
-    usual_chip,
-)
+from hotlever.probe.parts import mean_inverse_distance, spreading_K_per_mW
 from hotlever.probe.priors import Prior, as_known, known_beforehand
 
 CHIP = 3.0
@@ -98,9 +93,9 @@ def test_legs_share_the_heat_and_warm_each_other():
 def test_in_pulses_the_holder_stays_cold():
     probe = Probe.reference()
     spread = spreading_K_per_mW(probe.layout(), 293.0)
-    assert in_pulses(probe) is probe
-    assert in_pulses(probe.with_(chip_K_per_mW=5.0)).circuit.chip_K_per_mW == spread
-    assert in_pulses(probe.with_(chip_K_per_mW=0.3)).circuit.chip_K_per_mW == 0.3
+    assert probe.in_pulses() is probe
+    assert probe.with_(chip_K_per_mW=5.0).in_pulses().circuit.chip_K_per_mW == spread
+    assert probe.with_(chip_K_per_mW=0.3).in_pulses().circuit.chip_K_per_mW == 0.3
 
 
 def test_a_long_pulse_ends_where_a_lever_on_its_chip_rests(coarse):
@@ -113,7 +108,7 @@ def test_a_long_pulse_ends_where_a_lever_on_its_chip_rests(coarse):
 
 def test_calibrations_are_on_a_chip_unless_laws_are_the_papers():
     probe = Probe.reference()
-    assert as_known(probe, None).circuit.chip_K_per_mW == usual_chip(probe)
+    assert as_known(probe, None).circuit.chip_K_per_mW == probe.usual_chip_K_per_mW
     for priors in ({}, {"laws": "paper"}):
         assert as_known(probe, priors) is probe
     stated = known_beforehand(as_known(probe, None), {"chip_K_per_mW": "2 ± 1"})

@@ -8,7 +8,7 @@ import xarray as xr
 from hotlever.lever import State
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe
-from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.mesh import SolidMeshOptions
 
 COARSE = SolidMeshOptions(refinement=0.4, grading=0.7)
 

@@ -21,8 +21,7 @@ from hotlever.lever3d.solid_fields import (
     write_solid_vtu,
 )
 from hotlever.probe import Probe
-from hotlever.probe.mesh import doubled_areas
-from hotlever.probe.solid import SolidMeshOptions
+from hotlever.probe.mesh import SolidMeshOptions, doubled_areas
 
 COARSE = SolidMeshOptions(refinement=0.4, grading=0.7)
 

@@ -10,7 +10,7 @@ from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS, PUBLISHED, Material
 from hotlever.probe import Circuit, MeshOptions, Probe, ThreeLeg, Tip, UShape, mesh_layout
 from hotlever.probe.circuit import Contact
-from hotlever.probe.solid import mesh_solid
+from hotlever.probe.mesh import mesh_solid
 
 RECORDS = (ThreeLeg, UShape, Circuit, Contact, Material, Tip)
 NUMBERS = (float, int, float | None)

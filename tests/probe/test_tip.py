@@ -10,7 +10,7 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.probe import MeshOptions, Probe, Tip
-from hotlever.probe.solid import SolidMeshOptions, mesh_solid
+from hotlever.probe.mesh import SolidMeshOptions, mesh_solid
 
 TIP = Tip(height_um=0.7, half_angle_deg=25, apex_radius_um=0.03)
 

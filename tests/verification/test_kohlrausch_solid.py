@@ -15,7 +15,7 @@ from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.materials import published
 from hotlever.probe import Circuit, Layout, Region
-from hotlever.probe.solid import SolidMeshOptions, mesh_solid
+from hotlever.probe.mesh import SolidMeshOptions, mesh_solid
 
 OUTLINE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
 

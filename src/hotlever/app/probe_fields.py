@@ -33,7 +33,7 @@ from hotlever.probe import Circuit, Probe
 from hotlever.probe.drawing.outlines import DrawingError
 from hotlever.probe.drawing.shape import TOLERANCE_UM, DrawnShape
 from hotlever.probe.drawing.sheet import read_sheet
-from hotlever.probe.file_sections import file_text, read_sections
+from hotlever.probe.probe import file_text, read_sections
 from hotlever.probe.shapes import EDGE_BIAS, PARAMETRIC, SHAPE_SECTIONS
 
 # Sections of a probe file by name.

@@ -28,7 +28,6 @@ from hotlever.lever.transport import Tangent
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Part
 from hotlever.probe.mesh import ProbeMesh
-from hotlever.probe.solid import SolidMesh
 from hotlever.types import Array, Index, LinearSolver, Mask
 
 
@@ -37,7 +36,7 @@ class FullSpace(Space):
 
     Parameters
     ----------
-    mesh : ProbeMesh or SolidMesh
+    mesh : ProbeMesh
         Of triangles in the lever's plane, or of tetrahedra.
     elements : FiniteElements, optional
         Made on ``mesh.elements`` by default.
@@ -60,7 +59,7 @@ class FullSpace(Space):
 
     def __init__(
         self,
-        mesh: ProbeMesh | SolidMesh,
+        mesh: ProbeMesh,
         elements: FiniteElements | None = None,
         wiring: Wiring | None = None,
         factorisation: FactorisationOptions | None = None,
@@ -101,7 +100,7 @@ class FullSpace(Space):
             self.elements, unknowns, self.size, behind, self.tip, factorisation
         )
 
-    def _place(self, mesh: ProbeMesh | SolidMesh) -> None:
+    def _place(self, mesh: ProbeMesh) -> None:
         """Take up where the elements are on a mesh, and what that makes of the maps."""
         self.mesh, self._losses = mesh, dict[str, ElementLosses]()
         # in the middle of the silicon's thickness

@@ -31,7 +31,6 @@ from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP, Constraint
 from hotlever.materials import Material
 from hotlever.probe import Circuit, MeshOptions, Probe
-from hotlever.probe.chip import in_pulses
 from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.types import Array, Progress
 from hotlever.work import one_blas_thread
@@ -136,7 +135,7 @@ class Lever:
 
     def in_pulses(self) -> Self:
         """Return the same lever while the holder of its chip stays cold."""
-        probe = in_pulses(self.probe)
+        probe = self.probe.in_pulses()
         return self if probe is self.probe else self.with_probe(probe)
 
     def with_probe(self, probe: Probe) -> Self:

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix, vstack
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.probe import Probe
-from hotlever.probe.monitor_sections import Monitor, on_lever
+from hotlever.probe.parts import Monitor, on_lever
 from hotlever.types import Array, Mask
 
 

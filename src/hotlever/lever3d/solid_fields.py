@@ -20,7 +20,7 @@ from hotlever.lever.lever import State
 from hotlever.lever3d.solid_lever import SolidLever, surface_nodes
 from hotlever.lever3d.still_air import ngsolve
 from hotlever.materials.air import temperature_from_kirchhoff
-from hotlever.probe.solid import material_names
+from hotlever.probe.mesh import material_names
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 

@@ -23,7 +23,7 @@ from hotlever.lever.lever import Lever, State
 from hotlever.lever.readings import Reading, there_and_back
 from hotlever.lever3d.still_air import OpenAir, ngsolve
 from hotlever.probe import Layout, Probe, Wiring
-from hotlever.probe.solid import SolidMesh, SolidMeshOptions, mesh_solid, middle_and_reach
+from hotlever.probe.mesh import SolidMesh, SolidMeshOptions, mesh_solid, middle_and_reach
 from hotlever.types import Array, Index, Progress
 
 

@@ -45,7 +45,7 @@ class OpenAir:
     Parameters
     ----------
     mesh : netgen.meshing.Mesh
-        Made by `hotlever.probe.solid.in_a_sphere`: air and image ball, surfaces named.
+        Made by `hotlever.probe.mesh.in_a_sphere`: air and image ball, surfaces named.
     centre : tuple of float
         Of the sphere (µm).
     radius_um : float

@@ -38,9 +38,8 @@ from hotlever.probe.drawing.sheet import (
     read_sheet,
     sensible_unit,
 )
-from hotlever.probe.file_sections import other_sections, section_lines
 from hotlever.probe.layout import Point, ring_area
-from hotlever.probe.probe import Probe
+from hotlever.probe.probe import Probe, other_sections, section_lines
 from hotlever.text import aligned, as_toml
 
 #: A layer by its name, or outlines.

@@ -1,26 +1,166 @@
-"""What a probe consists of, before it is a file: shape, circuit, materials, surroundings, tip."""
+"""What a probe consists of, before it is a file: shape, circuit, materials, surroundings, tip.
+
+And monitors, where temperature and potential are to be reported, and the chip that holds it. Heat
+spreads from the small ends of the legs into the chip, within microseconds, and from there through
+its holder, in milliseconds or more. At rest both count, in pulses the spreading alone.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
-from pydantic import ConfigDict, Field, SerializeAsAny, model_validator
+from numpy.typing import ArrayLike
+from pydantic import BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
 
+from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.materials import HIGH_DOPED, KINDS, LOW_DOPED, REFERENCE, Kind, Material, full_name
+from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon, class_name
 from hotlever.probe.circuit import Circuit, Wiring
 from hotlever.probe.layout import Layout
-from hotlever.probe.monitor_sections import Monitor, Monitors
 from hotlever.probe.shapes import SHAPE_SECTIONS, Shape
 from hotlever.probe.surroundings import Physics, Surroundings
 from hotlever.probe.tip import SampleContact, Tip
-from hotlever.quantities import OBSERVABLES
-from hotlever.records import Record
-from hotlever.types import Array
+from hotlever.quantities import OBSERVABLES, QUANTITIES
+from hotlever.records import Record, bounded
+from hotlever.types import Array, Mask
+from hotlever.units import PER_CM_TO_MILLI_PER_UM
+
+
+def _as_tuples(value: Any) -> Any:
+    """Return lists, as files have them, as tuples."""
+    return tuple(map(_as_tuples, value)) if isinstance(value, list | tuple) else value
+
+
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Place = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(_as_tuples)]
+
+
+class Monitor(Record):
+    """A point, a line or a region of a lever (section ``[monitor.NAME]`` of a probe file).
+
+    What it shows is the temperature and the potential there, in the middle of the lever's
+    thickness, or their means over the region.
+
+    Examples
+    --------
+    >>> Monitor(line_um=[[0, 0], [40, 0]], points=3).positions.tolist()
+    [[0.0, 0.0], [20.0, 0.0], [40.0, 0.0]]
+    """
+
+    point_um: Place | None = Field(default=None, description="a place [x, y]")
+    line_um: Annotated[tuple[Place, Place], BeforeValidator(_as_tuples)] | None = Field(
+        default=None, description="from one place to another, which lie on the lever"
+    )
+    points: int | None = bounded("of the line; 101 if left out", 2, 1000, None)
+    region: str | None = Field(
+        default=None, description="a region, part, layer or material of the lever: a mean over it"
+    )
+
+    @model_validator(mode="after")
+    def _is_one_of_three(self) -> Self:
+        if sum(each is not None for each in (self.point_um, self.line_um, self.region)) != 1:
+            raise ValueError("expected one of point_um, line_um and region")
+        if self.points is not None and self.line_um is None:
+            raise ValueError("points go with line_um")
+        return self
+
+    @property
+    def _ends(self) -> tuple[Place, ...]:
+        return self.line_um or (() if self.point_um is None else (self.point_um,))
+
+    @property
+    def positions(self) -> Array:
+        """The points (µm), shape (n, 2); none of a region."""
+        if self.line_um is not None:
+            return np.linspace(*self.line_um, self.points or 101)
+        return np.reshape(self._ends, (-1, 2))
+
+    def __str__(self) -> str:
+        if self.region is not None:
+            return f"mean over {self.region}"
+        ends = " to ".join(f"({x:g}, {y:g})" for x, y in self._ends)
+        return f"{'at' if self.line_um is None else 'from'} {ends} µm"
+
+    def check(self, layout: Layout, where: str) -> None:
+        """Check that it is on a lever: of a line both ends, gaps between may be bridged.
+
+        Raises
+        ------
+        InputError
+            If it is not, with the nearest place that is; or there is no such region.
+        """
+        if self.region is not None and not layout.named(self.region):
+            names = dict.fromkeys(name for region in layout.regions for name in region.names)
+            raise unknown_name("region", self.region, names, where)
+        for x, y in self._ends:
+            if not on_lever(layout, [(x, y)]).all():
+                import shapely
+
+                line = shapely.shortest_line(layout.polygon, shapely.Point(x, y))
+                near_x, near_y = line.coords[0]
+                raise InputError(
+                    f"{where}: ({x:g}, {y:g}) µm lies off the lever, expected a place on it; "
+                    f"the nearest is ({near_x:.6g}, {near_y:.6g})"
+                )
+
+
+class Monitors(Record):
+    """Monitors by name (sections ``[monitor.NAME]`` of a probe file)."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Monitor]
+
+    @classmethod
+    def from_values(cls, values: dict[str, Any], where: str) -> Self:
+        """Check monitors, or what their sections hold; `where` names their origin in an error."""
+        monitors = {
+            name: section
+            if isinstance(section, Monitor)
+            else Monitor.from_values(section, f"{where}: {name}")
+            for name, section in values.items()
+        }
+        return cls.model_validate(monitors)
+
+    @property
+    def named(self) -> dict[str, Monitor]:
+        """Each by its name."""
+        return self.model_extra or {}
+
+    def check(self, layout: Layout, where: str) -> None:
+        """Check that all are on a lever, and have names for columns of their own.
+
+        Raises
+        ------
+        InputError
+            If one is not, see `Monitor.check`.
+        """
+        existing_columns = {*QUANTITIES, *(f"{name}_V" for name in layout.terminal_names)}
+        for name, monitor in self.named.items():
+            if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+                raise InputError(
+                    f"{where}: found the name {quoted(name)}, expected a letter first, and then "
+                    "letters, digits and _"
+                )
+            for column in (name, f"{name}_K", f"{name}_V"):
+                if column in existing_columns:
+                    raise InputError(
+                        f"{where}: the name {quoted(name)} is taken, there is a column {column}: "
+                        "expected another"
+                    )
+            monitor.check(layout, f"{where}: {name}")
+
+
+def on_lever(layout: Layout, points: Array | Sequence[Place]) -> Mask:
+    """Return which points (n, 2) are on a lever, as far as rounding tells, (n,)."""
+    import shapely  # not every probe has monitors
+
+    return np.asarray(shapely.distance(layout.polygon, shapely.points(np.asarray(points))) <= 1e-6)
 
 
 class PriorTexts(Record):
@@ -276,5 +416,61 @@ class ProbeParts(Record):
         """
         return self.model_copy(update={"physics": Physics.of(effects, where)})
 
+    @property
+    def usual_chip_K_per_mW(self) -> float:
+        """What a chip in its holder usually has: spreading, and a holder."""
+        # a holder, glue or a clip usually adds as much (K/mW), of which nothing is known but its
+        # size
+        return spreading_K_per_mW(self.layout(), self.circuit.base_temperature_K) + 1.0
+
+    def in_pulses(self) -> Self:
+        """Return the probe as it is in pulses, while the holder of its chip stays cold."""
+        at_rest = self.circuit.chip_K_per_mW
+        if not at_rest:
+            return self
+        spreading = spreading_K_per_mW(self.layout(), self.circuit.base_temperature_K)
+        return self if at_rest <= spreading else self.replace({"chip_K_per_mW": spreading})
+
 
 ProbesParts = TypeVar("ProbesParts", bound=ProbeParts)
+
+
+def mean_inverse_distance(a: ArrayLike, b: ArrayLike) -> Array:
+    """Return the mean of 1/r (1/µm) over all pairs of points of a rectangle of sides a, b (µm).
+
+    Examples
+    --------
+    >>> mean_inverse_distance(1.0, 1.0).round(4).item()
+    2.9732
+    """
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    diagonal = np.hypot(a, b)
+    sides = 2.0 / a * np.arcsinh(a / b) + 2.0 / b * np.arcsinh(b / a)
+    return np.asarray(sides + 2.0 / 3.0 * (a**3 + b**3 - diagonal**3) / (a * b) ** 2)
+
+
+def spreading_K_per_mW(layout: Layout, base_temperature_K: float) -> float:
+    """Return by how much leg ends get warmer for the heat that spreads from them into silicon.
+
+    Each end is a rectangle of uniform flux on a half space, and is warmed by the others as by
+    points; the heat is shared out so that all ends have one mean temperature.
+
+    Parameters
+    ----------
+    layout : Layout
+    base_temperature_K : float
+
+    Examples
+    --------
+    >>> from hotlever import Probe
+    >>> round(spreading_K_per_mW(Probe.reference().layout(), 293.0), 2)
+    0.67
+    """
+    start, end = np.array([(each.start, each.end) for each in layout.terminals]).swapaxes(0, 1)
+    widths = np.linalg.norm(end - start, axis=1)
+    apart = np.linalg.norm((start + end)[:, None] - (start + end), axis=2) / 2.0
+    np.fill_diagonal(apart, 1.0)
+    inverse = 1.0 / apart
+    np.fill_diagonal(inverse, mean_inverse_distance(widths, layout.thickness_um))
+    kappa = PER_CM_TO_MILLI_PER_UM * float(thermal_conductivity(base_temperature_K)[0])
+    return float(1.0 / (2.0 * math.pi * kappa * np.linalg.inv(inverse).sum()))

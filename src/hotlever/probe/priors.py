@@ -27,7 +27,6 @@ from pydantic import Field
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials.departures import DEPARTURES
 from hotlever.materials.parameters import Parameter, own_name
-from hotlever.probe.chip import on_usual_chip
 from hotlever.probe.parts import ProbeParts, ProbesParts
 from hotlever.probe.probe_parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.shapes import EDGE_BIAS
@@ -259,7 +258,9 @@ def as_known(probe: ProbesParts, stated: Mapping[str, Prior | str] | None) -> Pr
     """
     texts = {**probe.stated_priors, **(stated or {})}
     nothing = stated is not None and not stated
-    return on_usual_chip(probe, without=nothing or texts.get("laws") == "paper")
+    if probe.circuit.chip_K_per_mW or nothing or texts.get("laws") == "paper":
+        return probe
+    return probe.replace({"chip_K_per_mW": probe.usual_chip_K_per_mW})
 
 
 def is_of_laws(name: str) -> bool:

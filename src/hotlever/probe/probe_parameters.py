@@ -12,7 +12,6 @@ from typing import Any
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials import LOW_DOPED, PARAMETERS, Kind, Parameter, full_name
 from hotlever.materials.parameters import own_name, parameter_named
-from hotlever.probe.chip import usual_chip
 from hotlever.probe.circuit import MOST_OFFSET_V
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
@@ -162,7 +161,7 @@ def parameters_of(
     # of a room, or a hot plate and its thermocouple
     add("base_temperature_K", 1.0, (0.8, 1.2), relative=False)
     if anywhere or probe.circuit.chip_K_per_mW:
-        usual = usual_chip(probe)
+        usual = probe.usual_chip_K_per_mW
         # in pulses the spreading counts alone, which is known; the holder is not
         limits = {"scale": usual, "lower": 0.01, "upper": 100.0, "relative": False}
         add("chip_K_per_mW", None if in_time else 0.6 * usual, **limits)

@@ -34,7 +34,7 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.solved_states import solve_at
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.file_sections import field_of
+from hotlever.probe.probe import field_of
 from hotlever.probe.probe_parameters import parameters_of
 from hotlever.types import Array, Progress
 from hotlever.work import one_blas_thread

@@ -91,7 +91,7 @@ def read_surrounded_probe(
     Unless the command takes air where nothing is said (`finds_air`), settings of the air around a
     lever in vacuum are refused, since they would do nothing.
     """
-    from hotlever.probe.file_sections import field_of
+    from hotlever.probe.probe import field_of
 
     check_medium(lever.medium)
     probe = read_probe(reporter, lever.probe, lever.set, lever.physics)

@@ -98,7 +98,7 @@ def parse_settings(texts: Sequence[str] | None, probe: Probe) -> dict[str, Any]:
     >>> parse_settings(["a0=9e-4", "chip=true", "medium=air", "tip.height_um=0.7"], probe)
     {'a0': 0.0009, 'chip': True, 'medium': 'air', 'tip.height_um': 0.7}
     """
-    from hotlever.probe.file_sections import field_of
+    from hotlever.probe.probe import field_of
 
     values: dict[str, Any] = {}
     keys = set[tuple[str, str]]()

@@ -28,9 +28,9 @@ from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.heat import thermal_conductivity_of_layer
 from hotlever.materials.silicon import conductivity_low_doped
 from hotlever.probe import Probe
-from hotlever.probe.file_sections import read_sections
 from hotlever.probe.parts import SECTIONS
 from hotlever.probe.priors import Prior, parsed
+from hotlever.probe.probe import read_sections
 from hotlever.probe.tip import EXAMPLE
 from hotlever.raman import anharmonic
 from hotlever.records import Record
