@@ -54,8 +54,7 @@ from scipy.optimize import brentq
 from hotlever import Measurement, fit
 from hotlever.contact.law import INTERFACE, ContactLaw
 from hotlever.contact.resistances import cold_resistance
-from hotlever.estimate.experiment import ExperimentAtRest
-from hotlever.estimate.over_a_sample import with_distances
+from hotlever.estimate.experiment import ExperimentAtRest, with_distances
 from hotlever.lever import Lever
 from hotlever.lever.contact import sweep_in_contact
 from hotlever.lever.lever import COARSE

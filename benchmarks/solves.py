@@ -46,8 +46,8 @@ from hotlever.cli import main as command
 from hotlever.estimate import fit, read_measurement
 from hotlever.estimate.experiment import Predictor, experiment_of
 from hotlever.estimate.many import fit_many
-from hotlever.estimate.optimiser import Optimiser
 from hotlever.estimate.sampling import predictive_band, sample_posterior
+from hotlever.estimate.search import Optimiser
 from hotlever.lever.full_space import FullSpace, SparseFactors
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import PUBLISHED

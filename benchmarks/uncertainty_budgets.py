@@ -26,13 +26,12 @@ from numpy.random import Generator
 
 from hotlever.errors import HotleverError
 from hotlever.estimate import Estimate, FitOptions
-from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.experiment import TIP, Predictor
 from hotlever.estimate.objective import Objective
-from hotlever.estimate.optimiser import Optimiser
 from hotlever.estimate.options import CalibrationOptions, SearchOptions
 from hotlever.estimate.problem import Problem
-from hotlever.estimate.search import Solution, solve
+from hotlever.estimate.search import Optimiser, Solution, solve
+from hotlever.estimate.tip_temperature import calibrated
 from hotlever.estimate.verdict import verdict_on
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe

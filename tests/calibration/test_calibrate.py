@@ -14,7 +14,7 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.estimate import calibrate, read_calibration
 from hotlever.estimate.diagnosis import Diagnosis
-from hotlever.estimate.knee_scaling import curve_of_law, curve_of_model
+from hotlever.estimate.knee import curve_of_law, curve_of_model
 from hotlever.estimate.options import DiagnosisOptions, Numerics
 from hotlever.estimate.power_law import EQ12, read_power_law
 from hotlever.estimate.summary import calibration_text

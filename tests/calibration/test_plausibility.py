@@ -12,11 +12,11 @@ import pytest
 from documents import EXAMPLES
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, calibrate, estimator
-from hotlever.estimate.calibration import what_data_lack
 from hotlever.estimate.diagnosis import Diagnosis, MeasuredRows, hypotheses_of
 from hotlever.estimate.knee import IVCurve
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.problem import Problem
+from hotlever.estimate.tip_temperature import what_data_lack
 from hotlever.estimate.verdict import check_plausible
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
@@ -237,7 +237,7 @@ def test_a_resistor_that_is_hardly_known_may_be_another(curve, kohm):
     priors = {"series_resistance_ohm": "×/ 3"}
     options = FitOptions(priors=priors, usual_priors=True)
     problem = Problem.of(altered_measurement(curve), probe, options)
-    check_plausible(problem, Diagnosis(problem.measurement, problem.probe, priors))
+    check_plausible(problem)
 
 
 def test_good_data_have_no_cause(curve):

@@ -9,7 +9,7 @@ from hotlever.errors import InputError
 from hotlever.estimate import calibrate
 from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.estimate.next_measurement import LinearisedLever
-from hotlever.estimate.row_by_row import RowByRow
+from hotlever.instruments.ramp import RowByRow
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe

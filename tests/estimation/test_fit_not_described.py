@@ -14,9 +14,9 @@ from hotlever import figures
 from hotlever.errors import InputError
 from hotlever.estimate import Estimate, fit, read_fit
 from hotlever.estimate.estimator import undetermined
-from hotlever.estimate.profile import profile_likelihood
 from hotlever.estimate.sampling import sample_posterior
 from hotlever.estimate.summary import NEAREST, fit_text, parameter_rows
+from hotlever.estimate.uncertainty import profile_likelihood
 from hotlever.files import json_text
 from hotlever.report.estimate_pages import fit_page
 

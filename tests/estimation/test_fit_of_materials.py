@@ -11,8 +11,8 @@ import pytest
 from hotlever.errors import InputError
 from hotlever.estimate import Estimate, FitOptions, Measurement, fit, read_fit
 from hotlever.estimate.levers import compare_levers
-from hotlever.estimate.profile import profile_likelihood
 from hotlever.estimate.sampling import predictive_band, sample_posterior
+from hotlever.estimate.uncertainty import profile_likelihood
 from hotlever.lever import Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe

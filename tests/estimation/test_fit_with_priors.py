@@ -14,10 +14,9 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, estimator, fit, read_fit
-from hotlever.estimate.noise_model import CommonError, errors_of_scales
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.problem import Problem
-from hotlever.estimate.residuals import Residuals
+from hotlever.estimate.residuals import CommonError, Residuals, errors_of_scales
 from hotlever.estimate.search import solve
 from hotlever.estimate.summary import fit_text
 from hotlever.estimate.tip_temperature import tip_by_bias

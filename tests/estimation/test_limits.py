@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 
 from hotlever.estimate.experiment import Prediction
-from hotlever.estimate.objective import EstimatedQuantity, Objective, Penalty, Subproblem
+from hotlever.estimate.objective import (
+    Coordinates,
+    EstimatedQuantity,
+    Objective,
+    Penalty,
+    PriorDensity,
+    Subproblem,
+)
 from hotlever.estimate.options import Numerics
-from hotlever.estimate.posterior import Posterior
-from hotlever.estimate.prior_density import Coordinates, PriorDensity
-from hotlever.estimate.profile import ErrorProfile, profile_of_tip
+from hotlever.estimate.posterior import ErrorProfile, Posterior, profile_of_tip
 from hotlever.estimate.sampling import SampledTip, sample_tip
 from hotlever.estimate.tip_temperature import error_of_model
 from hotlever.probe.priors import Prior

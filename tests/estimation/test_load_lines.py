@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from hotlever.estimate.experiment import experiment_of
-from hotlever.estimate.objective import Objective
+from hotlever.estimate.objective import Objective, PriorDensity
 from hotlever.estimate.posterior import Posterior
-from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.residuals import Residuals
 from hotlever.estimate.surrogate import Rows
 from hotlever.lever import Lever

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hotlever.estimate.noise_model import CommonError, relative_noise
-from hotlever.estimate.residuals import Residuals
+from hotlever.estimate.residuals import CommonError, Residuals, relative_noise
 from hotlever.measurement import Measurement
 
 TRUTH = np.linspace(0.05, 1.5, 40)

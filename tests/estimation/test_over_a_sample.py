@@ -13,13 +13,12 @@ from hotlever import Measurement, Probe, fit, read_calibration
 from hotlever.contact.law import INTERFACE
 from hotlever.errors import InputError
 from hotlever.estimate import CalibrationOptions, Estimate, FitOptions
-from hotlever.estimate.calibration import calibrated
 from hotlever.estimate.diagnosis import Diagnosis
-from hotlever.estimate.experiment import ExperimentAtRest
-from hotlever.estimate.over_a_sample import with_distances
+from hotlever.estimate.experiment import ExperimentAtRest, with_distances
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import solve
 from hotlever.estimate.summary import calibration_text
+from hotlever.estimate.tip_temperature import calibrated
 from hotlever.estimate.verdict import verdict_on
 from hotlever.lever import Lever
 from hotlever.lever.contact import out_of_contact, sweep_in_contact

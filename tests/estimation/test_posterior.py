@@ -13,7 +13,6 @@ from hotlever.errors import ComputationError, InputError
 from hotlever.estimate import Measurement, fit, uncertainty
 from hotlever.estimate.experiment import experiment_of
 from hotlever.estimate.objective import inverse_or_nan
-from hotlever.estimate.profile import profile_likelihood
 from hotlever.estimate.sampling import (
     SampledLever,
     Trials,
@@ -21,6 +20,7 @@ from hotlever.estimate.sampling import (
     predictive_band,
     sample_posterior,
 )
+from hotlever.estimate.uncertainty import profile_likelihood
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe

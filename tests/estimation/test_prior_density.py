@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hotlever.estimate.prior_density import PriorDensity
+from hotlever.estimate.objective import PriorDensity
 from hotlever.probe.priors import Prior
 
 

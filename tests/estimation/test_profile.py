@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from experiments import full_experiment
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, fit
-from hotlever.estimate.profile import profile_likelihood
+from hotlever.estimate.uncertainty import profile_likelihood
 from hotlever.lever import Lever
 
 # a profile makes its own lever

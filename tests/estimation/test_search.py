@@ -18,12 +18,11 @@ from hotlever.errors import InputError
 from hotlever.estimate import Measurement, calibrate, fit
 from hotlever.estimate.experiment import ExperimentAtRest, Predictor
 from hotlever.estimate.objective import Objective
-from hotlever.estimate.optimiser import Optimiser
 from hotlever.estimate.options import FitOptions, SearchOptions
 from hotlever.estimate.posterior import standard_errors
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.residuals import Residuals
-from hotlever.estimate.search import solve
+from hotlever.estimate.search import Optimiser, solve
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.materials import PARAMETERS

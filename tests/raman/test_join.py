@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from hotlever.errors import InputError
-from hotlever.estimate.noise_model import errors_of_scales
+from hotlever.estimate.residuals import errors_of_scales
 from hotlever.measurement import read_measurement
 from hotlever.probe.priors import THERMOMETER
 from hotlever.raman.spectrum_tables import join, read_bias_log

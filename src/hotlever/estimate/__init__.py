@@ -3,13 +3,14 @@
 ==============  ====================================================================================
 problem         a measurement, priors and options, settled: `problem`, by `options`
 forward map     `experiment`: at rest, in time, over a sample; the `surrogate` of a solved lever
-residuals       data by their `noise` and the scales that they have in common: `residuals`
-search          of an `objective`, with a `prior_density`: `search` by an `optimiser`
-posterior       `posterior`: of any quantity, also curved; its `profile`; its samples: `sampling`
+residuals       `residuals`: data by their noise and the scales that they have in common
+search          `search` for the least of an `objective`, of residuals and priors
+posterior       `posterior`: of any quantity, also curved; its samples: `sampling`; of a fit, with
+                profiles: `uncertainty`
 verdict         `verdict`: whether data are described; why not: `diagnosis`
 estimate        `estimate`: all of that, and its `file`; `estimator` makes it, as a fit or as a
-                `calibration` with `tip_temperature`, `uncertainty_budget`, `knee`, `power_law`
-                and `pulses`; `beside_a_fit`; by the paper's rule, `knee_scaling`; `many` of them
+                calibration with `tip_temperature`, `uncertainty_budget`, `power_law` and `pulses`;
+                `beside_a_fit`; by the paper's rule, from a `knee`; `many` of them
 next            `next_measurement`: which further rows lessen an error most
 ==============  ====================================================================================
 """

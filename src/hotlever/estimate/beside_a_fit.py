@@ -12,8 +12,8 @@ import numpy as np
 
 from hotlever.errors import ComputationError
 from hotlever.estimate.estimate import Estimate
+from hotlever.estimate.objective import PriorDensity
 from hotlever.estimate.options import FitOptions
-from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import Solution, solve
 from hotlever.estimate.tip_temperature import OF_THE_MEASUREMENT

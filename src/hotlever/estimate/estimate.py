@@ -20,27 +20,24 @@ from hotlever.datasets import columns_text, labelled
 from hotlever.errors import InputError, unknown_name
 from hotlever.estimate.experiment import experiment_of
 from hotlever.estimate.file import EstimateFile, FittedParameter, rising_band
-from hotlever.estimate.knee import Knee
-from hotlever.estimate.noise_model import errors_of_scales
-from hotlever.estimate.objective import Objective
+from hotlever.estimate.objective import Objective, PriorDensity
 from hotlever.estimate.options import FitOptions
-from hotlever.estimate.over_a_sample import with_distances
 from hotlever.estimate.posterior import standard_errors
 from hotlever.estimate.power_law import PowerLaw
-from hotlever.estimate.prior_density import PriorDensity
-from hotlever.estimate.residuals import Residuals
+from hotlever.estimate.residuals import Residuals, errors_of_scales
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import (
     OF_THE_CONTACT,
     STATED,
     TABLE_COLUMNS,
     TABLES_BY,
+    Knee,
     PulseCalibration,
     TipTable,
     even_rows,
     interpolated,
 )
-from hotlever.estimate.uncertainty_budget import TemperatureBudget
+from hotlever.estimate.uncertainty_budget import TemperatureBudget, limits_of
 from hotlever.files import json_text, write_text
 from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.lever import Lever
@@ -369,8 +366,7 @@ class Estimate:
     def _over_a_sample(self) -> xr.Dataset:
         """Return what is shown at the measured biases and distances, in the order of the rows."""
         bias, distance = self.measurement.bias_V, self.measurement.distance_um
-        experiment = experiment_of(self.probe, bias)
-        experiment = with_distances(experiment, self.probe, distance)
+        experiment = experiment_of(self.probe, bias, distance_um=distance)
         _, at = experiment.measuring(bias, None, distance).exact_at(self.probe)
         away = self.measurement.out_of_contact
         of_contact = {
@@ -543,6 +539,36 @@ class Estimate:
         rows = even_rows(table, self.columns, TABLES_BY[by][0], step)
         return columns_text(rows, digits=6)
 
+    def in_either(self, other: Estimate) -> Estimate:
+        """Return it with errors that hold another estimate of the same data as well."""
+        band = self.band_columns
+        choice = _error_of_choice(band["tip_K"], other.band_columns["tip_K"])
+        band = {**band, "tip_stderr_K": np.hypot(band["tip_stderr_K"], choice)}
+        if not self.route:
+            return replace(self, band_columns=band)
+        columns, of_other = dict(self.tip_table.columns), other.tip_table
+        others = {
+            name: np.interp(columns["bias_V"], of_other["bias_V"], of_other[name])
+            for name in columns
+        }
+        columns["tip_low_K"] = np.minimum(columns["tip_low_K"], others["tip_low_K"])
+        columns["tip_high_K"] = np.maximum(columns["tip_high_K"], others["tip_high_K"])
+        choices = {}
+        for error in (name for name in columns if name.endswith("_stderr_K")):
+            name = error.replace("_stderr", "")
+            choices[name] = _error_of_choice(columns[name], others[name])
+            columns[error] = np.hypot(columns[error], choices[name])
+        budgets = {
+            name: {**parts, "medium": choices["apex_K" if name == "apex_budget_K" else "tip_K"]}
+            for name, parts in self.tip_table.budgets.items()
+        }
+        table, gum = TipTable(columns, budgets), self.gum
+        if gum is not None and other.gum is not None:
+            row = columns["bias_V"].tolist().index(gum.bias_V)
+            limits = limits_of(table.rows(slice(row, row + 1)), gum.of)
+            gum = gum.in_either(other.gum, choices[f"{gum.of}_K"][row].item(), limits)
+        return replace(self, band_columns=band, tabulated=table, gum=gum)
+
     # --- its file ---------------------------------------------------------------------------------
 
     @classmethod
@@ -567,6 +593,11 @@ class Estimate:
     ) -> None:
         """Write the file, whole or not at all."""
         write_text(path, self.to_json(request))
+
+
+def _error_of_choice(tip_K: Array, other_K: Array) -> Array:
+    """Return the standard error (K) of a tip temperature that may as well be another one."""
+    return np.asarray(np.abs(tip_K - other_K) / np.sqrt(2.0))
 
 
 def _correlation(covariance: Array) -> Array:

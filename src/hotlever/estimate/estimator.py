@@ -17,21 +17,19 @@ import numpy as np
 
 from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.estimate.beside_a_fit import solve_beside_a_fit
-from hotlever.estimate.calibration import calibrated
-from hotlever.estimate.diagnosis import Diagnosis, outlier_notes
+from hotlever.estimate.diagnosis import outlier_notes
 from hotlever.estimate.estimate import Estimate, read_fit
 from hotlever.estimate.experiment import Model, Seen
-from hotlever.estimate.knee_scaling import calibrated_by_rule
+from hotlever.estimate.knee import calibrated_by_rule
 from hotlever.estimate.options import CalibrationOptions, FitOptions, chosen
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.pulses import pulse_calibration
 from hotlever.estimate.search import Solution, solve
-from hotlever.estimate.tip_table import TipTable
 from hotlever.estimate.tip_temperature import (
+    calibrated,
     check_in_range,
     limits_of_range,
 )
-from hotlever.estimate.uncertainty_budget import limits_of
 from hotlever.estimate.verdict import (
     check_plausible,
     check_similar,
@@ -44,7 +42,7 @@ from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import of_materials, parameters_of
 from hotlever.probe.surroundings import Medium
 from hotlever.text import NOT_DETERMINED, value_with_error, with_unit
-from hotlever.types import Array, Progress
+from hotlever.types import Progress
 
 
 def fit(
@@ -60,7 +58,7 @@ def fit(
     """Find the material parameters that make the model match a measurement.
 
     Gauss and Newton's steps within a trust region, with the exact Jacobian
-    (`hotlever.estimate.optimiser`).
+    (`hotlever.estimate.search`).
 
     Parameters
     ----------
@@ -105,9 +103,7 @@ def fit(
         return result
     problem, values = solution.problem, solution.prediction.values
     if problem.options.robust or not outlier_notes(solution.residuals, values, robust=False):
-        priors = problem.options.priors or None
-        diagnosis = options.numerics.diagnosis
-        cause = Diagnosis(problem.measurement, problem.probe, priors, diagnosis).named()
+        cause = problem.causes.named()
     else:
         cause = "are the points far from the fit wrong ones? a robust fit (--robust) forgets them"
     return replace(result, reason=f"{result.reason}; {cause}")
@@ -125,7 +121,7 @@ def calibrate(
     """Find the tip temperature of a lever from its I-V curve.
 
     What is known of the lever beforehand is brought up to date by all that was measured; with a
-    power law the paper's rule is used instead (`hotlever.estimate.knee_scaling`).
+    power law the paper's rule is used instead (`hotlever.estimate.knee`).
 
     Parameters
     ----------
@@ -181,16 +177,14 @@ def calibrate(
     def within(medium: Any) -> tuple[Solution, Estimate]:
         """Calibrate the lever in a medium."""
         problem = Problem.of(whole, origin, replace(options.of_lever, medium=medium))
-        # the search begins with the lever that its data are compared with before
-        names = problem.experiment.names if fit is None else ()
-        diagnosis = options.numerics.diagnosis
-        causes = Diagnosis(problem.measurement, problem.probe, options.priors, diagnosis, names)
-        check_plausible(problem, causes)
+        causes = problem.causes
+        check_plausible(problem)
         check_in_range(options.at_V, *limits_of_range(problem.measurement, problem.probe))
         if fit is None:
-            check_similar(problem, causes)
+            check_similar(problem)
         try:
             if fit is None:
+                # the search begins with the lever that its data are compared with before
                 alone = problem.probe.circuit.starts_cold
                 solution = solve(problem, progress, stated=causes.stated if alone else None)
             else:
@@ -264,56 +258,20 @@ def in_medium(
         return bool(answer.reason), solution.posterior.deviance
 
     best, *rest = sorted(answers, key=unlikeliness)
-    texts = [f"in {medium} a lever {_how_well(*answers[medium])}" for medium in (best, *rest)]
+    texts = [f"in {medium} a lever {_how_well(answers[medium][1])}" for medium in (best, *rest)]
     texts += [f"in {medium} there is none: {error}" for medium, error in failures.items()]
     note = f"the medium is not known: {'; '.join(texts)}"
     solution, answer = answers[best]
     for other in (answers[medium][1] for medium in rest if not answers[medium][1].reason):
-        answer = _either(answer, other)
+        answer = answer.in_either(other)
         note += "; the data do not tell which, and the errors of the tip temperature hold both"
     return solution, replace(answer, notes=[note, *answer.notes])
 
 
-def _how_well(solution: Solution, answer: Estimate) -> str:
-    rms = solution.residuals.rms(solution.prediction.values)
-    rms_text = ", ".join(f"{value:.2g} {name.rsplit('_', 1)[1]}" for name, value in rms.items())
+def _how_well(answer: Estimate) -> str:
+    rms = answer.residual_rms.items()
+    rms_text = ", ".join(f"{value:.2g} {name.rsplit('_', 1)[1]}" for name, value in rms)
     return f"{'does not describe' if answer.reason else 'describes'} the data (rms {rms_text})"
-
-
-def _error_of_choice(tip_K: Array, other_K: Array) -> Array:
-    """Return the standard error (K) of a tip temperature that may as well be another one."""
-    return np.asarray(np.abs(tip_K - other_K) / np.sqrt(2.0))
-
-
-def _either(estimate: Estimate, other: Estimate) -> Estimate:
-    """Return an estimate whose errors hold another of the same data as well."""
-    band = estimate.band_columns
-    choice = _error_of_choice(band["tip_K"], other.band_columns["tip_K"])
-    band = {**band, "tip_stderr_K": np.hypot(band["tip_stderr_K"], choice)}
-    estimate = replace(estimate, band_columns=band)
-    if not estimate.route:
-        return estimate
-    columns, of_other = dict(estimate.tip_table.columns), other.tip_table
-    others = {
-        name: np.interp(columns["bias_V"], of_other["bias_V"], of_other[name]) for name in columns
-    }
-    columns["tip_low_K"] = np.minimum(columns["tip_low_K"], others["tip_low_K"])
-    columns["tip_high_K"] = np.maximum(columns["tip_high_K"], others["tip_high_K"])
-    choices = {}
-    for error in (name for name in columns if name.endswith("_stderr_K")):
-        name = error.replace("_stderr", "")
-        choices[name] = _error_of_choice(columns[name], others[name])
-        columns[error] = np.hypot(columns[error], choices[name])
-    budgets = {
-        name: {**parts, "medium": choices["apex_K" if name == "apex_budget_K" else "tip_K"]}
-        for name, parts in estimate.tip_table.budgets.items()
-    }
-    table, gum = TipTable(columns, budgets), estimate.gum
-    if gum is not None and other.gum is not None:
-        row = columns["bias_V"].tolist().index(gum.bias_V)
-        limits = limits_of(table.rows(slice(row, row + 1)), gum.of)
-        gum = gum.in_either(other.gum, choices[f"{gum.of}_K"][row].item(), limits)
-    return replace(estimate, tabulated=table, gum=gum)
 
 
 # --- what is said of the parameters of a fit ----------------------------------------------------

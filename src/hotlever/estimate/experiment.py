@@ -1,37 +1,56 @@
 """An experiment: the forward map from a lever's parameters to what is measured, with derivatives.
 
-A lever is measured at rest or in time (`hotlever.estimate.experiment_in_time`). Either solves a
-lever that is fast, and can be corrected by the full one at the probe of a prediction.
+A lever is measured at rest or in time. Either solves a lever that is fast, and can be corrected by
+the full one at the probe of a prediction. Parameters are what `hotlever.probe.probe_parameters`
+names: of the material, dimensions, the series resistance.
 
 At rest the fast lever is a reduced one where the geometry has been reduced before, or else the same
 lever on a coarse mesh. Where the full lever is solved too, the difference of the two branches is
-added to the fast one's from then on. Parameters are what `hotlever.probe.probe_parameters` names:
-of the material, dimensions, the series resistance.
+added to the fast one's from then on. In time the lever on a coarse mesh tells how its history
+changes with the parameters; at the optimum the full one is followed, and the difference added.
+
+Over a sample one lever is measured in several positions, with all parameters in common: in contact,
+as the probe states it; and away from the sample, where no heat passes the interface, and in air the
+surface is further away. In vacuum all distances are one position. In air a few are solved, and the
+rows between them are interpolated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol, Self
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, make_interp_spline
 
-from hotlever.errors import ComputationError
-from hotlever.estimate.surrogate import CurveSurrogate, Rows, Surrogate
+from hotlever.contact.law import INTERFACE
+from hotlever.errors import ComputationError, InputError
+from hotlever.estimate.surrogate import (
+    ContactTemperatures,
+    CurveSurrogate,
+    LinearSurrogate,
+    Rows,
+    Surrogate,
+)
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.observables import Linearised, by_parameter
 from hotlever.lever.reduced.reduced_lever import ReducedLever
 from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
 from hotlever.lever.similar import SimilarLevers
+from hotlever.lever.transient.history import integrate
+from hotlever.lever.transient.sensitivities import derivable, with_sensitivities
+from hotlever.lever.transient.waveform import Piece, Waveform
+from hotlever.measurement import Measurement
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
+from hotlever.probe.priors import Prior
 from hotlever.probe.probe_parameters import usual_parameters
-from hotlever.quantities import FITTED
-from hotlever.types import Array, Mask, Progress
+from hotlever.probe.tip import OUT_OF_CONTACT
+from hotlever.quantities import FITTED, observables_of
+from hotlever.types import Array, Index, Mask, Progress
 from hotlever.units import MOST_BIAS
 from hotlever.work import one_blas_thread
 
@@ -204,6 +223,9 @@ class Predictor:
         return True
 
 
+# --- at rest --------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
 class PredictionAtRest(Prediction):
     """What an instrument and a thermometer would show at some biases.
@@ -214,8 +236,8 @@ class PredictionAtRest(Prediction):
     linearised : Linearised
         What it was read from, not corrected.
     away : tuple of PredictionAtRest
-        Of levers away from a sample, see `hotlever.estimate.over_a_sample`; then what it was read
-        from is the lever in contact.
+        Of levers away from a sample, see `ExperimentOverSample`; then what it was read from is the
+        lever in contact.
     """
 
     surrogate: CurveSurrogate
@@ -280,7 +302,7 @@ class ExperimentAtRest:
     ) -> ExperimentAtRest:
         """Return the model at other biases (V), with what was measured there, if that is known.
 
-        Distances count over a sample, see `hotlever.estimate.over_a_sample`.
+        Distances count over a sample, see `ExperimentOverSample`.
         """
         return replace(self, bias=bias, measured=measured)
 
@@ -387,6 +409,7 @@ def experiment_of(
     *,
     names: tuple[str, ...] | None = None,
     reduce: bool = False,
+    distance_um: Array | None = None,
 ) -> ExperimentAtRest:
     """Return the fastest forward model of a probe.
 
@@ -400,10 +423,408 @@ def experiment_of(
     reduce : bool
         Make and keep a reduced lever (some seconds) if the geometry has none yet: it pays where
         more than one fit is to come.
+    distance_um : ndarray, shape (n,), optional
+        Of the apex from a sample, see `with_distances`.
     """
     lever, reduced = Lever(probe), None
     names = usual_parameters(probe) if names is None else names
     if can_be_reduced(probe, names):
         reduced = cached_reduction(lever, names=names) if reduce else known_reduction(lever, names)
     fast = reduced or SimilarLevers(Lever(probe, COARSE))
-    return ExperimentAtRest(fast, SimilarLevers(lever), bias, names)
+    experiment = ExperimentAtRest(fast, SimilarLevers(lever), bias, names)
+    return with_distances(experiment, probe, distance_um)
+
+
+# --- in time --------------------------------------------------------------------------------------
+
+
+class _Times:
+    """Times (µs) at which a lever is followed, and what is seen at the rows of a measurement.
+
+    Where rows are many they lie on a spline of third degree over the logarithm of the time since
+    the last corner of the wave form, in which histories are smooth.
+    """
+
+    def __init__(self, waveform: Waveform, rows: Array) -> None:
+        self._count = rows.size
+        parts: list[tuple[Index, Array, float | None]] = []
+        # where a lever is hottest, as a rule
+        ends: list[float] = []
+        for piece in waveform.pieces(float(rows[-1]) * (1.0 + 1e-9)):
+            here = (rows > piece.start) | ((rows == 0.0) & (piece.start == 0.0))
+            indices = np.flatnonzero(here & (rows <= piece.end))
+            ends.append(min(piece.end, float(rows[-1])))
+            if indices.size:
+                parts.append((indices, *_few(rows[indices], piece)))
+        self.at = np.unique(np.concatenate([ends, *(at for _, at, _ in parts)]))
+        self._parts = [
+            (indices, np.searchsorted(self.at, at), rows[indices], start)
+            for indices, at, start in parts
+        ]
+
+    def at_rows(self, values: Array) -> Array:
+        """Return what is seen at the rows, (k, n, ...), of that at the times, (k, m, ...)."""
+        at_rows = np.empty((len(values), self._count, *values.shape[2:]))
+        for indices, nodes, rows, start in self._parts:
+            part = values[:, nodes]
+            if start is not None:
+                after = np.log(self.at[nodes] - start)
+                # what a lever does not show is NaN, and stays alone so
+                spline = make_interp_spline(after, part, 3, axis=1, check_finite=False)
+                part = spline(np.log(rows - start))
+            at_rows[:, indices] = part
+        return at_rows
+
+
+def _few(rows: Array, piece: Piece) -> tuple[Array, float | None]:
+    """Return times at which to follow within a piece, and its start if these are not all rows."""
+    first = rows[rows > piece.start][:1]
+    if not first.size or np.isfinite(piece.longest):
+        return rows, None
+    decades = np.log10((rows[-1] - piece.start) / (first[0] - piece.start))
+    few = piece.start + np.geomspace(
+        first[0] - piece.start, rows[-1] - piece.start, 4 + int(12 * decades)
+    )
+    if few.size >= rows.size or rows[0] == piece.start:
+        return rows, None
+    # without what the logarithm has rounded
+    few[[0, -1]] = rows[[0, -1]]
+    return few, piece.start
+
+
+@dataclass(frozen=True)
+class PredictionInTime(Prediction):
+    """What an instrument and a thermometer would show in time.
+
+    Attributes
+    ----------
+    coarse : ndarray, shape (observables, m)
+        What the coarse lever itself shows at the times at which it was followed.
+    coarse_slopes : ndarray, shape (observables, m, k)
+    """
+
+    coarse: Array
+    coarse_slopes: Array
+
+
+@dataclass(frozen=True)
+class ExperimentInTime:
+    """Predicts histories of levers similar to one.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters; see `hotlever.lever.transient.sensitivities.with_sensitivities`.
+    waveform : Waveform
+    fast : SimilarLevers
+        On a coarse mesh.
+    full : SimilarLevers or None
+        What it is corrected by; None where it is right as it is.
+    times : _Times
+        When it is followed, and how rows are read off that.
+    offset : ndarray, shape (observables, m), or float
+        That correction.
+    tolerance_K : float
+        Of a step: some parts in a hundred thousand of the current.
+    """
+
+    names: tuple[str, ...]
+    waveform: Waveform
+    fast: SimilarLevers
+    full: SimilarLevers | None
+    times: _Times
+    offset: Array | float = 0.0
+    tolerance_K: float = 0.05
+
+    @classmethod
+    def of(
+        cls,
+        probe: Probe,
+        rows: Array,
+        waveform: Waveform,
+        names: Sequence[str],
+        *,
+        lever: Lever | None = None,
+    ) -> ExperimentInTime:
+        """Return the model of a probe at the times (µs) of some rows.
+
+        A `lever` that is given is taken as it is; else a coarse one is corrected by the full one.
+        """
+        fast = SimilarLevers(Lever(probe, COARSE) if lever is None else lever)
+        full = SimilarLevers(Lever(probe)) if lever is None else None
+        return cls(tuple(names), waveform, fast, full, _Times(waveform, rows))
+
+    def predict(self, probe: Probe, near: PredictionInTime | None = None) -> PredictionInTime:
+        """Follow the lever of a probe, unless it was followed for the prediction nearby.
+
+        Raises
+        ------
+        ComputationError
+            If silicon melts, or a step fails.
+        """
+        if near is not None and near.probe == probe:
+            coarse, coarse_slopes = near.coarse, near.coarse_slopes
+        else:
+            history = with_sensitivities(
+                self.fast.lever(probe),
+                self.waveform,
+                self.times.at,
+                self.names,
+                tolerance_K=self.tolerance_K,
+            )
+            coarse, coarse_slopes = observables_of(history), history.sensitivity.values
+        corrected = coarse + self.offset
+        columns = {
+            "time_us": self.times.at,
+            "bias_V": self.waveform.bias(self.times.at),
+            **named(corrected),
+        }
+        parameters = probe.values(self.names)
+        values, slopes = ContactTemperatures(probe, self.names).differentiated(
+            self.times.at_rows(corrected), self.times.at_rows(coarse_slopes), parameters
+        )
+        surrogate = LinearSurrogate(parameters, values, slopes)
+        tip_slopes = coarse_slopes[TIP]
+        return PredictionInTime(
+            probe, values, slopes, surrogate, columns, tip_slopes, coarse, coarse_slopes
+        )
+
+    def confirmed(self, at: PredictionInTime) -> ExperimentInTime:
+        """Return a model that is that of the full lever at the probe of a prediction.
+
+        Raises
+        ------
+        ComputationError
+            If the full lever cannot be followed.
+        """
+        if self.full is None:
+            return self
+        history = integrate(
+            self.full.lever(at.probe), self.waveform, at=self.times.at, tolerance_K=self.tolerance_K
+        )
+        return replace(self, offset=observables_of(history) - at.coarse)
+
+
+def known_in_time(
+    probe: Probe, measurement: Measurement, priors: Mapping[str, Prior], varied: Sequence[str]
+) -> tuple[dict[str, Prior], list[str]]:
+    """Return the priors of what a fit in time can vary, and a note on those of the probe file left.
+
+    Raises
+    ------
+    InputError
+        If there are no derivatives by what is varied otherwise, or the bias does not begin at 0.
+    """
+    before = 0.0 if measurement.waveform is None else measurement.waveform.before_V
+    if before != 0.0:
+        raise InputError(
+            f"found a wave form that begins at {before:g} V, expected one of a lever that is cold"
+        )
+    stated = probe.stated_priors
+    without = [name for name in varied if not derivable(probe, name)]
+    # what a probe file says of a dimension is no request to vary it here
+    held = [name for name in without if name in stated or "dimensions" in stated]
+    for name in without:
+        if name not in held:
+            raise InputError(
+                f"{name}: cannot be varied in time, for there are no derivatives by it; expected "
+                "parameters of materials, series_resistance_ohm or gas_conductivity"
+            )
+    notes = [f"held, since there are no derivatives in time by them: {', '.join(held)}"]
+    return {name: prior for name, prior in priors.items() if name not in held}, notes * bool(held)
+
+
+# --- over a sample --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Away:
+    """Positions away from the sample, (k,).
+
+    Attributes
+    ----------
+    changes : tuple of mapping of str to float
+        What the probe has there in place of its values in contact.
+    height_um : float
+        Of the tip.
+    places : ndarray, shape (k,)
+        Logarithms of the distances from sample to lever; empty in vacuum.
+    """
+
+    changes: tuple[Mapping[str, float], ...]
+    height_um: float
+    places: Array
+
+    @classmethod
+    def of(cls, probe: Probe, distance_um: Array, most: int = 7) -> Away:
+        """Return those that rows at distances of a probe's apex need, (n,), and `most` in air."""
+        assert probe.tip is not None
+        change, height = {INTERFACE: OUT_OF_CONTACT}, probe.tip.height_um
+        out = distance_um[distance_um > 0.0]
+        if probe.surroundings.medium == "vacuum" or not out.size:
+            return cls((change,), height, np.empty(0))
+        places = np.unique(np.log(height + out))
+        if places.size > most:
+            # Chebyshev's, between which a polynomial follows a smooth function closely
+            turns = np.cos(np.linspace(np.pi, 0.0, most))
+            places = (places[-1] + places[0] + turns * np.ptp(places)) / 2.0
+        gaps = np.exp(places).tolist()
+        return cls(tuple({**change, "surface_gap_um": gap} for gap in gaps), height, places)
+
+    def probes(self, probe: Probe) -> list[Probe]:
+        """Return a probe in contact as it is there."""
+        return [probe.replace(change) for change in self.changes]
+
+    def weights(self, distance_um: Array) -> Array:
+        """Return how much rows, (n,), show of the lever in contact and of these, (1 + k, n)."""
+        out = distance_um > 0.0
+        if not self.places.size:
+            return np.stack([~out, out]).astype(float)
+        # Lagrange's polynomials
+        at, same = np.log(self.height_um + distance_um[out]), np.eye(self.places.size, dtype=bool)
+        away = np.where(same, 1.0, self.places[:, None] - self.places)
+        factors = np.where(same, 1.0, (at[:, None, None] - self.places) / away)
+        weights = np.zeros((1 + self.places.size, out.size))
+        weights[0], weights[1:, out] = ~out, factors.prod(axis=-1).T
+        return weights
+
+
+def _mixed(weights: Array, each: Sequence[Array]) -> Array:
+    """Return what rows show, (m, n, ...), of what each lever shows at all of them."""
+    return np.asarray(np.einsum("kn,kmn...->mn...", weights, np.stack(each)))
+
+
+class SurrogateOverSample(CurveSurrogate):
+    """What is shown over a sample by levers near one; its branch is that in contact.
+
+    Parameters
+    ----------
+    touching : CurveSurrogate
+    away : sequence of CurveSurrogate
+        With fewer parameters.
+    weights : ndarray, shape (1 + k, n)
+        See `Away`.
+    """
+
+    def __init__(
+        self, touching: CurveSurrogate, away: Sequence[CurveSurrogate], weights: Array
+    ) -> None:
+        own = touching
+        super().__init__(own.probe, own.names, own.branch, own.by_parameter, own.rows)
+        self._away, self._weights = away, weights
+        self._columns = [[self.names.index(name) for name in each.names] for each in away]
+
+    def predict(self, parameters: Array) -> tuple[Array, Array]:
+        """See `hotlever.estimate.surrogate.Surrogate`."""
+        pairs = zip(self._away, self._columns, strict=True)
+        others = [each.predict(parameters[columns]) for each, columns in pairs]
+        return self.mixed(super().predict(parameters), others)
+
+    def mixed(
+        self, touching: tuple[Array, Array], away: Sequence[tuple[Array, Array]]
+    ) -> tuple[Array, Array]:
+        """Return values and slopes at the rows, of those that each lever has at all of them."""
+        values, slopes = [touching[0]], [touching[1]]
+        for (each, by_own), columns in zip(away, self._columns, strict=True):
+            by_all = np.zeros_like(touching[1])
+            by_all[..., columns] = by_own
+            values.append(each)
+            slopes.append(by_all)
+        return _mixed(self._weights, values), _mixed(self._weights, slopes)
+
+    def values_at(self, parameters: Array) -> Array:
+        """See `hotlever.estimate.surrogate.Surrogate`."""
+        pairs = zip(self._away, self._columns, strict=True)
+        others = [each.values_at(parameters[columns]) for each, columns in pairs]
+        return _mixed(self._weights, [super().values_at(parameters), *others])
+
+
+@dataclass(frozen=True)
+class ExperimentOverSample(ExperimentAtRest):
+    """Predicts a measurement over a sample.
+
+    Attributes
+    ----------
+    positions : Away
+    away : tuple of ExperimentAtRest
+        One for each position, without the parameters that do not matter there.
+    weights : ndarray, shape (1 + k, n)
+        See `Away`.
+    """
+
+    positions: Away = field(kw_only=True)
+    away: tuple[ExperimentAtRest, ...] = field(kw_only=True)
+    weights: Array = field(kw_only=True)
+
+    @classmethod
+    def of(cls, touching: ExperimentAtRest, probe: Probe, distance_um: Array) -> Self:
+        """Return that of a lever in contact, at rows with distances of its apex (µm)."""
+        positions = Away.of(probe, distance_um)
+        own = {field.name: getattr(touching, field.name) for field in fields(touching)}
+        names = tuple(name for name in touching.names if name not in positions.changes[0])
+        away = tuple(
+            replace(touching.drawn_anew(each), names=names) for each in positions.probes(probe)
+        )
+        weights = positions.weights(distance_um)
+        return cls(**own, positions=positions, away=away, weights=weights)
+
+    def measuring(
+        self, bias: Array, measured: Array | None, distance_um: Array | None = None
+    ) -> ExperimentAtRest:
+        """Return the model at other rows; of the lever in contact where no distance is said."""
+        if distance_um is None:
+            names = [field.name for field in fields(ExperimentAtRest)]
+            own = ExperimentAtRest(**{name: getattr(self, name) for name in names})
+            return own.measuring(bias, measured)
+        away = tuple(each.measuring(bias, measured) for each in self.away)
+        weights = self.positions.weights(distance_um)
+        return replace(self, bias=bias, measured=measured, away=away, weights=weights)
+
+    def coarse(self) -> Self:
+        """See `ExperimentAtRest.coarse`."""
+        return replace(super().coarse(), away=tuple(each.coarse() for each in self.away))
+
+    def until_melting(self) -> Self:
+        """See `ExperimentAtRest.until_melting`."""
+        away = tuple(each.until_melting() for each in self.away)
+        return replace(super().until_melting(), away=away)
+
+    def drawn_anew(self, probe: Probe) -> Self:
+        """See `ExperimentAtRest.drawn_anew`."""
+        pairs = zip(self.away, self.positions.probes(probe), strict=True)
+        away = tuple(each.drawn_anew(there) for each, there in pairs)
+        return replace(super().drawn_anew(probe), away=away)
+
+    def predict(self, probe: Probe, near: PredictionAtRest | None = None) -> PredictionAtRest:
+        """See `ExperimentAtRest.predict`."""
+        own = super().predict(probe, near)
+        nearby = (None,) * len(self.away) if near is None else near.away
+        trios = zip(self.away, self.positions.probes(probe), nearby, strict=True)
+        away = tuple(each.predict(there, other) for each, there, other in trios)
+        surrogate = SurrogateOverSample(
+            own.surrogate, [each.surrogate for each in away], self.weights
+        )
+        every = [(each.values, each.slopes) for each in (own, *away)]
+        values, slopes = surrogate.mixed(every[0], every[1:])
+        lever = probe.circuit.lever_voltage(self.bias, values[0])
+        columns = {**own.columns, "lever_V": lever, **named(values)}
+        return PredictionAtRest(
+            probe, values, slopes, surrogate, columns, slopes[TIP], own.linearised, away
+        )
+
+    def confirmed(self, at: PredictionAtRest) -> Self:
+        """See `ExperimentAtRest.confirmed`."""
+        if self.full is None:
+            return self
+        pairs = zip(self.away, at.away, strict=True)
+        away = tuple(each.confirmed(there) for each, there in pairs)
+        return replace(super().confirmed(at), away=away)
+
+
+def with_distances(
+    experiment: ExperimentAtRest, probe: Probe, distance_um: Array | None
+) -> ExperimentAtRest:
+    """Return an experiment with its rows at distances from a sample (µm), if they have some."""
+    if probe.contact is None or distance_um is None or not (distance_um > 0.0).any():
+        return experiment
+    return ExperimentOverSample.of(experiment, probe, distance_um)

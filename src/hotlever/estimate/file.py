@@ -29,13 +29,13 @@ from pydantic import (
 
 from hotlever import __version__
 from hotlever.errors import InputError, unknown_name
-from hotlever.estimate.knee import Knee
 from hotlever.estimate.options import BudgetOf, FitOptions
 from hotlever.estimate.power_law import PowerLaw
 from hotlever.estimate.tip_table import (
     OF_THE_CONTACT,
     PULSE_COLUMNS,
     TABLE_COLUMNS,
+    Knee,
     PulseCalibration,
     PulseTiming,
     TipTable,

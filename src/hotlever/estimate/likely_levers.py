@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hotlever.estimate.prior_density import Coordinates
+from hotlever.estimate.objective import Coordinates
 from hotlever.estimate.surrogate import CurveSurrogate
 from hotlever.lever.branch import TIP_RISE
 from hotlever.lever.observables import observed, observed_by

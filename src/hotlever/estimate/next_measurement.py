@@ -24,9 +24,9 @@ from hotlever.errors import InputError, unknown_name
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP
 from hotlever.estimate.likely_levers import Knowledge, LikelyLevers
+from hotlever.estimate.objective import Coordinates, PriorDensity
 from hotlever.estimate.options import FitOptions, SearchOptions
 from hotlever.estimate.posterior import standard_errors
-from hotlever.estimate.prior_density import Coordinates, PriorDensity
 from hotlever.estimate.search import Solution
 from hotlever.estimate.surrogate import CurveSurrogate, Rows
 from hotlever.estimate.tip_temperature import error_of_model

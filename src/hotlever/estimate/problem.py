@@ -6,19 +6,26 @@ Medium, circuit, observables, priors and noise are settled here, once: what come
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
 from hotlever.errors import InputError
-from hotlever.estimate.experiment import Experiment, ExperimentAtRest, Model, experiment_of
-from hotlever.estimate.experiment_in_time import ExperimentInTime, known_in_time
-from hotlever.estimate.noise_model import errors_of_scales
+from hotlever.estimate.diagnosis import Diagnosis
+from hotlever.estimate.experiment import (
+    Experiment,
+    ExperimentAtRest,
+    ExperimentInTime,
+    Model,
+    experiment_of,
+    known_in_time,
+    with_distances,
+)
+from hotlever.estimate.objective import FLAT, PriorDensity
 from hotlever.estimate.options import FitOptions
-from hotlever.estimate.over_a_sample import with_distances
-from hotlever.estimate.prior_density import FLAT, PriorDensity
-from hotlever.estimate.residuals import Residuals
+from hotlever.estimate.residuals import Residuals, errors_of_scales
 from hotlever.measurement import Measurement, with_measured_circuit
 from hotlever.measurement.data import check_sample
 from hotlever.measurement.rows import averaged, note_on_averages
@@ -56,6 +63,8 @@ class Problem:
         Where the search begins: the lever that is likeliest beforehand.
     notes : list of str
         What was decided on the way that a user should know.
+    stated : mapping of str to Prior or str
+        The priors that a user has stated.
     model : callable, optional
         Makes the experiment, see `hotlever.estimate.fit`.
     """
@@ -68,6 +77,7 @@ class Problem:
     residuals: Residuals
     start: Probe
     notes: list[str]
+    stated: Mapping[str, Prior | str]
     model: Model | None = None
 
     @classmethod
@@ -99,7 +109,8 @@ class Problem:
             If a name does not exist, an observable has no data, a fixed value is impossible, or
             there are fewer data than parameters.
         """
-        informed = bool(options.usual_priors or options.priors or before.names)
+        stated = options.priors
+        informed = bool(options.usual_priors or stated or before.names)
         whole, measurement = measurement, averaged(measurement, options.robust or informed)
         in_time = measurement.time_us is not None
         if in_time:
@@ -146,6 +157,7 @@ class Problem:
             residuals=residuals,
             start=start.with_(**held) if held else start,
             notes=notes + more,
+            stated=stated,
             model=model,
         )
 
@@ -159,16 +171,26 @@ class Problem:
         """Whether the lever was measured in time."""
         return self.measurement.time_us is not None
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters that a search at rest has derivatives by."""
+        return tuple(dict.fromkeys([*self.options.usual, *self.options.varied]))
+
+    @cached_property
+    def causes(self) -> Diagnosis:
+        """What may be behind the data if no such lever shows them."""
+        diagnosis = self.options.numerics.diagnosis
+        return Diagnosis(self.measurement, self.probe, self.stated, diagnosis, self.names)
+
     @cached_property
     def experiment(self) -> Experiment:
         """The forward map from the lever's parameters to what was measured."""
-        options, residuals = self.options, self.residuals
+        residuals, names = self.residuals, self.names
         if self.measurement.waveform is not None:
             follow = partial(
-                ExperimentInTime.of, waveform=self.measurement.waveform, names=options.varied
+                ExperimentInTime.of, waveform=self.measurement.waveform, names=self.options.varied
             )
             return (self.model or follow)(self.probe, residuals.along)
-        names = tuple(dict.fromkeys([*options.usual, *options.varied]))
         experiment = (self.model or partial(experiment_of, names=names))(self.probe, residuals.bias)
         assert isinstance(experiment, ExperimentAtRest)
         # with priors errors are a matter of standard deviations; the fast lever's slopes do

@@ -28,12 +28,16 @@ from scipy import optimize
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.experiment import TIP, ExperimentAtRest, Predictor, experiment_of, named
+from hotlever.estimate.experiment import (
+    TIP,
+    ExperimentAtRest,
+    Predictor,
+    experiment_of,
+    named,
+)
 from hotlever.estimate.objective import EstimatedQuantity, Objective, Subproblem
 from hotlever.estimate.options import TrialOptions
-from hotlever.estimate.over_a_sample import with_distances
-from hotlever.estimate.posterior import Posterior
-from hotlever.estimate.profile import ErrorProfile, hotter_rows
+from hotlever.estimate.posterior import ErrorProfile, Posterior, hotter_rows
 from hotlever.estimate.surrogate import ReducedSurrogate
 from hotlever.lever.reduced.reduced_lever import ReducedLever
 from hotlever.materials import full_name
@@ -266,8 +270,9 @@ class SampledLever:
         cls, fit: Estimate, probe: Probe, bias: Array, distance_um: Array | None = None
     ) -> SampledLever:
         """Return a lever that was fitted, at some biases (V) and distances, exact at a probe."""
-        experiment = experiment_of(probe, bias, names=tuple(fit.names), reduce=True)
-        return cls(with_distances(experiment, probe, distance_um), probe)
+        names = tuple(fit.names)
+        experiment = experiment_of(probe, bias, names=names, reduce=True, distance_um=distance_um)
+        return cls(experiment, probe)
 
     def error_K(self, probe: Probe) -> float:
         """Return by how much the tip temperature of a similar probe may be off.

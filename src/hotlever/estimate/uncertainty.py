@@ -1,26 +1,205 @@
 """How sure a fit is beyond its covariance: posterior, predictive band and profiles together.
 
-In numbers for the fit file, and in words.
+In numbers for the fit file, and in words. A profile likelihood says how much worse a fit gets as a
+parameter is moved off its optimum: by a further datum (`hotlever.estimate.objective.Penalty`), with
+all others estimated anew; the rise ΔS of the sum of squares says how many standard errors away it
+is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
+from scipy.special import chdtri
 
+from hotlever.datasets import labelled
+from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.profile import profile_likelihood
+from hotlever.estimate.experiment import (
+    Prediction,
+    Predictor,
+    experiment_of,
+)
+from hotlever.estimate.objective import EstimatedQuantity, Penalty
 from hotlever.estimate.sampling import BAND_QUANTILES, predictive_band, sample_posterior
+from hotlever.estimate.search import Optimiser
 from hotlever.files import json_text
 from hotlever.materials.parameters import heading, scale_of
-from hotlever.probe.probe_parameters import parameters_of
+from hotlever.probe.probe_parameters import parameter_of, parameters_of, usual_parameters
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.text import BAND, aligned, with_unit
 from hotlever.types import Array, Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hotlever.estimate.estimate import Estimate
+
+#: Confidence levels whose intervals are read off the profile of a parameter.
+LEVELS = (0.68, 0.95)
+
+
+def profile_likelihood(
+    result: Estimate,
+    name: str,
+    *,
+    points: int = 11,
+) -> xr.Dataset:
+    """Hold one parameter at values around its optimum and fit the others again.
+
+    Parameters
+    ----------
+    result : Estimate
+    name : str
+        A parameter that was varied.
+    points : int
+        Odd; values from 2.5 standard errors below to as many above the optimum, within the
+        parameter's bounds. More are added on a side where the 95 % interval stays open.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimension ``point``: ``value``, ``delta_chi_square`` (in units of the fit's own
+        noise variance; what priors add is included), ``parabola`` (what the standard error alone
+        says; NaN without one), and ``refitted`` (parameter, point). On (level, side):
+        ``interval``, NaN where it is open. ``notes`` says in words which sides are open and why.
+
+    Raises
+    ------
+    InputError
+        If the parameter does not exist or was fixed, it is the only one varied, `points` is too
+        small or even, or the data have no scatter or are not described.
+    ComputationError
+        If the lever cannot be solved at the optimum.
+    """
+    result.measurement.need_rest("a profile")
+    result.need_described("a profile")
+    parameter = parameter_of(result.probe, name)
+    if name not in result.names or len(result.names) < 2:
+        raise InputError(
+            f"no profile of {name}: expected one of several parameters that the fit varied "
+            f"({', '.join(result.names)})"
+        )
+    if points < 5 or points % 2 == 0:
+        raise InputError(f"found points = {points}, expected an odd number of 5 or more")
+    if not result.sum_of_squares > 0:
+        raise InputError("the fit meets its data exactly: without scatter nothing tells how sure")
+    quantity = EstimatedQuantity("parameter", result.names.index(name))
+    names = tuple(dict.fromkeys([*usual_parameters(result.probe), *result.names]))
+    objective = result.objective(names)
+    residuals = objective.residuals
+    # exact to first order at the optimum, and used as it is from there
+    experiment, at_optimum = experiment_of(
+        result.probe, residuals.bias, names=names, reduce=True, distance_um=residuals.distance_um
+    ).exact_at(result.probe)
+    # with priors, residuals are in standard deviations
+    variance = 1.0 if objective.informed else _noise_variance(result, name, residuals.size)
+    least = objective.squares(at_optimum) if objective.informed else result.sum_of_squares
+    value, stderr = result.parameters[name].value, result.parameters[name].stderr
+    # without a standard error, a tenth of the bounds' distance is a step as good as any
+    step = (stderr or 0.1 * (parameter.upper - parameter.lower)) * 2.5 / (points // 2)
+    rows = {value: (0.0, result.probe.values(result.names))}
+    reasons: dict[str, str] = {}
+    longer_steps = 6  # that are added on a side until the interval closes
+    for side, sign, way, bound in (
+        ("lower", -1.0, "down", parameter.lower),
+        ("upper", 1.0, "up", parameter.upper),
+    ):
+        distance = 0.0
+        near: Prediction = at_optimum
+        for count in range(1, points // 2 + longer_steps + 1):
+            distance += step * 2.0 ** max(0, count - points // 2)
+            target = value + sign * distance
+            if sign * (target - bound) >= 0:
+                reasons[side] = f"{way} to its bound {bound:g}"
+                break
+            # held within a thousandth of a step
+            penalised = objective.penalised(Penalty(quantity, target, 1e-3 * step))
+            try:
+                start = near.probe.replace({name: target})
+                predictor = Predictor(experiment, near=near)
+                near = Optimiser(penalised, predictor).solve(start).prediction
+            except ComputationError:
+                reasons[side] = f"as far as the lever can be solved ({target:.4g} cannot)"
+                break
+            delta = (objective.squares(near) - least) / variance
+            rows[target] = delta, near.probe.values(result.names)
+            if count >= points // 2 and delta > chdtri(1, 1.0 - LEVELS[-1]):
+                break
+        else:
+            reasons[side] = f"as far as it was followed ({target:.4g})"
+    return _dataset(result, name, dict(sorted(rows.items())), reasons)
+
+
+def _noise_variance(result: Estimate, name: str, size: int) -> float:
+    """Return what the sum of squares knows of the noise, corrected by the standard error."""
+    variance = result.sum_of_squares / max(size - len(result.names), 1)
+    number, stderr = result.names.index(name), result.parameters[name].stderr
+    common = result.common_noise_covariance[number, number]
+    return variance * (1.0 if stderr is None else float(stderr**2 / common))
+
+
+def _dataset(
+    result: Estimate, name: str, rows: dict[float, tuple[float, Array]], reasons: dict[str, str]
+) -> xr.Dataset:
+    optimum = result.parameters[name]
+    values = np.array(list(rows))
+    delta = np.array([delta for delta, _ in rows.values()])
+    interval = np.array([_interval(values, delta, optimum.value, level) for level in LEVELS])
+    sides = ["lower", "upper"]
+    notes = [
+        f"{name}: the {100 * level:.0f} % interval is open on the {side} side: the data do not "
+        f"exclude values {reasons[side]}"
+        for level, ends in zip(LEVELS, interval, strict=True)
+        for side, end in zip(sides, ends, strict=True)
+        if np.isnan(end)
+    ]
+    stderr = np.nan if optimum.stderr is None else optimum.stderr
+    refitted = np.transpose([parameters for _, parameters in rows.values()])
+    others = [number for number, other in enumerate(result.names) if other != name]
+    return labelled(
+        {
+            "delta_chi_square": delta,
+            "parabola": ((values - optimum.value) / stderr) ** 2,
+            "refitted": (("parameter", "point"), refitted[others]),
+            "interval": (("level", "side"), interval),
+        },
+        "point",
+        {
+            "value": ("point", values),
+            "parameter": [result.names[number] for number in others],
+            "level": list(LEVELS),
+            "side": sides,
+        },
+        quantity=name,
+        lever=result.probe.title,
+        optimum=optimum.value,
+        notes="\n".join(notes),
+    )
+
+
+def _interval(values: Array, delta: Array, optimum: float, level: float) -> tuple[float, float]:
+    """Read an interval off a profile; NaN for a side where it does not close."""
+    # the root of a parabola is a straight line, on which interpolation is exact
+    height, limit = np.sqrt(np.maximum(delta, 0.0)), np.sqrt(chdtri(1, 1.0 - level))
+
+    def crossing(side: NDArray[np.bool_], outwards: int) -> float:
+        x, y = values[side][::outwards], height[side][::outwards]
+        beyond = np.flatnonzero(y >= limit)
+        if not beyond.size:
+            return float("nan")
+        after = beyond[0]
+        return float(np.interp(limit, y[after - 1 : after + 1], x[after - 1 : after + 1]))
+
+    return crossing(values <= optimum, -1), crossing(values >= optimum, 1)
+
+
+# --- all of it ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from scipy.special import stdtrit
 
 from hotlever.errors import ComputationError
 from hotlever.estimate.experiment import TIP
+from hotlever.estimate.objective import PriorDensity
 from hotlever.estimate.options import BudgetOf
 from hotlever.estimate.posterior import CurvedQuantity
-from hotlever.estimate.prior_density import PriorDensity
 from hotlever.estimate.search import Solution
 from hotlever.estimate.surrogate import Rows
 from hotlever.estimate.tip_table import TipTable

@@ -13,7 +13,6 @@ from scipy.special import chdtrc
 
 from hotlever.errors import InputError
 from hotlever.estimate.diagnosis import (
-    Diagnosis,
     lack_of_fit_text,
     run_of_outliers,
 )
@@ -32,21 +31,15 @@ from hotlever.probe.probe_parameters import parameters_of
 # --- before the search --------------------------------------------------------------------------
 
 
-def check_plausible(problem: Problem, causes: Diagnosis) -> None:
+def check_plausible(problem: Problem) -> None:
     """Refuse data whose resistance at low bias, or whose temperatures, are far from the lever's.
-
-    Parameters
-    ----------
-    problem : Problem
-    causes : Diagnosis
-        Of the same data.
 
     Raises
     ------
     InputError
         Saying what was compared, and the likeliest cause.
     """
-    measured, probe, options = problem.measurement, problem.probe, causes.options
+    measured, probe, options = problem.measurement, problem.probe, problem.causes.options
     where = measured.path or "measurement"
     alone, size = probe.circuit.starts_cold, np.abs(measured.bias_V)
     current = measured.current(probe.circuit)
@@ -83,7 +76,7 @@ def check_plausible(problem: Problem, causes: Diagnosis) -> None:
         if least + lever * np.exp(-spread) < cold_kohm < most + lever * np.exp(spread):
             return
     quantity = "V_b / I_h" if alone else "the change of V_b over that of I_h"
-    cause = causes.likeliest()
+    cause = problem.causes.likeliest()
     if not cause and cold_kohm > 100.0 * (lever + series):
         cause = "hardly any current flows, as if a terminal was open or the meter at another one"
     cause = cause or "no single cause that is known explains it"
@@ -94,7 +87,7 @@ def check_plausible(problem: Problem, causes: Diagnosis) -> None:
     )
 
 
-def check_similar(problem: Problem, causes: Diagnosis) -> None:
+def check_similar(problem: Problem) -> None:
     """Refuse data that no lever like the probe is near to.
 
     Raises
@@ -102,7 +95,7 @@ def check_similar(problem: Problem, causes: Diagnosis) -> None:
     InputError
         Asking for what may be behind it: another drawing first.
     """
-    if cause := causes.of_another_lever():
+    if cause := problem.causes.of_another_lever():
         where = problem.measurement.path or "measurement"
         raise InputError(f"{where}: no lever like the probe shows such currents: {cause}")
 

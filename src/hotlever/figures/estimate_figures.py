@@ -223,7 +223,7 @@ def profile_curves(profiles: Sequence[xr.Dataset]) -> Figure:
     Parameters
     ----------
     profiles : sequence of xarray.Dataset
-        From `hotlever.estimate.profile.profile_likelihood`.
+        From `hotlever.estimate.uncertainty.profile_likelihood`.
     """
     columns = min(3, len(profiles))
     rows = math.ceil(len(profiles) / columns)

@@ -25,8 +25,7 @@ from hotlever.datasets import labelled
 from hotlever.errors import BranchEndError, HotleverError
 from hotlever.estimate import Measurement
 from hotlever.estimate.estimator import calibrate
-from hotlever.estimate.knee import IVCurve, find_knee
-from hotlever.estimate.knee_scaling import curve_of_law, curve_of_model
+from hotlever.estimate.knee import IVCurve, curve_of_law, curve_of_model, find_knee
 from hotlever.estimate.power_law import EQ12
 from hotlever.lever import Branch, Lever
 from hotlever.materials import LOW_DOPED, Material
