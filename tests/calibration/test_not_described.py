@@ -22,7 +22,7 @@ from hotlever.estimate.summary import calibration_text
 from hotlever.files import json_text
 from hotlever.lever import Branch
 from hotlever.measurement import Measurement
-from hotlever.report.estimate_pages import calibration_page
+from hotlever.report.result_pages import calibration_page
 from synthetic_curves import measured_curve, measurement_of
 
 ERRORS = ("tip_stderr_K", "tip_low_K", "tip_high_K")

@@ -16,7 +16,7 @@ from hotlever.estimate.summary import calibration_text
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
-from hotlever.report.estimate_pages import calibration_page
+from hotlever.report.result_pages import calibration_page
 from synthetic_curves import measurement_of
 
 #: A heater that is no longer than its border is wide, all within what a fit may vary: its heat

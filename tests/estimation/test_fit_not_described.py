@@ -18,7 +18,7 @@ from hotlever.estimate.sampling import sample_posterior
 from hotlever.estimate.summary import NEAREST, fit_text, parameter_rows
 from hotlever.estimate.uncertainty import profile_likelihood
 from hotlever.files import json_text
-from hotlever.report.estimate_pages import fit_page
+from hotlever.report.result_pages import fit_page
 
 EXAMPLE = Path(__file__).parents[2] / "src" / "hotlever" / "examples" / "lever-a.csv"
 FIXED = {"a1": None, "p": None, "delta": None, "a0": None}

@@ -14,7 +14,7 @@ from hotlever.report.reproduce import claim_sections as claims
 from hotlever.report.reproduce import layout_sections as layouts
 from hotlever.report.reproduce import paper_sections as vacuum
 from hotlever.report.reproduce.findings import Extent, Findings
-from hotlever.studies.parameter_consistency import FREE, HELD
+from hotlever.studies.simulation_based_calibration import FREE, HELD
 from hotlever.studies.thermoelectric_shift import HEATS, POLARITIES, SIDES
 
 

@@ -9,9 +9,9 @@ import made_up
 from experiments import full_experiment
 from hotlever.estimate import Measurement, fit
 from hotlever.estimate.uncertainty import examine
-from hotlever.report.estimate_pages import fit_page
 from hotlever.report.reproduce import paper_sections as inference
 from hotlever.report.reproduce.findings import Findings
+from hotlever.report.result_pages import fit_page
 from hotlever.studies.simulation_based_calibration import WAYS
 
 # a profile makes its own lever

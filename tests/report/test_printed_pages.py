@@ -10,7 +10,7 @@ import pytest
 
 import hotlever
 from hotlever.estimate import calibrate
-from hotlever.report.estimate_pages import budget_page, calibration_page
+from hotlever.report.result_pages import budget_page, calibration_page
 
 pytest.importorskip("playwright", reason="the extra test-app is not installed")
 

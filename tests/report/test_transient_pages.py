@@ -6,7 +6,7 @@ import pytest
 
 from hotlever import Lever, Probe
 from hotlever.lever.lever import COARSE
-from hotlever.report.transient_pages import transient_page
+from hotlever.report.result_pages import transient_page
 
 
 @pytest.mark.slow

@@ -7,16 +7,17 @@ import pytest
 
 from hotlever.probe import Probe
 from hotlever.spieser2017 import HOTTEST_TIP_K, NOMINAL_DOPING
-from hotlever.studies.parameter_consistency import (
+from hotlever.studies.simulation_based_calibration import (
+    DEPARTURES,
     ERRORS,
     FREE,
     HELD,
+    LaboratoryOptions,
     consistency_study,
     largest_deviation,
     published_levers,
     twin_measurement,
 )
-from hotlever.studies.simulation_based_calibration import DEPARTURES, LaboratoryOptions
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 

@@ -9,7 +9,7 @@ import xarray as xr
 from hotlever.datasets import labelled
 from hotlever.lever.lever import COARSE
 from hotlever.probe.priors import THERMOMETER
-from hotlever.studies.knee_study import Suspect, knee_K
+from hotlever.studies.knee_study import Suspect, carried, knee_K, what_to_measure
 from hotlever.studies.published_lever.ensemble import (
     ANY,
     CRITERIA,
@@ -21,7 +21,6 @@ from hotlever.studies.published_lever.ensemble import (
     stored_layouts,
     verdict_on,
 )
-from hotlever.studies.published_lever.knee_suspects import carried, what_to_measure
 from hotlever.studies.published_lever.statements import MAIN, OPTIONS, SEARCHED
 from published_lever import DRAWN, SearchOptions, Solver, numbers_of, search
 

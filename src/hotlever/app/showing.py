@@ -45,8 +45,8 @@ from hotlever.raman.series import MeasuredLine
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.spectrum_reading import read_file, spectrum_files
 from hotlever.raman.spectrum_tables import corrections_text
-from hotlever.report.estimate_pages import budget_page, estimate_page
 from hotlever.report.report_page import Page
+from hotlever.report.result_pages import budget_page, estimate_page
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.spectra import ThermometerOptions, set_up
 from hotlever.types import Array

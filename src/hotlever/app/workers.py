@@ -235,7 +235,7 @@ def _import_all() -> None:
     from hotlever import estimate, figures, lever, raman  # noqa: F401
     from hotlever.estimate import many  # noqa: F401
     from hotlever.lever import fields, set_points, transient  # noqa: F401
-    from hotlever.report import estimate_pages  # noqa: F401
+    from hotlever.report import result_pages  # noqa: F401
 
 
 def _answer(

@@ -26,8 +26,8 @@ from hotlever.figures.style import (
     parameter_label,
 )
 from hotlever.studies.linear_branch import Regression
-from hotlever.studies.parameter_consistency import largest_deviation
 from hotlever.studies.published_lever.ensemble import ANY, REFERENCE, Ensemble
+from hotlever.studies.simulation_based_calibration import largest_deviation
 from hotlever.types import Array
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def parameter_deviations(study: xr.Dataset, published: xr.Dataset, claimed: floa
     Parameters
     ----------
     study, published : xarray.Dataset
-        See `hotlever.studies.parameter_consistency`.
+        See `hotlever.studies.simulation_based_calibration`.
     claimed : float
         The paper's limit, a share of the mean.
     """
@@ -232,7 +232,7 @@ def predicted_and_published(cases: xr.Dataset) -> Figure:
     Parameters
     ----------
     cases : xarray.Dataset
-        From `hotlever.studies.validation.prediction.comparison`.
+        From `hotlever.studies.validation.case.comparison`.
     """
     cases = cases.sortby("group")
     colour_by_verdict = {"inside 68 %": GREEN, "inside 95 %": ORANGE, "outside": VERMILION}

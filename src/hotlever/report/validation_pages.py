@@ -17,14 +17,16 @@ from hotlever.estimate.tip_table import rms
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.report.report_page import Page, filled, texts
-from hotlever.studies.validation.case import Case, cases, sought
-from hotlever.studies.validation.prediction import (
+from hotlever.studies.validation.case import (
     DRAWS,
     OUTSIDE,
+    Case,
     PredictedNumber,
+    cases,
     comparison,
     computed,
     predict,
+    sought,
 )
 from hotlever.text import value_with_error
 from hotlever.types import Array, Progress
@@ -42,7 +44,7 @@ def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]
     -------
     page : Page
     compared : xarray.Dataset
-        See `hotlever.studies.validation.prediction.comparison`.
+        See `hotlever.studies.validation.case.comparison`.
     """
     # what else the lever of the real curve may be, and its changes
     other_levers: dict[str, dict[str, Any]] = {

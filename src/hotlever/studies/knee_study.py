@@ -19,6 +19,10 @@ Of a tip on the heater, which the paper suspects, three things are told apart: h
 of the same lever, how it moves the temperature at the same power, and by how much a tipless model
 *fitted* to a lever with a tip misses its knee. A tip conducts heat away from the middle of the
 heater, and in air its surface gives heat to the air; what the latter does by itself is told too.
+
+What each suspect carries of the layouts of the paper's lever is stored, as
+``benchmarks/published_lever.py knee`` writes it. What a law may carry is a standard error: the root
+of the sum of the squares over its coefficients.
 """
 
 from __future__ import annotations
@@ -26,6 +30,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from enum import StrEnum
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,17 +41,21 @@ from scipy.interpolate import CubicSpline
 from hotlever import spieser2017 as paper
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError
-from hotlever.estimate import Estimate, Measurement, fit
+from hotlever.estimate import Estimate, Measurement, calibrate, fit, plan_next
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import solve
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
-from hotlever.materials.departures import FACTORS, departure_of
+from hotlever.materials import PARAMETERS
+from hotlever.materials.departures import DEPARTURES, FACTORS, departure_of
 from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.silicon import intrinsic_density, inversion_temperature
 from hotlever.probe import Probe, Tip
+from hotlever.probe.probe_parameters import parameter_named
 from hotlever.raman.thermometer import published_raman_calibration
+from hotlever.studies.published_lever.ensemble import stored_table
+from hotlever.studies.published_lever.statements import raman_error
 from hotlever.studies.simulation_based_calibration import MinimosMaterial
 from hotlever.types import Array, Progress
 from hotlever.work import each
@@ -479,3 +488,108 @@ def compare_suspects(
         left_K=paper.KNEE_OFF_K - float(fitted[-1]),
         stderr_K=by_covariance(example),
     )
+
+
+# --- what is stored of it -------------------------------------------------------------------------
+
+
+@cache
+def carried() -> xr.Dataset:
+    """Return what is stored.
+
+    Returns
+    -------
+    xarray.Dataset
+        On ``layout`` and ``suspect``: ``moved_K``, ``shift_K`` and ``ramp_K``, see
+        `Carried`; and each fitted parameter, by its name. On ``layout``
+        and ``law``: ``stderr_K``, what a law may carry where the model is fitted; NaN where that
+        was not computed.
+    """
+    table = stored_table("knee.csv", "layout", "suspect")
+    layouts, suspects = (list(table.index.unique(level)) for level in ("layout", "suspect"))
+    coefficients = {name for law in DEPARTURES.values() for name in law.names}
+    suspects = [name for name in suspects if name not in coefficients]
+
+    def column(key: str, names: list[str]) -> Array:
+        values = table[key].unstack("suspect").reindex(index=layouts, columns=names)
+        return values.to_numpy(dtype=float)
+
+    by_law = [
+        np.linalg.norm(column("shift_K", list(law.names)), axis=1) for law in DEPARTURES.values()
+    ]
+    both = ("layout", "suspect")
+    columns = {
+        key: (both, column(key, suspects)) for key in ("moved_K", "shift_K", "ramp_K", *PARAMETERS)
+    }
+    columns["stderr_K"] = (("layout", "law"), np.transpose(by_law))
+    coordinates = {"layout": layouts, "suspect": suspects, "law": list(DEPARTURES)}
+    return labelled(columns, both, coordinates)
+
+
+# --- which measurement would decide ---------------------------------------------------------------
+
+
+def what_to_measure(probe: Probe, seed: int = 0) -> xr.Dataset:
+    """Ask what to measure next for the knee of a lever that was measured as the paper's was.
+
+    The 2 % within which the paper describes currents are taken as two standard deviations of
+    currents and reader voltages; temperatures have the error of the paper's thermometer.
+
+    Parameters
+    ----------
+    probe : Probe
+    seed : int
+        Of the noise.
+
+    Returns
+    -------
+    xarray.Dataset
+        On ``added``, what is measured next (nothing, a spectrum, a finer sweep, a dimension), and
+        ``data``, what is calibrated (the ramp without its temperatures, with them): ``stderr_K``,
+        the standard error of the knee then, and ``what`` is proposed, in words.
+
+    Raises
+    ------
+    InputError
+        If a calibration does not describe the ramp.
+    ComputationError
+        If the lever cannot be solved.
+    """
+    ramp, rng = Lever(probe).sweep(paper.RAMP), np.random.default_rng(seed)
+    error_K = raman_error(ramp.tip_K.values - probe.circuit.base_temperature_K)
+
+    def noisy(values: Array, errors: Array) -> Array:
+        return values + errors * rng.standard_normal(values.size)
+
+    current, reader = (
+        noisy(ramp[name].values, 0.5 * paper.CURRENT_ERROR * ramp[name].values)
+        for name in ("current_mA", "reader_V")
+    )
+    tip_K = noisy(ramp.tip_K.values, error_K)
+    everything = Measurement(ramp.bias_V.values, current, reader, tip_K, error_K)
+    nothing = np.full(len(paper.RAMP), np.nan)
+    data = {
+        "ramp without temperatures": replace(everything, tip_K=nothing, tip_error_K=nothing),
+        "ramp with temperatures": everything,
+    }
+    choices: dict[str, dict[str, Any]] = {
+        "a spectrum": {"allowed": {"spectra": 1}, "count": 1},
+        "eight more biases, currents to 0.1 %": {
+            "allowed": {"bias": 8},
+            "count": 8,
+            "noise": {"current": 1e-3},
+        },
+        "a dimension, to 1 %": {"allowed": {"dimensions": 1}, "count": 1},
+    }
+    stderr_K, what = [], []
+    for measurement in data.values():
+        estimate = calibrate(measurement, probe=probe)
+        plans = [plan_next(estimate, quantity="knee", **choice) for choice in choices.values()]
+        spectrum, *_, dimension = (plan.proposals.isel(proposal=0) for plan in plans)
+        now = spectrum.stderr_now_K.item()
+        stderr_K.append([now, *(plan.proposals.stderr_then_K.values[-1] for plan in plans)])
+        name = parameter_named(dimension.what.item()).symbol
+        what.append(["", f"at {spectrum.tip_K.item():.0f} K", "", name])
+    both = ("added", "data")
+    columns = {"stderr_K": (both, np.transpose(stderr_K)), "what": (both, np.transpose(what))}
+    return labelled(columns, both, {"added": ["nothing", *choices], "data": list(data)})

@@ -145,7 +145,7 @@ def fit_files(
     if levers.output is not None:
         write_text(levers.output, (uncertainty or result).to_json())
     if levers.report is not None:
-        from hotlever.report.estimate_pages import fit_page
+        from hotlever.report.result_pages import fit_page
 
         texts.append(f"report: {fit_page(result, uncertainty).write(levers.report)}")
     reporter.give("\n".join([*texts, ""]))
@@ -332,7 +332,7 @@ def _table_options(by: str, step: str | None) -> dict[str, Any]:
 
 def _write_pages(result: Estimate, folder: Path) -> Path:
     """Write the page of a calibration, and that of its uncertainty budget; return the former."""
-    from hotlever.report.estimate_pages import budget_page, calibration_page
+    from hotlever.report.result_pages import budget_page, calibration_page
 
     page = calibration_page(result)
     if result.gum is not None:
@@ -576,7 +576,7 @@ def _tell_together(
         except InputError as error:
             texts.append(f"{name}: {error}")
     if report is not None:
-        from hotlever.report.estimate_pages import levers_page
+        from hotlever.report.result_pages import levers_page
 
         texts.append(f"report: {levers_page(batch, compared).write(report)}")
     reporter.give("\n".join([*texts, ""]))

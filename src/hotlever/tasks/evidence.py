@@ -67,8 +67,7 @@ def validate(
 
 
 def _predict(reporter: Reporter, path: Path) -> None:
-    from hotlever.studies.validation.case import Case
-    from hotlever.studies.validation.prediction import predict
+    from hotlever.studies.validation.case import Case, predict
 
     case = Case.from_file(path)
     with reporter.progress("draws") as update:

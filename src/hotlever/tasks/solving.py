@@ -324,7 +324,7 @@ def _draw_film(
 
 def _write_page(reporter: Reporter, lever: Lever, folder: Path) -> None:
     """Write the page of a lever in time."""
-    from hotlever.report.transient_pages import transient_page
+    from hotlever.report.result_pages import transient_page
 
     with reporter.progress("sections") as update:
         page = transient_page(lever, update)

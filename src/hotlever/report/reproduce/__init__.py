@@ -10,43 +10,41 @@ from hotlever.materials import published
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.report.report_page import Block, Page
-from hotlever.report.reproduce import air_sections as air
 from hotlever.report.reproduce import claim_sections as claims
 from hotlever.report.reproduce import layout_sections as layout
-from hotlever.report.reproduce import paper_sections as inference
-from hotlever.report.reproduce import paper_sections as vacuum
+from hotlever.report.reproduce import paper_sections as paper
 from hotlever.report.reproduce.findings import Claim, Findings
 from hotlever.types import Progress
 
 #: Headings and sections, in the order of the paper.
 SECTIONS: dict[str, Callable[[Findings], None]] = {
     "The lever of the paper, from all that is printed of it": layout.layouts_section,
-    "The reference probe (Fig. 1)": vacuum.probe_section,
-    "The Raman thermometer (Section III, Fig. 2)": inference.thermometer_section,
-    "Material parameters from a measurement (Section IV, option III)": inference.fit_section,
-    "What each observable adds (options I to III, Figs. 3 and 4, Table I)": inference.data_section,
-    "Published parameters and inversion temperatures (Tables I and II)": vacuum.parameter_section,
+    "The reference probe (Fig. 1)": paper.probe_section,
+    "The Raman thermometer (Section III, Fig. 2)": paper.thermometer_section,
+    "Material parameters from a measurement (Section IV, option III)": paper.fit_section,
+    "What each observable adds (options I to III, Figs. 3 and 4, Table I)": paper.data_section,
+    "Published parameters and inversion temperatures (Tables I and II)": paper.parameter_section,
     "The same parameters from other levers? (Table II)": claims.consistency_section,
-    "Characteristics in vacuum (Figs. 5 and 6)": vacuum.characteristics_section,
-    "Published operating points (Figs. 6a and 7b)": vacuum.operating_points_section,
+    "Characteristics in vacuum (Figs. 5 and 6)": paper.characteristics_section,
+    "Published operating points (Figs. 6a and 7b)": paper.operating_points_section,
     "T(P) above the knee on other levers (Eq. 12)": claims.linear_section,
-    "Inside the heater (Fig. 7)": vacuum.heater_section,
-    "Why the knee is not at the inversion temperature (Section IV)": vacuum.knee_section,
+    "Inside the heater (Fig. 7)": paper.heater_section,
+    "Why the knee is not at the inversion temperature (Section IV)": paper.knee_section,
     "Radiation (Section IV)": claims.radiation_section,
     "Thermoelectricity: which way the hot spot moves (Section IV)": claims.shift_section,
     "Thermoelectricity: what a fit gains by it (Section IV)": claims.prediction_section,
-    "Heat into air depends on the surroundings (Fig. 8)": air.disc_section,
-    "Characteristics in air (Figs. 9 and 10)": air.characteristics_section,
-    "Is air one factor of the power? (Fig. 10b)": air.scale_section,
-    "Where the heat goes (Section V)": air.map_section,
-    "A surface on one side (Section V)": air.one_sided_section,
-    "k by size and pressure (Section V)": air.geometry_section,
+    "Heat into air depends on the surroundings (Fig. 8)": claims.disc_section,
+    "Characteristics in air (Figs. 9 and 10)": claims.characteristics_section,
+    "Is air one factor of the power? (Fig. 10b)": claims.scale_section,
+    "Where the heat goes (Section V)": claims.map_section,
+    "A surface on one side (Section V)": claims.one_sided_section,
+    "k by size and pressure (Section V)": claims.geometry_section,
     "The 50 K that the knee is off (Figs. 6a and 10a)": layout.discrepancy_section,
     "Which measurement would decide the 50 K?": layout.next_section,
-    "The missing tip (Conclusions)": air.tip_section,
-    "A lever never seen: how wrong is its calibration?": inference.levers_section,
-    "Balances": vacuum.balance_section,
-    "Mesh": vacuum.mesh_section,
+    "The missing tip (Conclusions)": claims.tip_section,
+    "A lever never seen: how wrong is its calibration?": paper.levers_section,
+    "Balances": paper.balance_section,
+    "Mesh": paper.mesh_section,
 }
 
 
@@ -62,11 +60,11 @@ def reproduce_page(quick: bool, progress: Progress) -> Page:
     progress : callable
         Called with the sections done and their number.
     """
-    long = {claims.shift_section, claims.prediction_section, vacuum.mesh_section}
-    long |= {air.geometry_section, air.tip_section}
+    long = {claims.shift_section, claims.prediction_section, paper.mesh_section}
+    long |= {claims.geometry_section, claims.tip_section}
     headings = [name for name, section in SECTIONS.items() if not (quick and section in long)]
     # processes begin with those that take longest
-    longest = (inference.levers_section, claims.consistency_section, claims.linear_section)
+    longest = (paper.levers_section, claims.consistency_section, claims.linear_section)
     order = sorted(headings, key=lambda heading: SECTIONS[heading] not in longest)
     with local_processes(PROCESSORS) as run:
         done = run(filled_section, [(heading, quick) for heading in order], progress)

@@ -15,8 +15,8 @@ from hotlever import spieser2017 as paper
 from hotlever.estimate import Estimate, Measurement, fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.report.report_page import Page, filled, texts
-from hotlever.studies.parameter_consistency import ERRORS, GEOMETRIES
 from hotlever.studies.published_lever.ensemble import CRITERIA, verdict_on
+from hotlever.studies.simulation_based_calibration import ERRORS, GEOMETRIES
 
 # Where the paper says what, the verdict, what was found, and its range over the layouts.
 Claim = tuple[str, str, str, str, str]
@@ -31,7 +31,7 @@ class Extent:
     every : int
         Of the levers whose T(P) is followed beyond the knee: every so many.
     geometries : int
-        Levers of one material, of `hotlever.studies.parameter_consistency.GEOMETRIES`, the first.
+        Levers of one material, of `GEOMETRIES`, the first.
     errors : tuple of str
         Errors of the model that these have.
     gaps_um : tuple of float

@@ -14,7 +14,7 @@ from hotlever.materials.departures import DEPARTURES, departure_of
 from hotlever.probe.priors import THERMOMETER
 from hotlever.probe.probe_parameters import parameter_named
 from hotlever.report.reproduce.findings import Findings
-from hotlever.studies.knee_study import Suspect, compare_suspects
+from hotlever.studies.knee_study import Suspect, carried, compare_suspects, what_to_measure
 from hotlever.studies.published_lever.ensemble import (
     REFERENCE,
     SIZES,
@@ -23,7 +23,6 @@ from hotlever.studies.published_lever.ensemble import (
     stored_ensemble,
     stored_layouts,
 )
-from hotlever.studies.published_lever.knee_suspects import carried, what_to_measure
 from hotlever.studies.published_lever.statements import SEARCHED
 from hotlever.text import listed
 

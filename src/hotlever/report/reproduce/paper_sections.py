@@ -20,8 +20,8 @@ from hotlever.materials import PARAMETERS, PUBLISHED
 from hotlever.materials.silicon import inversion_temperature
 from hotlever.probe import MeshOptions
 from hotlever.raman import Thermometer, calibrate_from, measure, read_lines, read_spectra
-from hotlever.report.estimate_pages import add_fit
 from hotlever.report.reproduce.findings import Findings, example
+from hotlever.report.result_pages import add_fit
 from hotlever.spieser2017 import NOMINAL_DOPING
 from hotlever.studies.knee_study import reasons_of_the_knee, steps_to_the_knee
 from hotlever.studies.published_lever.ensemble import REFERENCE, stored_ensemble
