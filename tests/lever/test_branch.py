@@ -132,6 +132,24 @@ def test_a_branch_goes_on_where_it_was(coarse):
     np.testing.assert_allclose(longer.curve(u), whole.curve(u), rtol=1e-4, atol=1e-6)
 
 
+@pytest.mark.parametrize("thermoelectric", [False, True])
+def test_a_state_has_the_polarity_of_its_branch_wherever_it_is_looked_for(coarse, thermoelectric):
+    """Heat does not know the direction of a current: a tip temperature has one state each way."""
+    lever = coarse
+    if thermoelectric:
+        lever = Lever(coarse.probe.with_physics(("thermoelectric",)), COARSE)
+    branch = lever.branch(600.0)
+    u, x = branch.u[1:], branch.x[:, 1:]
+    potentials = ~lever.equations.space.is_temperature[:, None]
+    some_reversed = np.where(potentials & (np.arange(u.size) % 2 == 0), -x, x)
+    found = solve_at(lever.equations, u, some_reversed, NewtonOptions(tolerance=1e-8))
+    scale = lever.equations.scale
+    np.testing.assert_allclose(found.x / scale, x / scale, rtol=0, atol=1e-5)
+    # with the factors of these states: what is found is differentiated with them
+    along = Branch.of_roots(lever.equations, u, found)
+    np.testing.assert_allclose(along.value_slopes, branch.value_slopes[1:], rtol=1e-5, atol=1e-9)
+
+
 def test_a_branch_goes_on_from_just_before_a_step_of_a_law(coarse):
     """So that of a lever ends whose base has become a little warmer than that of the one before."""
     whole = coarse.branch(800.0)

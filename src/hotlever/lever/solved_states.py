@@ -10,6 +10,7 @@ or that of a similar lever, so that the states of both can be compared.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hotlever.errors import NewtonError
 from hotlever.lever.equations import LeverEquations
@@ -48,6 +49,13 @@ class Parametrisation:
         """Return how fast the values pass states (size + 1, n), by u, (n,)."""
         return np.asarray(2.0 * u)
 
+    def reversed_at(self, u: Array, x: Array) -> NDArray[np.bool_]:
+        """Return which states (size + 1, n) have the values but the other polarity, (n,).
+
+        Heat does not know the direction of a current, so that each tip temperature has two states.
+        """
+        return np.asarray(x[-1] * u < 0.0)
+
 
 #: It has no state of its own.
 NATURAL = Parametrisation()
@@ -85,6 +93,10 @@ class PseudoArclength(Parametrisation):
         # the lines turn, so that they pass faster on the outside of a bend than on the inside
         aside = in_plane(space, x) - self._curve(u)
         return np.asarray((along**2 - bend * aside).sum(axis=1))
+
+    def reversed_at(self, u: Array, x: Array) -> NDArray[np.bool_]:
+        """See `Parametrisation`; lines in the plane of the lever voltage know its sign."""
+        return np.zeros(u.shape, dtype=bool)
 
 
 class Constrained:
@@ -126,7 +138,16 @@ def solve_at(
         If a state was not found.
     """
     problem = Constrained(equations, parametrisation.constraint(u), parametrisation.values(u))
-    return find_roots(problem, guess, options, factors, fresh=fresh)
+    roots = find_roots(problem, guess, options, factors, fresh=fresh)
+    if not parametrisation.reversed_at(u, roots.x).any():
+        return roots
+    # Newton's method went past the state without a current, to one of the other polarity
+    potentials = ~equations.space.is_temperature[:, None]
+    turned = np.where(potentials & parametrisation.reversed_at(u, roots.x), -roots.x, roots.x)
+    roots = find_roots(problem, turned, options)
+    if parametrisation.reversed_at(u, roots.x).any():
+        raise NewtonError("only states of the other polarity were found", partial=roots.x)
+    return roots
 
 
 def state_at_bias(
