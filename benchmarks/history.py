@@ -38,7 +38,7 @@ import xarray as xr
 
 from hotlever.errors import HotleverError
 from hotlever.estimate import Measurement, fit
-from hotlever.estimate.experiment import ExperimentInTime
+from hotlever.estimate.experiment_in_time import ExperimentInTime
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.transient import Waveform, integrate, pulse, simulate, sine, step
 from hotlever.lever.transient.reduced import reduced_in_time

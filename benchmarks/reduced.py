@@ -120,9 +120,9 @@ def buys():
             tips = branch.tip_K(branch.read(one.circuit, bias).u)
             off = max(off, float(np.abs(tips - one.sweep(bias).tip_K.values).max()))
         lever = SampledLever(experiments[name], alone.probe)
-        drawn = draw_samples(Trials(Subproblem(objective, lever.at)), SAMPLES)
+        points, effective = draw_samples(Trials(Subproblem(objective, lever.at)), SAMPLES)
         error = max(
-            lever.error_K(objective.at(alone.probe, drawn.points[row]))
+            lever.error_K(objective.at(alone.probe, points[row]))
             for row in range(0, SAMPLES, SAMPLES // 4)
         )
         fitted = {"coarse": fit_on_coarse, "reduced": fit_on_reduced}[name]
@@ -134,7 +134,7 @@ def buys():
                 f"{off:.2f}",
                 f"{fitted:.2f}",
                 f"{60 * fitted + spent:.0f}",
-                f"{drawn.effective:.0f}",
+                f"{effective:.0f}",
                 f"{error:.1f}",
             )
         )

@@ -119,7 +119,7 @@ def test_they_are_as_likely_as_trials_of_the_posterior_say(below_the_knee, known
     problem = Problem.of(below_the_knee, Probe.reference(), options, model=until_it_melts)
     solution = solve(problem)
     near = Subproblem(solution.objective, solution.prediction)
-    points = draw_samples(Trials(near), 800).points
+    points, _ = draw_samples(Trials(near), 800)
     tips = [near.values_at(point)[TIP, -1] for point in points]
     shares, last_V = np.array([0.025, 0.5, 0.975, 0.99]), below_the_knee.bias_V[-1:]
     ours = known.likely.quantiles(last_V, shares)[:, 0]

@@ -13,7 +13,7 @@ from experiments import on_coarse_meshes
 from hotlever import read_measurement
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, fit, read_fit
-from hotlever.estimate.experiment import ExperimentInTime
+from hotlever.estimate.experiment_in_time import ExperimentInTime
 from hotlever.lever.transient import pulse, simulate, sine, step
 
 TIMES = np.array([0.2, 1.0, 3.0, 6.0, 10.0, 15.0, 20.0])

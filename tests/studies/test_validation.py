@@ -12,17 +12,13 @@ from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
 from hotlever.probe import Probe
-from hotlever.studies.validation.case import (
+from hotlever.studies.validation.case import QUANTITIES, Case, cases, johnson_noise, sought
+from hotlever.studies.validation.prediction import (
     OUTSIDE,
-    QUANTITIES,
-    Case,
     PredictedNumber,
-    cases,
     comparison,
     computed,
-    johnson_noise,
     predict,
-    sought,
 )
 
 HEAD = """quantity = "{quantity}"

@@ -25,8 +25,8 @@ from hotlever.lever.lever import COARSE
 from hotlever.lever.reader import Reader, Signal, at_distance, over_surface, reading_notes
 from hotlever.probe import Layout, Probe
 from hotlever.probe.shapes import Shape
+from hotlever.tasks.arguments import make_lever, notes_of
 from hotlever.tasks.commands import arguments_of
-from hotlever.tasks.common_steps import make_lever, notes_of
 from hotlever.tasks.parsing import parse_bias, parse_distances
 from hotlever.tasks.surfaces import jumping_at_tip, over_a_surface, reader_noise
 from hotlever.types import Array, Index

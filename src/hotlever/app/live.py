@@ -37,8 +37,8 @@ from hotlever.materials.parameters import own_name
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.probe_parameters import of_materials
 from hotlever.probe.shapes import EDGE_BIAS
+from hotlever.tasks.arguments import make_lever
 from hotlever.tasks.commands import arguments_of
-from hotlever.tasks.common_steps import make_lever
 from hotlever.types import Array, Index
 from hotlever.work import one_blas_thread
 

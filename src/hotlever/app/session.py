@@ -20,9 +20,8 @@ from hotlever.app.project import Project
 from hotlever.app.workers import Heard, Report, Worker
 from hotlever.errors import HotleverError
 from hotlever.probe import Probe
-from hotlever.tasks.arguments import LeverArguments
+from hotlever.tasks.arguments import LeverArguments, read_surrounded_probe
 from hotlever.tasks.commands import COMMANDS, run_command, written_by
-from hotlever.tasks.common_steps import read_surrounded_probe
 
 
 @dataclass(frozen=True)

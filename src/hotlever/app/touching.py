@@ -23,8 +23,8 @@ from hotlever.lever.contact import state_in_contact, sweep_in_contact
 from hotlever.lever.lever import COARSE, State
 from hotlever.probe import Probe
 from hotlever.probe.tip import EXAMPLE, OUT_OF_CONTACT
+from hotlever.tasks.arguments import make_lever
 from hotlever.tasks.commands import arguments_of
-from hotlever.tasks.common_steps import make_lever
 from hotlever.tasks.surfaces import contact_notes, in_contact
 from hotlever.work import one_blas_thread
 

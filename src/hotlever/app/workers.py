@@ -166,7 +166,7 @@ def _end_all() -> None:
 
 
 class Report:
-    """Tells the app of a call: a `hotlever.tasks.common_steps.Reporter`.
+    """Tells the app of a call: a `hotlever.tasks.arguments.Reporter`.
 
     Attributes
     ----------

@@ -8,8 +8,7 @@ from typing import Annotated
 from typer import Option
 
 from hotlever.errors import InputError, unforeseen_error
-from hotlever.tasks.arguments import refuse
-from hotlever.tasks.common_steps import Reporter
+from hotlever.tasks.arguments import Reporter, refuse
 from hotlever.tasks.parsing import check_number
 
 

@@ -23,11 +23,7 @@ from scipy import optimize
 from scipy.interpolate import PchipInterpolator
 
 from hotlever.errors import HotleverError
-from hotlever.estimate.experiment import (
-    TIP,
-    Experiment,
-    Prediction,
-)
+from hotlever.estimate.experiment import TIP, Experiment, Prediction
 from hotlever.estimate.objective import (
     EstimatedQuantity,
     Objective,

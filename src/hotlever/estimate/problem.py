@@ -17,12 +17,11 @@ from hotlever.estimate.diagnosis import Diagnosis
 from hotlever.estimate.experiment import (
     Experiment,
     ExperimentAtRest,
-    ExperimentInTime,
     Model,
     experiment_of,
-    known_in_time,
     with_distances,
 )
+from hotlever.estimate.experiment_in_time import ExperimentInTime, known_in_time
 from hotlever.estimate.objective import FLAT, PriorDensity
 from hotlever.estimate.options import FitOptions
 from hotlever.estimate.residuals import Residuals, errors_of_scales

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
@@ -28,13 +28,7 @@ from scipy import optimize
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.experiment import (
-    TIP,
-    ExperimentAtRest,
-    Predictor,
-    experiment_of,
-    named,
-)
+from hotlever.estimate.experiment import TIP, ExperimentAtRest, Predictor, experiment_of, named
 from hotlever.estimate.objective import EstimatedQuantity, Objective, Subproblem
 from hotlever.estimate.options import TrialOptions
 from hotlever.estimate.posterior import ErrorProfile, Posterior, hotter_rows
@@ -52,21 +46,6 @@ from hotlever.work import each
 BAND_QUANTILES = (2.5, 16.0, 50.0, 84.0, 97.5)
 #: One unknown noise scale for each observable, or one for all.
 Noise = Literal["each", "common"]
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Points of a posterior that all count the same.
-
-    Attributes
-    ----------
-    points : ndarray, shape (n, p)
-    effective : float
-        How many independent ones they are worth: (Σw)² / Σw² of the trials' weights.
-    """
-
-    points: Array
-    effective: float
 
 
 class Trials:
@@ -188,7 +167,7 @@ def draw_samples(
     processes: int = 1,
     seed: int = 0,
     progress: Progress | None = None,
-) -> Samples:
+) -> tuple[Array, float]:
     """Make trials, and draw samples that all count the same from them by their weights.
 
     Parameters
@@ -197,6 +176,12 @@ def draw_samples(
         Picklable if `processes` is more than one.
     count, processes, seed, progress
         See `sample_posterior`.
+
+    Returns
+    -------
+    points : ndarray, shape (count, p)
+    effective : float
+        How many independent ones they are worth: (Σw)² / Σw² of the trials' weights.
 
     Raises
     ------
@@ -225,7 +210,7 @@ def draw_samples(
     # systematic resampling: each trial as often as its weight says, but for a fraction
     places = (np.arange(count) + np.random.default_rng(last).random()) / count
     chosen = np.searchsorted(np.cumsum(weights), places).clip(max=count - 1)
-    return Samples(points[chosen], float(1.0 / (weights @ weights)))
+    return points[chosen], float(1.0 / (weights @ weights))
 
 
 def _block(trials: Trials, count: int, seed: np.random.SeedSequence) -> tuple[Array, Array]:
@@ -288,40 +273,15 @@ class SampledLever:
 # --- the tip of a calibration -------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class SampledTip:
-    """What posterior samples say of the tip temperature.
-
-    Attributes
-    ----------
-    profile : ErrorProfile
-        From the quantiles of 2.5 and 97.5 %.
-    effective_samples : float
-    fewest : int
-        So many are expected.
-    """
-
-    profile: ErrorProfile
-    effective_samples: float
-    fewest: int
-
-    @property
-    def enough(self) -> bool:
-        """Whether the quantiles can be trusted."""
-        return self.effective_samples >= self.fewest
-
-    @property
-    def note(self) -> str:
-        """What the limits are from, or why not from these samples."""
-        worth = f"worth {self.effective_samples:.0f} independent ones"
-        if self.enough:
-            return (
-                f"95 % of the tip temperatures lie between quantiles of posterior samples, {worth}"
-            )
-        return (
-            f"too few posterior samples: {worth}, where {self.fewest} are expected; the limits are "
-            "those without samples, take more"
-        )
+def sampled_limits_note(effective: float, fewest: int) -> str:
+    """Say that limits are from samples worth so many independent ones, or why not, being fewer."""
+    worth = f"worth {effective:.0f} independent ones"
+    if effective >= fewest:
+        return f"95 % of the tip temperatures lie between quantiles of posterior samples, {worth}"
+    return (
+        f"too few posterior samples: {worth}, where {fewest} are expected; the limits are those "
+        "without samples, take more"
+    )
 
 
 def sample_tip(
@@ -330,11 +290,12 @@ def sample_tip(
     *,
     samples: int,
     progress: Progress | None = None,
-) -> SampledTip:
+) -> tuple[ErrorProfile, float]:
     """Sample the parameters of an estimate, and their tip temperatures.
 
     Levers that the predictor has solved far enough from the optimum say how values bend. What is
-    sampled costs too little for processes of its own.
+    sampled costs too little for processes of its own. Of the tip's quantiles of 2.5 and 97.5 % the
+    profile is returned, and how many independent samples they are from.
     """
     objective, at, experiment = posterior.objective, posterior.at, predictor.experiment
     if isinstance(experiment, ExperimentAtRest) and at.probe.circuit.starts_cold:
@@ -343,19 +304,16 @@ def sample_tip(
     # a solved lever that far away tells of those that samples reach
     near = Subproblem(objective, at, predictor.others(at), least=1.0)
     trials, rows = Trials(near, options=objective.residuals.numerics.trials), hotter_rows(at)
-    drawn = draw_samples(trials, samples, progress=progress)
+    points, effective = draw_samples(trials, samples, progress=progress)
     # one that counts for much is there several times
-    different, index = np.unique(drawn.points, axis=0, return_inverse=True)
+    different, index = np.unique(points, axis=0, return_inverse=True)
     tips = np.array([near.values_at(point)[TIP, rows] for point in different])[index]
     middle, stderr = np.transpose(
         [posterior.of(EstimatedQuantity("tip", int(row))) for row in rows]
     )
     low, high = np.percentile(tips, (2.5, 97.5), axis=0)
-    return SampledTip(
-        ErrorProfile(middle, (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)),
-        drawn.effective,
-        trials.options.fewest_effective,
-    )
+    sides = (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)
+    return ErrorProfile(middle, *sides), effective
 
 
 # --- the parameters of a fit --------------------------------------------------------------------
@@ -411,12 +369,14 @@ def sample_posterior(
         # with other weights than the fit's, the posterior lies beside the optimum
         middle = objective.at(fit.probe, trials.optimum)
         trials, lever = _trials_at(fit, objective, middle, noise)
-    drawn = draw_samples(trials, samples, processes=processes, seed=seed, progress=progress)
-    data = _dataset(fit, drawn, objective.coordinates.values)
+    points, effective = draw_samples(
+        trials, samples, processes=processes, seed=seed, progress=progress
+    )
+    data = _dataset(fit, objective.coordinates.values(points), effective)
     errors = list[float]()
-    for row in _outermost(drawn.points):
+    for row in _outermost(points):
         with suppress(InputError):  # no such lever can be drawn
-            errors.append(lever.error_K(objective.at(fit.probe, drawn.points[row])))
+            errors.append(lever.error_K(objective.at(fit.probe, points[row])))
     error = max(errors, default=np.nan)
     data.attrs |= {"seed": seed, "noise": noise, "surrogate_error_K": error}
     return data
@@ -439,8 +399,8 @@ def _outermost(points: Array) -> list[int]:
     return [int(np.argmin(along)), int(np.argmax(along))]
 
 
-def _dataset(fit: Estimate, drawn: Samples, values_of: Callable[[Array], Array]) -> xr.Dataset:
-    columns = dict(zip(fit.names, values_of(drawn.points).T, strict=True))
+def _dataset(fit: Estimate, values: Array, effective: float) -> xr.Dataset:
+    columns = dict(zip(fit.names, values.T, strict=True))
     silicon, material = fit.probe.heater_silicon, fit.probe.layout().heater.material
     if silicon is not None:
         owned = {full_name(material, own): own for own in ("n_d", "p")}
@@ -452,7 +412,7 @@ def _dataset(fit: Estimate, drawn: Samples, values_of: Callable[[Array], Array])
     held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
     at_rest = zip(held, fit.probe.values(held).tolist(), strict=True)
     data = labelled(
-        {**columns, "effective_sample_size": ((), drawn.effective)},
+        {**columns, "effective_sample_size": ((), effective)},
         "draw",
         {"quantity": list(columns)},
         fixed=", ".join(f"{name} = {value:g}" for name, value in at_rest),

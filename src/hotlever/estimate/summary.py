@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
@@ -99,16 +98,13 @@ def fit_text(fit: Estimate) -> str:
 # --- of the tip ---------------------------------------------------------------------------------
 
 
-class Parts(NamedTuple):
-    """What a calibration says: words, tables with their captions, and words that end it."""
+def calibration_parts(
+    calibration: Estimate,
+) -> tuple[list[str], list[tuple[str, list[list[str]]]], list[str]]:
+    """Return what a calibration says: words, tables with their captions, and words that end it.
 
-    before: list[str]
-    tables: list[tuple[str, list[list[str]]]]
-    after: list[str]
-
-
-def calibration_parts(calibration: Estimate) -> Parts:
-    """Return what a calibration says in words and tables; of one not described no table."""
+    Of one that does not describe its data there is no table.
+    """
     routes = {
         "power law": "a given power law",
         "probe": "a probe like this lever, brought up to date by these data",
@@ -136,16 +132,15 @@ def calibration_parts(calibration: Estimate) -> Parts:
         after.append(
             f"the measured tip temperatures differ by {calibration.measured_rms_K:.1f} K (rms)"
         )
-    return Parts(before, tables, after)
+    return before, tables, after
 
 
 def calibration_text(calibration: Estimate) -> str:
     """Return the result of a calibration as lines of text."""
-    parts = calibration_parts(calibration)
-    lines = parts.before
-    for caption, rows in parts.tables:
+    lines, tables, after = calibration_parts(calibration)
+    for caption, rows in tables:
         lines += ["", *([f"{caption}:"] if caption else []), *aligned(rows, right=True)]
-    return "\n".join([*lines, *([""] if parts.tables else []), *parts.after])
+    return "\n".join([*lines, *([""] if tables else []), *after])
 
 
 def _budget_lines(stated: TemperatureBudget) -> list[str]:

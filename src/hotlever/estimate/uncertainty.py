@@ -20,11 +20,7 @@ from scipy.special import chdtri
 from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.experiment import (
-    Prediction,
-    Predictor,
-    experiment_of,
-)
+from hotlever.estimate.experiment import Prediction, Predictor, experiment_of
 from hotlever.estimate.objective import EstimatedQuantity, Penalty
 from hotlever.estimate.sampling import BAND_QUANTILES, predictive_band, sample_posterior
 from hotlever.estimate.search import Optimiser

@@ -232,7 +232,7 @@ def predicted_and_published(cases: xr.Dataset) -> Figure:
     Parameters
     ----------
     cases : xarray.Dataset
-        From `hotlever.studies.validation.case.comparison`.
+        From `hotlever.studies.validation.prediction.comparison`.
     """
     cases = cases.sortby("group")
     colour_by_verdict = {"inside 68 %": GREEN, "inside 95 %": ORANGE, "outside": VERMILION}

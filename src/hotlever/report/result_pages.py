@@ -149,9 +149,9 @@ def calibration_page(calibration: Estimate, added: Callable[[Block], None] | Non
     ``added`` is called with each block as soon as it is there.
     """
     page = Page(f"Calibration of {calibration.measurement.path}", added=added)
-    parts = calibration_parts(calibration)
-    page.sentences("; ".join(parts.before), *parts.after)
-    for caption, (head, *rows) in parts.tables:
+    before, tables, after = calibration_parts(calibration)
+    page.sentences("; ".join(before), *after)
+    for caption, (head, *rows) in tables:
         page.table(head, rows, caption or "The standard error of the tip temperature, by source.")
     curves = figures.calibration_curves(calibration)
     page.draw(_of(calibration, "calibration"), curves, "calibration")

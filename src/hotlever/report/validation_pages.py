@@ -17,16 +17,14 @@ from hotlever.estimate.tip_table import rms
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.report.report_page import Page, filled, texts
-from hotlever.studies.validation.case import (
+from hotlever.studies.validation.case import Case, cases, sought
+from hotlever.studies.validation.prediction import (
     DRAWS,
     OUTSIDE,
-    Case,
     PredictedNumber,
-    cases,
     comparison,
     computed,
     predict,
-    sought,
 )
 from hotlever.text import value_with_error
 from hotlever.types import Array, Progress
@@ -44,7 +42,7 @@ def validation_page(progress: Progress | None = None) -> tuple[Page, xr.Dataset]
     -------
     page : Page
     compared : xarray.Dataset
-        See `hotlever.studies.validation.case.comparison`.
+        See `hotlever.studies.validation.prediction.comparison`.
     """
     # what else the lever of the real curve may be, and its changes
     other_levers: dict[str, dict[str, Any]] = {
@@ -199,7 +197,7 @@ def _real_curve(page: Page, calibrations: Mapping[str, Estimate]) -> None:
     page.draw("real_curve", figures.calibration_curves(calibration))
     bias = calibration.measurement.bias_V
     page.draw("real_curve_residuals", figures.residuals_of_current(bias, off, read_uA))
-    page.sentences(*calibration_parts(calibration).before)
+    page.sentences(*calibration_parts(calibration)[0])
     told = [
         [name, use.stated, value_with_error(use.posterior_value, use.posterior_spread)]
         for name, use in calibration.priors.items()

@@ -1,6 +1,6 @@
 """The commands, and the command line made of them.
 
-A command is a function of who hears it (`hotlever.tasks.common_steps.Reporter`), of its arguments,
+A command is a function of who hears it (`hotlever.tasks.arguments.Reporter`), of its arguments,
 and of its options, which are told by name. Their types say what the command line takes, and the
 docstring is the help: above all of the command, and below of each parameter, with what stands for
 its value in place of a type. A parameter that is a dataclass stands for its fields. A command
@@ -27,8 +27,7 @@ from typer.models import ParameterInfo
 from hotlever import __version__
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import check_outputs
-from hotlever.tasks.arguments import Written
-from hotlever.tasks.common_steps import Reporter
+from hotlever.tasks.arguments import Reporter, Written
 from hotlever.tasks.describing import (
     list_materials,
     new_probe,

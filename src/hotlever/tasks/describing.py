@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from hotlever.errors import unknown_name
 from hotlever.files import write_text
-from hotlever.tasks.arguments import Plot, ProbeFile, Written
-from hotlever.tasks.common_steps import Reporter, draw, read_probe
+from hotlever.tasks.arguments import Plot, ProbeFile, Reporter, Written, draw, read_probe
 
 if TYPE_CHECKING:
     from hotlever.probe import Probe, ProbeMesh

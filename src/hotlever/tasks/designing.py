@@ -10,8 +10,17 @@ from typer import Option
 from hotlever.errors import InputError
 from hotlever.files import write_text
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S
-from hotlever.tasks.arguments import Physics, Plot, ProbeFile, Written, at_most_one, refuse
-from hotlever.tasks.common_steps import Reporter, draw, read_probe
+from hotlever.tasks.arguments import (
+    Physics,
+    Plot,
+    ProbeFile,
+    Reporter,
+    Written,
+    at_most_one,
+    draw,
+    read_probe,
+    refuse,
+)
 from hotlever.tasks.parsing import check_number, parse_bounds, parse_setting, parse_varied
 
 if TYPE_CHECKING:

@@ -14,13 +14,15 @@ from hotlever.tasks.arguments import (
     DataArguments,
     MeasuredOptions,
     Plot,
+    Reporter,
     WaveformOptions,
     Written,
     at_most_one,
     check_medium,
+    draw,
+    read_probe,
     refuse,
 )
-from hotlever.tasks.common_steps import Reporter, draw, read_probe
 from hotlever.tasks.parsing import (
     check_number,
     parse_bias,

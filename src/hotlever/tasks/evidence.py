@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from hotlever.files import FOLDER, check_outputs, write_text
-from hotlever.tasks.arguments import Written, refuse
-from hotlever.tasks.common_steps import Reporter
+from hotlever.tasks.arguments import Reporter, Written, refuse
 
 
 def reproduce(
@@ -67,7 +66,8 @@ def validate(
 
 
 def _predict(reporter: Reporter, path: Path) -> None:
-    from hotlever.studies.validation.case import Case, predict
+    from hotlever.studies.validation.case import Case
+    from hotlever.studies.validation.prediction import predict
 
     case = Case.from_file(path)
     with reporter.progress("draws") as update:

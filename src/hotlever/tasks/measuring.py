@@ -12,8 +12,7 @@ from typer import Option
 
 from hotlever.errors import ComputationError, InputError, counted, excerpt, quoted
 from hotlever.files import write_text
-from hotlever.tasks.arguments import PriorOptions, Written, check_medium
-from hotlever.tasks.common_steps import Reporter, read_probe
+from hotlever.tasks.arguments import PriorOptions, Reporter, Written, check_medium, read_probe
 from hotlever.tasks.parsing import check_number, parse_bias, parse_temperature
 from hotlever.units import setting
 

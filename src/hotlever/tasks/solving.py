@@ -21,18 +21,16 @@ from hotlever.tasks.arguments import (
     HistoryOptions,
     LeverArguments,
     Plot,
+    Reporter,
     Table,
     Written,
     at_most_one,
-    refuse,
-)
-from hotlever.tasks.common_steps import (
-    Reporter,
     draw,
     give_table,
     make_lever,
     notes_of,
     read_surrounded_probe,
+    refuse,
 )
 from hotlever.tasks.parsing import parse_bias, parse_frequencies, parse_set_points, parse_times
 from hotlever.units import bias_setting

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from hotlever.errors import InputError, unknown_name
 from hotlever.files import FIGURE_TYPES, write_text
-from hotlever.tasks.arguments import Written, at_most_one, refuse
-from hotlever.tasks.common_steps import Reporter, draw
+from hotlever.tasks.arguments import Reporter, Written, at_most_one, draw, refuse
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,13 +9,17 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
-from hotlever.tasks.arguments import HistoryOptions, LeverArguments, Plot, Table, refuse
-from hotlever.tasks.common_steps import (
+from hotlever.tasks.arguments import (
+    HistoryOptions,
+    LeverArguments,
+    Plot,
     Reporter,
+    Table,
     give_table,
     make_lever,
     notes_of,
     read_surrounded_probe,
+    refuse,
 )
 from hotlever.tasks.parsing import parse_bias, parse_distances, parse_pressures, parse_times
 from hotlever.units import setting
