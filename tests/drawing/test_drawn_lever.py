@@ -53,13 +53,6 @@ def test_the_reference_probe_as_a_drawing(file, parametric):
     check_same(Lever(probe).sweep(BIAS), parametric)
 
 
-def test_turned_and_shifted_on_a_wafer(tmp_path, parametric):
-    """Through a reference that turns its cell."""
-    file = written(tmp_path / "turned.gds", turn=True)
-    probe = drawn(file, TURNED_TIP)
-    check_same(Lever(probe).sweep(BIAS), parametric)
-
-
 def test_on_the_same_mesh_turned_nothing_changes(file, tmp_path):
     other = written(tmp_path / "turned.gds", turn=True)
     there = drawn(other, TURNED_TIP)

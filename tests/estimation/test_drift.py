@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 from fit_twins import twin
 
-from experiments import reduced_experiment
-from hotlever.estimate import FitOptions, fit
+from hotlever.estimate import FitOptions
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import solve
-
-
-@pytest.fixture(scope="module")
-def model(coarse, reduced):
-    return lambda probe, bias: reduced_experiment(coarse.with_probe(probe), reduced, bias)
 
 
 @pytest.fixture(scope="module")
@@ -33,13 +27,8 @@ def drifting(coarse):
     return dataclasses.replace(good, **shuffled)
 
 
-def test_the_fit_says_that_the_zero_drifts(coarse, model, drifting):
-    estimated = solve(Problem.of(drifting, coarse.probe, FitOptions(), model=model))
+def test_the_fit_says_that_the_zero_drifts(coarse, coarse_fast, drifting):
+    estimated = solve(Problem.of(drifting, coarse.probe, FitOptions(), model=coarse_fast))
     at, slopes = estimated.prediction, estimated.posterior.slopes
     notes = estimated.residuals.drifting_zeros(at.values, slopes)
     assert any(text.startswith("current: the zero seems to go from") for text in notes)
-
-
-def test_data_without_drift_raise_no_suspicion(coarse, model):
-    result = fit(twin(coarse, noise=5e-4), coarse.probe, model=model)
-    assert not any("zero" in note for note in result.notes)

@@ -93,11 +93,10 @@ def test_the_band_is_the_spread_of_repeated_experiments(coarse, coarse_fast):
     assert 0.6 < ratio < 1.6
 
 
-def test_noise_gives_errors_of_its_size(coarse, coarse_fast):
-    result = fit(twin(coarse, noise=2e-3), model=coarse_fast)
-    for name, fitted in result.parameters.items():
+def test_noise_gives_errors_of_its_size(noisy_fit):
+    for name, fitted in noisy_fit.parameters.items():
         assert fitted.stderr is not None
         assert abs(fitted.value - TRUTH[name]) < 4 * fitted.stderr
-    assert np.allclose(np.diag(result.correlation), 1.0)
-    assert np.allclose(result.correlation, result.correlation.T)
-    assert 0 < result.inversion_temperature_stderr_K < 60
+    assert np.allclose(np.diag(noisy_fit.correlation), 1.0)
+    assert np.allclose(noisy_fit.correlation, noisy_fit.correlation.T)
+    assert 0 < noisy_fit.inversion_temperature_stderr_K < 60

@@ -17,7 +17,6 @@ from hotlever.estimate.estimator import undetermined
 from hotlever.estimate.sampling import sample_posterior
 from hotlever.estimate.summary import NEAREST, fit_text, parameter_rows
 from hotlever.estimate.uncertainty import profile_likelihood
-from hotlever.files import json_text
 from hotlever.report.result_pages import fit_page
 
 EXAMPLE = Path(__file__).parents[2] / "src" / "hotlever" / "examples" / "lever-a.csv"
@@ -59,28 +58,6 @@ def test_nothing_has_an_error(refused, good, tmp_path):
     assert content["inversion_temperature_stderr_K"] is None
     assert set(content["band"]["tip_stderr_K"]) == {None}
     assert content["describes_data"] is False
-
-
-def test_a_search_that_did_not_converge_is_a_third_answer(good, tmp_path):
-    ended = replace(good, converged=False, reason="ended after 30 s")
-    again = _again(ended, tmp_path)
-    assert json.loads((tmp_path / "fit.json").read_text())["describes_data"] is None
-    assert again.describes_data is None
-    assert again.reason == "ended after 30 s"
-    assert {one.stderr for one in again.parameters.values()} == {None}
-    first, *_ = fit_text(again).splitlines()
-    assert (
-        first == "the search for a lever that shows these data did not converge: ended after 30 s"
-    )
-
-
-def test_a_file_of_before_with_errors_is_read_without_them(refused, good, tmp_path):
-    content = good.content() | {"reason": "current differs by 3%"}
-    del content["describes_data"]
-    (tmp_path / "old.json").write_text(json_text(content))
-    old = read_fit(tmp_path / "old.json")
-    assert old.describes_data is False
-    assert {one.stderr for one in old.parameters.values()} == {None}
 
 
 def test_words_say_whose_the_numbers_are(refused):

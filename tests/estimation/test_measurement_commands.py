@@ -133,14 +133,6 @@ def test_every_key_of_a_probe_file_can_be_set(run, settings):
     assert 290 < float(rows_of(out)[0]["tip_K"]) < 700
 
 
-def test_a_tip_that_is_set_counts(run):
-    plain, tip = (
-        float(rows_of(run("sweep", "--bias", "6:6:1", *words)[1])[0]["tip_K"])
-        for words in ((), ("--set", "tip.height_um=1"))
-    )
-    assert 0.1 < plain - tip < 30
-
-
 @pytest.mark.parametrize(
     ("setting", "message"),
     [

@@ -81,13 +81,6 @@ def test_settings_may_be_negative_by_any_minus_sign(tmp_path):
     assert read_measurement(path).base_temperature_K == pytest.approx(263.15)
 
 
-def test_a_file_that_is_no_table_is_refused(tmp_path):
-    path = tmp_path / "iv.csv"
-    path.write_text("<?xml version='1.0'?>\n<a>1,2</a>\n")
-    with pytest.raises(InputError, match="an XML or HTML file, expected a table in text"):
-        read_measurement(path)
-
-
 @pytest.mark.parametrize(
     ("header", "cells", "right"),
     [

@@ -150,19 +150,3 @@ def test_zeros_in_place_of_samples_are_found(silicon, whole, tmp_path):
     # a background that was taken off and cut at zero is none
     cut = np.maximum(y - np.median(y), 0.0)
     assert len(spectra_or_line(wdf_bytes(x, [cut]), ".wdf", tmp_path)) == 1
-
-
-def test_a_damaged_file_ends_the_command_with_a_line_and_status_2(run, silicon, tmp_path):
-    x, y = silicon
-    raw = wdf_bytes(x, [y])
-    for name, content in (
-        ("cut.wdf", raw[: len(raw) // 2]),
-        ("zeros.wdf", bytes(len(raw))),
-        ("half.wdf", raw[:600] + bytes(len(raw) - 600)),
-    ):
-        (tmp_path / name).write_bytes(content)
-        with time_limit(LIMIT_S):
-            status, out, err = run("raman", tmp_path / name)
-        assert (status, out) == (2, "")
-        (line,) = err.splitlines()
-        assert f"{name}: not a readable WiRE file (cut short or damaged" in line

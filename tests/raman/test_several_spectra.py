@@ -10,7 +10,6 @@ import pytest
 
 import synthetic_spectra as synthetic
 from hotlever.errors import InputError
-from hotlever.raman.line_fit import fit_peak
 from hotlever.raman.spectrum_reading import read_file
 from hotlever.tables import find_tables
 from spectrometer_files import wdf_bytes
@@ -271,24 +270,7 @@ def test_one_file_calibrates_and_one_is_joined(run, tmp_path):
     }
 
 
-def test_a_log_that_names_a_file_of_several_spectra_is_told_so(run, series, hot_plate, tmp_path):
-    (tmp_path / "map.txt").write_text(wire(*series))
-    (tmp_path / "log.csv").write_text("V_b (V),file\n1,map.txt\n")
-    status, _, err = run(
-        *("join", tmp_path / "log.csv", tmp_path / "map.txt", "--calibrate-from", hot_plate)
-    )
-    assert status == 2
-    assert "line 2: spectrum 'map.txt' names 4 of them" in err
-
-
 def test_headings_between_two_tabs_stand_above_numbers_between_one(series):
     text = wire(*series).replace("\t\t", "\t").replace("#X\t#Y\t#Wave\t", "#X\t\t#Y\t\t#Wave\t\t")
     tables = find_tables(text.encode(), "map.txt")
     assert {tuple(table.names) for table in tables} == {("#X", "#Y", "#Wave", "#Intensity")}
-
-
-def test_peaks_of_a_series_are_those_of_its_spectra(series, tmp_path):
-    x, ys = series
-    (tmp_path / "a.txt").write_text(columns(x, ys))
-    for spectrum, y in zip(read_file(tmp_path / "a.txt"), ys, strict=True):
-        assert fit_peak(spectrum.x, spectrum.y).centre == fit_peak(x, y).centre

@@ -13,7 +13,6 @@ import synthetic_spectra as synthetic
 from hotlever.errors import InputError
 from hotlever.raman import anharmonic, lineshape
 from hotlever.raman.line_fit import fit_peak
-from hotlever.raman.lineshape import PeakOptions
 from hotlever.raman.series import calibrate_from, measure, read_lines
 from hotlever.raman.spectrum import Spectrum
 from hotlever.raman.spectrum_reading import read_spectra
@@ -382,8 +381,3 @@ def test_broken_table_of_temperatures(tmp_path, text, words):
     (tmp_path / "t.csv").write_text(text)
     with pytest.raises(InputError, match=words):
         read_temperatures(tmp_path / "t.csv")
-
-
-def test_calibration_and_measurement_are_fitted_with_the_same_shape(hot_plate):
-    found, _ = calibrate_from(read_spectra([hot_plate]), PeakOptions("voigt", resolution=0.8))
-    assert (found.line_shape, found.resolution_cm) == ("voigt", 0.8)

@@ -47,14 +47,6 @@ def test_the_design_s_knee_is_the_lever_s(start, reference):
     assert values["tip_K"] == pytest.approx(reference.tip_temperature(2.0).item(), abs=0.3)
 
 
-def test_a_sweep_of_the_heater_s_length(start):
-    data = vary(start, {"heater_length_um": [4.0, 4.6]}, air=False)
-    assert data.heater_length_um.values.tolist() == [4.0, 4.6]
-    assert data.cold_ohm.diff("heater_length_um").item() > 0
-    assert data.knee_K.diff("heater_length_um").item() < 0
-    assert data.knee_mW.attrs["units"] == "mW"
-
-
 def test_a_map_has_each_with_each_and_gaps_with_their_reasons(start):
     """In vacuum the power of the knee grows as the thickness, whatever the doping."""
     varied = {"thickness_um": [-0.2, 0.2, 0.4], "n_d": [5e17, 6e17]}
