@@ -9,7 +9,6 @@ from hotlever import figures
 from hotlever.datasets import labelled
 from hotlever.materials import PARAMETERS
 from hotlever.report.reproduce import SECTIONS
-from hotlever.report.reproduce import air_sections as air
 from hotlever.report.reproduce import claim_sections as claims
 from hotlever.report.reproduce import layout_sections as layouts
 from hotlever.report.reproduce import paper_sections as vacuum
@@ -75,7 +74,7 @@ def test_parameters_are_judged_apart_from_the_doping(page, monkeypatch, scatter,
 
 def test_k_with_a_surface_is_judged_by_what_the_best_one_leaves(quick_page):
     quick_page.extent = Extent(gaps_um=(1.0, np.inf))
-    air.one_sided_section(quick_page)
+    claims.one_sided_section(quick_page)
     assert set(kinds(quick_page)) == {"figure", "table", "text"}
     [claim] = quick_page.claims
     assert claim[2].startswith("does not hold, because")
@@ -97,7 +96,7 @@ def test_radiation_is_judged_by_all_of_the_lever(page):
         (vacuum.heater_section, 1),
         (vacuum.knee_section, 3),
         (vacuum.balance_section, 0),
-        (air.disc_section, 2),
+        (claims.disc_section, 2),
     ],
 )
 def test_texts_say_what_their_section_found(coarse, section, claims):

@@ -35,12 +35,11 @@ from hotlever.tasks.describing import (
     show_cache,
     show_probe,
 )
-from hotlever.tasks.designing import vary_design
 from hotlever.tasks.estimating import calibrate_files, fit_files, propose
-from hotlever.tasks.evidence import reproduce, validate
 from hotlever.tasks.measuring import measure_lever
 from hotlever.tasks.solving import respond, simulate_in_time, sweep
 from hotlever.tasks.spectra import join_spectra, measure_spectra
+from hotlever.tasks.studying import reproduce, validate, vary_design
 from hotlever.tasks.surfaces import approach, touch
 
 Command = Callable[..., int | None]
