@@ -30,7 +30,7 @@ from hotlever.air.operator import PanelledAir
 from hotlever.cache import CACHE_VARIABLE
 from hotlever.estimate.experiment import experiment_of
 from hotlever.lever import Lever
-from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
+from hotlever.lever.response_surface import PAPER, ParameterDomain
 from hotlever.lever3d import SolidLever
 from hotlever.probe import Probe
 from hotlever.probe.mesh import SolidMeshOptions

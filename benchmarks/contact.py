@@ -52,8 +52,7 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.optimize import brentq
 
 from hotlever import Measurement, fit
-from hotlever.contact.law import INTERFACE, ContactLaw
-from hotlever.contact.resistances import cold_resistance
+from hotlever.contact.law import INTERFACE, ContactLaw, cold_resistance
 from hotlever.estimate.experiment import ExperimentAtRest, with_distances
 from hotlever.lever import Lever
 from hotlever.lever.contact import sweep_in_contact

@@ -274,7 +274,7 @@ def differences(sweep: xr.Dataset, other: xr.Dataset) -> list[str]:
 
 def share_by_distance(low: PlacedFilm, delta: float) -> np.ndarray:
     """The share of the high-doped silicon's dopant by `tapered_doping`."""
-    from hotlever.materials.doping import tapered_doping
+    from hotlever.materials.silicon import tapered_doping
 
     share, _ = tapered_doping(low.distances[..., 0], 0.0, delta, n_hd=1.0)
     return share

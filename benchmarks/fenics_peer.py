@@ -47,7 +47,7 @@ from hotlever.estimate import fit, read_measurement
 from hotlever.lever import Lever
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.full_space import FullSpace
-from hotlever.lever.reduced.training import cached_reduction
+from hotlever.lever.reduced_lever import cached_reduction
 from hotlever.lever.transient import simulate, step
 from hotlever.materials import PARAMETERS
 from hotlever.measurement import with_measured_circuit

@@ -23,9 +23,8 @@ from hotlever.estimate.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.reduced_lever import estimated_error
-from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
-from hotlever.lever.reduced.training import cached_reduction
+from hotlever.lever.reduced_lever import cached_reduction, estimated_error
+from hotlever.lever.response_surface import PAPER, ParameterDomain
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import usual_parameters

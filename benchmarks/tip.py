@@ -15,7 +15,7 @@ import sys
 import numpy as np
 
 from hotlever.lever import Lever, State
-from hotlever.lever.air_fields import AirFields
+from hotlever.lever.fields import AirFields
 from hotlever.lever3d import SolidLever
 from hotlever.probe import MeshOptions, Probe, Tip
 from hotlever.spieser2017 import KNEE_MEASURED_K, KNEE_PREDICTED_K

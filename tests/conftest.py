@@ -17,8 +17,7 @@ from hotlever.cache import CACHE_VARIABLE
 from hotlever.cli import main, output
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.reduced_lever import ReducedLever
-from hotlever.lever.reduced.training import cached_reduction
+from hotlever.lever.reduced_lever import ReducedLever, cached_reduction
 from hotlever.materials import published
 from hotlever.probe import Probe
 

@@ -12,7 +12,7 @@ from hotlever.estimate import Estimate, fit
 from hotlever.estimate.experiment import ExperimentAtRest
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.reduced_lever import ReducedLever
+from hotlever.lever.reduced_lever import ReducedLever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.types import Array

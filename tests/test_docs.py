@@ -46,7 +46,7 @@ LAWS = (
     "spieser2017.py",
     "materials",
     "probe/tip.py",
-    "lever/reduced/reduced_lever.py",
+    "lever/reduced_lever.py",
     "estimate",
 )
 

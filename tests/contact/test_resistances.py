@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import quad, solve_bvp
 from scipy.special import j1
 
-from hotlever.contact.law import ContactLaw
-from hotlever.contact.resistances import (
+from hotlever.contact.law import (
     AirBeside,
+    ContactLaw,
     axis_rise,
     cold_resistance,
     contact_resistance,

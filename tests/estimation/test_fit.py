@@ -18,7 +18,7 @@ from hotlever.estimate.options import Numerics, SearchOptions
 from hotlever.estimate.residuals import Residuals
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.reduced_lever import ReducedLever
+from hotlever.lever.reduced_lever import ReducedLever
 from hotlever.materials import PARAMETERS
 from hotlever.measurement import with_measured_circuit
 from hotlever.probe import Probe

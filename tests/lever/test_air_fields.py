@@ -10,7 +10,7 @@ from documents import EXAMPLES
 from hotlever.errors import InputError
 from hotlever.figures import air_loss, save_figure
 from hotlever.lever import Lever
-from hotlever.lever.air_fields import AirFields
+from hotlever.lever.fields import AirFields
 from hotlever.lever.lever import COARSE
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.probe import Probe

@@ -20,7 +20,7 @@ from hotlever.lever.contact import (
     sweep_in_contact,
 )
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.training import can_be_reduced
+from hotlever.lever.reduced_lever import can_be_reduced
 from hotlever.lever.transient import pulse, simulate, step
 from hotlever.lever.transient.reduced import reduced_in_time
 from hotlever.lever3d import SolidLever

@@ -8,9 +8,8 @@ import pytest
 from hotlever.errors import ComputationError
 from hotlever.lever.branch import Reach
 from hotlever.lever.observables import at_fixed_bias
-from hotlever.lever.reduced.reduced_lever import estimated_error
-from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain
-from hotlever.lever.reduced.training import ReductionOptions, reduce
+from hotlever.lever.reduced_lever import ReductionOptions, estimated_error, reduce
+from hotlever.lever.response_surface import PAPER, ParameterDomain
 from hotlever.materials.parameters import OF_SILICON
 
 

@@ -17,11 +17,11 @@ from hotlever.errors import BranchEndError
 from hotlever.estimate.experiment import ExperimentAtRest
 from hotlever.lever import Branch, Lever
 from hotlever.lever.branch import Reach, branch_end
+from hotlever.lever.dataset import MonitorMap
 from hotlever.lever.equations import BALANCES, balance_columns
 from hotlever.lever.lever import COARSE
-from hotlever.lever.monitors import MonitorMap
 from hotlever.lever.observables import Linearised, by_parameter
-from hotlever.lever.reduced.reduced_lever import ReducedLever
+from hotlever.lever.reduced_lever import ReducedLever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.lever.space import LEVER, TIP
 from hotlever.lever3d import SolidLever

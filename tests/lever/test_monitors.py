@@ -8,7 +8,7 @@ import xarray as xr
 
 from hotlever.errors import InputError
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
-from hotlever.lever.fields import FieldMapper
+from hotlever.lever.fields import mapped_fields
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse, simulate, write_history
 from hotlever.lever.transient.reduced import reduced_in_time
@@ -41,7 +41,7 @@ def test_a_sweep_shows_what_solved_states_do(monitored):
 def test_fields_that_are_written_are_those_monitored(coarse):
     lever = Lever(metal_film_probe(), COARSE)
     (state,) = lever.solve([0.5])
-    fields = FieldMapper(lever).map(state)
+    [fields] = mapped_fields(lever, [state])
     number = {"metal": np.flatnonzero(np.isfinite(fields.potential))[7]}
     number["bare"] = np.flatnonzero(np.isnan(fields.potential))[5]
     # in the middle of a small triangle, away from borders

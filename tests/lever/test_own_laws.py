@@ -21,7 +21,7 @@ from hotlever.estimate import FitOptions, Measurement, fit, many, read_fit
 from hotlever.estimate.many import fit_many
 from hotlever.lever import Lever, probe_of, read_sweep, write_sweep
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.training import cached_reduction
+from hotlever.lever.reduced_lever import cached_reduction
 from hotlever.lever.transient import pulse, simulate
 from hotlever.materials import LOW_DOPED, Material, Parameter
 from hotlever.materials.kinds import Dielectric, HighDopedSilicon, MetalFilm, NSilicon
@@ -290,7 +290,7 @@ def test_nothing_is_kept_of_a_class_whose_code_may_change(monkeypatch, tmp_path)
     probe = Probe.reference().with_material("material", OtherMaterial)
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
     reduction = SimpleNamespace(arrays=lambda: {"a": np.zeros(2)})
-    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", lambda *_: reduction)
+    monkeypatch.setattr("hotlever.lever.reduced_lever.reduce", lambda *_: reduction)
     cached_reduction(Lever(probe, COARSE))
     assert not list(tmp_path.rglob("*.npz"))
     (tmp_path / "a.csv").write_text("V_b (V),I_h (mA)\n1,0.1\n2,0.2\n3,0.3\n")

@@ -9,7 +9,7 @@ import hotlever
 from hotlever import Lever, Probe
 from hotlever.errors import InputError
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.training import can_be_reduced
+from hotlever.lever.reduced_lever import can_be_reduced
 from hotlever.lever.transient import pulse, spectrum, step
 from hotlever.lever3d import SolidLever
 from hotlever.probe.mesh import SolidMeshOptions

@@ -14,9 +14,8 @@ from hotlever.estimate import Measurement, fit
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.reduced_lever import ReducedLever
-from hotlever.lever.reduced.response_surface import ParameterDomain
-from hotlever.lever.reduced.training import cached_reduction
+from hotlever.lever.reduced_lever import ReducedLever, cached_reduction
+from hotlever.lever.response_surface import ParameterDomain
 from hotlever.probe import Probe
 from hotlever.quantities import observables_of
 
@@ -133,7 +132,7 @@ def test_a_geometry_is_reduced_once(coarse, reduced, cache, monkeypatch):
     def never(*_):
         raise AssertionError("reduced again")
 
-    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", never)
+    monkeypatch.setattr("hotlever.lever.reduced_lever.reduce", never)
     again = cached_reduction(coarse)
     np.testing.assert_array_equal(again.points, reduced.points)
     np.testing.assert_array_equal(again.space.modes, reduced.space.modes)
@@ -142,7 +141,7 @@ def test_a_geometry_is_reduced_once(coarse, reduced, cache, monkeypatch):
 @pytest.mark.parametrize("damage", [b"", b"not a zip file", None], ids=["empty", "text", "cut"])
 def test_a_damaged_file_is_made_anew(coarse, reduced, tmp_path, monkeypatch, damage):
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
-    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", lambda *_: reduced)
+    monkeypatch.setattr("hotlever.lever.reduced_lever.reduce", lambda *_: reduced)
     cached_reduction(coarse)
     (file,) = (tmp_path / "reduced").iterdir()
     whole = file.read_bytes()
@@ -152,7 +151,7 @@ def test_a_damaged_file_is_made_anew(coarse, reduced, tmp_path, monkeypatch, dam
 
 
 def test_the_cache_can_be_switched_off_or_be_unwritable(coarse, reduced, tmp_path, monkeypatch):
-    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", lambda *_: reduced)
+    monkeypatch.setattr("hotlever.lever.reduced_lever.reduce", lambda *_: reduced)
     monkeypatch.setenv(CACHE_VARIABLE, "")
     assert cached_reduction(coarse) is reduced
     (tmp_path / "file").write_text("in the way")
@@ -162,7 +161,7 @@ def test_the_cache_can_be_switched_off_or_be_unwritable(coarse, reduced, tmp_pat
 
 def test_other_geometries_have_other_files(coarse, reduced, tmp_path, monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
-    monkeypatch.setattr("hotlever.lever.reduced.training.reduce", lambda *_: reduced)
+    monkeypatch.setattr("hotlever.lever.reduced_lever.reduce", lambda *_: reduced)
     cached_reduction(coarse)
     wider = Lever(coarse.probe.with_(gap_um=3.3), COARSE)
     cached_reduction(wider)

@@ -11,9 +11,8 @@ from hotlever.estimate.surrogate import Rows
 from hotlever.lever import Lever
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.reduced_lever import estimated_error
-from hotlever.lever.reduced.response_surface import PAPER, ParameterDomain, is_papers
-from hotlever.lever.reduced.training import cached_reduction, known_reduction
+from hotlever.lever.reduced_lever import cached_reduction, estimated_error, known_reduction
+from hotlever.lever.response_surface import PAPER, ParameterDomain, is_papers
 from hotlever.probe import Probe
 from of_materials import p_type_probe, strip_probe
 

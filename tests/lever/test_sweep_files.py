@@ -13,7 +13,7 @@ from hotlever.datasets import csv_text, frame_text, labelled
 from hotlever.errors import InputError
 from hotlever.lever import probe_of, read_sweep, write_sweep
 from hotlever.lever.dataset import circuit_of
-from hotlever.lever.fields import FieldMapper, heater_profile, write_vtu
+from hotlever.lever.fields import heater_profile, mapped_fields, write_vtu
 from hotlever.materials.silicon import inversion_temperature
 
 HEADER = "bias_V,current_mA,lever_V,reader_V,tip_K,power_mW,heater_ohm,legs_ohm"
@@ -110,7 +110,7 @@ def test_a_sweep_that_does_not_say_its_circuit_is_not_taken_for_one_in_the_usual
 
 def test_vtu_holds_the_fields(coarse, tmp_path):
     (state,) = coarse.solve([8.3])
-    fields = FieldMapper(coarse).map(state)
+    [fields] = mapped_fields(coarse, [state])
     write_vtu(fields, tmp_path / "a.vtu")
     mesh = meshio.read(tmp_path / "a.vtu")
     seen = coarse.dataset([state]).isel(bias=0)

@@ -9,7 +9,7 @@ import pytest
 
 from hotlever.estimate import Measurement, fit
 from hotlever.lever import Lever
-from hotlever.lever.air_fields import AirFields
+from hotlever.lever.fields import AirFields
 from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import simulate, step
 from hotlever.lever.transient.frequency_domain import spectrum

@@ -7,7 +7,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.materials import published
-from hotlever.materials.doping import (
+from hotlever.materials.silicon import (
     diffusion_length,
     phosphorus_diffusivity,
 )

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.special import erf
 from test_silicon import numerical_derivative
 
-from hotlever.materials.doping import tapered_doping
+from hotlever.materials.silicon import tapered_doping
 
 LENGTH, N_HD = 4.0, 2.2e20
 

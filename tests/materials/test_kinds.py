@@ -13,8 +13,7 @@ from hotlever.materials import KINDS, PARAMETERS, published
 from hotlever.materials.departures import DEPARTURES, PROFILE, SmoothFactor, departure_of
 from hotlever.materials.heat import thermal_conductivity_of_layer
 from hotlever.materials.kinds import LowDopedSilicon, PSilicon
-from hotlever.materials.presets import PRESETS
-from hotlever.materials.sections import material_of
+from hotlever.materials.presets import PRESETS, material_of
 from hotlever.materials.silicon import (
     band_gap,
     band_gap_p,

@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from hotlever.errors import InputError
 from hotlever.materials.films import metal_conductivity
 from hotlever.materials.kinds import Dielectric, MetalFilm
-from hotlever.materials.sections import material_of, read_law
+from hotlever.materials.presets import material_of, read_law
 from hotlever.materials.stated import Formula, Table, parsed
 from hotlever.piecewise import monotone_cubic
 from hotlever.units import product_conversion

@@ -8,9 +8,8 @@ from skfem import MeshTri
 
 from hotlever.lever.equations import LeverEquations
 from hotlever.materials import published
-from hotlever.materials.doping import tapered_doping
 from hotlever.materials.heat import thermal_conductivity
-from hotlever.materials.silicon import conductivity_low_doped
+from hotlever.materials.silicon import conductivity_low_doped, tapered_doping
 from hotlever.probe import Taper, Terminal
 
 LENGTH, WIDTH, BIAS, BASE = 2.0, 1.0, 1.5, 293.0

@@ -16,7 +16,7 @@ from skfem.element import ElementTriP1, ElementTriP2, ElementTriP3
 
 from hotlever.lever import Lever
 from hotlever.materials import published
-from hotlever.materials.sections import material_of
+from hotlever.materials.presets import material_of
 from hotlever.probe import Probe, Terminal
 
 BASE, LENGTH, WIDTH = 293.0, 20.0, 2.0

@@ -29,9 +29,13 @@ from hotlever.lever.branch import Reach, branch_end
 from hotlever.lever.fields import current_path
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import COARSE
-from hotlever.lever.reduced.reduced_lever import ReducedLever
-from hotlever.lever.reduced.response_surface import is_papers
-from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
+from hotlever.lever.reduced_lever import (
+    ReducedLever,
+    cached_reduction,
+    can_be_reduced,
+    known_reduction,
+)
+from hotlever.lever.response_surface import is_papers
 from hotlever.materials.departures import departure_of
 from hotlever.materials.parameters import own_name
 from hotlever.probe import Circuit, Probe

@@ -26,8 +26,7 @@ from hotlever.errors import InputError, excerpt
 from hotlever.lever.discretisation import chosen_space
 from hotlever.materials.kinds import KINDS
 from hotlever.materials.parameters import STATED, label, parameter_named
-from hotlever.materials.presets import PRESETS, usual_values
-from hotlever.materials.sections import with_tables
+from hotlever.materials.presets import PRESETS, usual_values, with_tables
 from hotlever.materials.stated import names_stated
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.drawing.outlines import DrawingError

@@ -32,11 +32,15 @@ from hotlever.estimate.surrogate import (
     Rows,
     Surrogate,
 )
-from hotlever.lever.branch import TIP_RISE, Branch, Reach, shifted
+from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.observables import Linearised, by_parameter
-from hotlever.lever.reduced.reduced_lever import ReducedLever
-from hotlever.lever.reduced.training import cached_reduction, can_be_reduced, known_reduction
+from hotlever.lever.reduced_lever import (
+    ReducedLever,
+    cached_reduction,
+    can_be_reduced,
+    known_reduction,
+)
 from hotlever.lever.similar import SimilarLevers
 from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
@@ -267,7 +271,7 @@ class Correction:
         """Return a branch of the fast lever with what it lacks, for some values of parameters."""
         offset, u = at - self.at, branch.u
         changes, slopes = (self.values(u, n) + self.slopes(u, n) @ offset for n in (0, 1))
-        return shifted(branch, changes, slopes)
+        return branch.shifted(changes, slopes)
 
 
 @dataclass(frozen=True)
@@ -412,7 +416,7 @@ def experiment_of(
     bias : ndarray, shape (n,)
     names : tuple of str
         Parameters of the derivatives; by default what a fit usually varies. A reduced lever does
-        not serve all, see `hotlever.lever.reduced.training.can_be_reduced`.
+        not serve all, see `hotlever.lever.reduced_lever.can_be_reduced`.
     reduce : bool
         Make and keep a reduced lever (some seconds) if the geometry has none yet: it pays where
         more than one fit is to come.

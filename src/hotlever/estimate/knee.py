@@ -28,7 +28,7 @@ from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.power_law import PowerLaw, law_of_model, power_turns
 from hotlever.estimate.tip_table import Knee, rms, table_by_bias
 from hotlever.lever import Branch
-from hotlever.lever.branch import Reach, shifted
+from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement import Measurement, with_measured_circuit
@@ -599,7 +599,7 @@ def _similar_branches(probe: Probe, like: Branch) -> list[Branch]:
     changes = solved.output_slopes * np.array([_STEP * priors[name].absolute for name in names])
     slopes = spline_through(model.u, changes)(model.u, 1)
     perturbations = zip(np.moveaxis(changes, 2, 0), np.moveaxis(slopes, 2, 0), strict=True)
-    return [model, *(shifted(model, *change) for change in perturbations)]
+    return [model, *(model.shifted(*change) for change in perturbations)]
 
 
 def _error_of_other_levers(similar: list[Branch], ratio: Array) -> Array:

@@ -26,7 +26,7 @@ from hotlever.files import (
     without_nan,
 )
 from hotlever.lever.lever import Lever
-from hotlever.lever.reduced.training import cached_reduction, can_be_reduced
+from hotlever.lever.reduced_lever import cached_reduction, can_be_reduced
 from hotlever.measurement import Measurement, read_measurement_of, with_measured_circuit
 from hotlever.probe import Probe
 from hotlever.processes import PROCESSORS, Executor, guarded, local_executor, run_all

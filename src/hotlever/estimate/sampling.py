@@ -33,7 +33,7 @@ from hotlever.estimate.objective import EstimatedQuantity, Objective, Subproblem
 from hotlever.estimate.options import TrialOptions
 from hotlever.estimate.posterior import ErrorProfile, Posterior, hotter_rows
 from hotlever.estimate.surrogate import ReducedSurrogate
-from hotlever.lever.reduced.reduced_lever import ReducedLever
+from hotlever.lever.reduced_lever import ReducedLever
 from hotlever.materials import full_name
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import parameters_of, usual_parameters

@@ -21,7 +21,7 @@ from typing import Self
 import numpy as np
 
 from hotlever.contact.law import contact_of
-from hotlever.lever.branch import TIP_RISE, Branch, branch_end, shifted
+from hotlever.lever.branch import TIP_RISE, Branch, branch_end
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.newton import NewtonResult
 from hotlever.lever.observables import (
@@ -31,7 +31,7 @@ from hotlever.lever.observables import (
     observed_by,
     with_changes,
 )
-from hotlever.lever.reduced.reduced_lever import ReducedLever
+from hotlever.lever.reduced_lever import ReducedLever
 from hotlever.piecewise import Piecewise, crossing, spline_values
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.probe_parameters import parameters_of
@@ -298,7 +298,7 @@ class CurveSurrogate:
         """Return the branch for some values of the parameters (p,)."""
         away = self.distance(parameters)
         if self._straight:
-            return shifted(self.branch, self._rates @ away, self._slopes @ away)
+            return self.branch.shifted(self._rates @ away, self._slopes @ away)
         return multiplied(self.branch, np.exp(self._rates @ away), self._slopes @ away)
 
     def distance(self, parameters: Array) -> Array:

@@ -41,7 +41,7 @@ from hotlever.figures.style import (
     settled,
 )
 from hotlever.files import FILM_TYPES, whole_file
-from hotlever.lever.fields import FieldMapper, Surface, seen_from_above
+from hotlever.lever.fields import Surface, mapped_fields, seen_from_above
 from hotlever.probe import Layout
 from hotlever.types import Array, Progress
 
@@ -67,7 +67,7 @@ def field_maps(state: State) -> Figure:
     InputError
         If it is one of a `SolidLever`.
     """
-    fields, layout = FieldMapper(state.lever).map(state), state.lever.probe.layout()
+    (fields,), layout = mapped_fields(state.lever, [state]), state.lever.probe.layout()
     mesh = Triangulation(fields.points[:, 0], fields.points[:, 1], fields.triangles)
     density = np.linalg.norm(fields.current_density, axis=1)
     strong = max(density.max(), 1e-9)
@@ -129,7 +129,7 @@ def air_loss(
     flux : ndarray, shape (len(panels),)
         mW/µm², of one state.
     shares : xarray.Dataset
-        See `hotlever.lever.air_fields.AirFields.shares`.
+        See `hotlever.lever.fields.AirFields.shares`.
     title : str
         Of the map.
     """

@@ -26,9 +26,6 @@ from hotlever.lever.space import LEVER
 from hotlever.piecewise import hermite_weights
 from hotlever.types import Array, Progress
 
-#: Points and weights of Gauss's rule on a piece of the curve.
-_GAUSS = np.polynomial.legendre.leggauss(5)
-
 
 @dataclass(frozen=True)
 class ContinuationOptions:
@@ -327,7 +324,8 @@ def _length_between(start: Array, end: Array, away: Array) -> float:
     It is that of the cubic through both ends, whose slopes are of unit length.
     """
     length = float(np.linalg.norm(away))
-    t, weights = 0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1]
+    nodes, of_nodes = np.polynomial.legendre.leggauss(5)
+    t, weights = 0.5 * (nodes + 1.0), 0.5 * of_nodes
     for _ in range(6):  # it converges by a digit a round
         slopes = (
             np.outer(6 * t - 6 * t**2, away)

@@ -7,7 +7,7 @@ Heat (paper's first equation, with the sign corrected) and charge::
 and, where a probe asks for them, what the current carries and the surface radiates
 (`hotlever.lever.transport`),
 
-with what is wired to the terminals (`hotlever.lever.terminals`). One more condition, the
+with what is wired to the terminals (`Terminals`). One more condition, the
 *constraint*, selects a state: its tip temperature. What is behind the swept supply does not enter:
 what a lever shows at a tip temperature does not depend on it. Units are µm, V, mA, mW and K.
 Several states stand side by side, see `hotlever.lever.space`.
@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from hotlever.lever.laws_at_points import LawsAtPoints
 from hotlever.lever.layers_at_points import Rim
 from hotlever.lever.newton import refined
 from hotlever.lever.space import LEVER, TIP, Constraint, Factors, Space, SurfaceTangent
-from hotlever.lever.terminals import Terminals
 from hotlever.lever.transport import (
     Fields,
     Fluxes,
@@ -381,7 +380,8 @@ class LeverEquations:
             name
             for name in names
             if name in {"gas_conductivity", "surface_gap_um", "base_temperature_K", "chip_K_per_mW"}
-            or self._has_losses
+            or len(self.rim.weights)
+            or self.contact is not None
         ]
         if surface:
             columns = [names.index(name) for name in surface]
@@ -404,10 +404,6 @@ class LeverEquations:
             else self.motions[name].of_fluxes(fields, fluxes, tangent)
             for name in moving
         }
-
-    @property
-    def _has_losses(self) -> bool:
-        return len(self.rim.weights) > 0 or self.contact is not None
 
     def _on_surface(self, x: Array, names: Sequence[str]) -> Array:
         """Return how what leaves at the surface, and into the chip, changes with parameters."""
@@ -551,6 +547,115 @@ def steps_of(equations: LeverEquations) -> Array:
     return np.concatenate([-u[::-1], u])
 
 
+# --- the terminals --------------------------------------------------------------------------------
+
+
+class Terminals:
+    """What is wired to the terminals of a lever, in its equations, and how warm its leg ends are.
+
+    Each terminal gives its potential V one equation, and the leg end there the temperature at which
+    the chip holds it, the base temperature; or all of them one temperature, above it by
+    ``chip_K_per_mW`` times the heat that enters the chip:
+
+    =======  =======================================  ===========================================
+    kind     what it is                               equation of the potential
+    =======  =======================================  ===========================================
+    ground   wired to ground, nothing between         V = 0, no unknown
+    held     a supply of its own, of a voltage        one unknown, the same all over the contact;
+             behind a resistor or of a current, or a  current into the lever I = J − G V
+             ground behind a resistor (Norton)
+    sense    floating                                 no current density; V is the mean over it
+    swept    the supply that is swept                 V_l, the last unknown: a constraint selects
+                                                      a state, or the circuit V_l + R_s I_h = V_b
+    =======  =======================================  ===========================================
+
+    Which terminals are what is a matter of the space, whose unknowns depend on it; what is behind
+    them and how warm the leg ends are is one of the circuit.
+
+    Parameters
+    ----------
+    space : Space
+    circuit : Circuit
+
+    Attributes
+    ----------
+    conductance : ndarray, shape (held,)
+        G of the held terminals (mA/V).
+    chip_mW_per_K : float
+        Of the chip below the leg ends; infinite if it stays at the base temperature.
+    source_mA : ndarray, shape (held,)
+        J of the held terminals.
+    end_rises : dict of str to float
+        How much warmer than the base temperature leg ends are (K), if they are.
+    """
+
+    def __init__(self, space: Space, circuit: Circuit) -> None:
+        self._space, self._held = space, np.array(list(space.held.values()), dtype=int)
+        self.conductance, self.source_mA = circuit.norton(space.held)
+        self.chip_mW_per_K = np.inf if space.chip is None else 1.0 / circuit.chip_K_per_mW
+        self.end_rises = circuit.end_rises()
+
+    def scaled(self, sources: float, rises: float) -> Terminals:
+        """Return the same with so many times the sources, and the rises of leg ends."""
+        other = copy(self)
+        other.source_mA = sources * self.source_mA
+        other.end_rises = {name: rises * rise for name, rise in self.end_rises.items()}
+        return other
+
+    @property
+    def behind(self) -> Array:
+        """The conductances behind all unknowns that have one, that of the chip last."""
+        chip = [] if self._space.chip is None else [self.chip_mW_per_K]
+        return np.append(self.conductance, chip)
+
+    def add_heat_into_chip(self, weak: Array, x: Array, mW_per_K: float | None = None) -> None:
+        """Add what the chip takes up of states or changes of them, or by another conductance."""
+        if self._space.chip is None:
+            return
+        unknowns, weights = self._space.chip
+        rise = np.tensordot(weights, x[unknowns], axes=1)
+        heat = (self.chip_mW_per_K if mW_per_K is None else mW_per_K) * rise
+        weak[unknowns] += np.multiply.outer(weights, heat)
+
+    def add_currents(self, weak: Array, x: Array) -> None:
+        """Add what held terminals take from states (size + 1, n), G V − J, to the balances there.
+
+        Of an ideal supply both parts are large, so that the difference is taken first.
+        """
+        weak[self._held] += self._conducted(x) - self.source_mA[:, None]
+
+    def add_current_changes(self, weak: Array, change: Array) -> None:
+        """Do the same with changes of the unknowns, (size + 1, n) or (size + 1, n, k)."""
+        weak[self._held] += self._conducted(change)
+
+    def _conducted(self, x: Array) -> Array:
+        conductance = self.conductance.reshape(-1, *(1,) * (x.ndim - 1))
+        return np.asarray(conductance * x[self._held])
+
+    def power(self, x: Array, into: Array) -> Array:
+        """Return the power (mW) that supplies put into states, (n,), by the currents (mA) there.
+
+        These are the weak form of the fluxes, (size + 1, n).
+        """
+        by_held = (x[self._held] * into[self._held]).sum(axis=0)
+        return np.asarray(x[-1] * into[-1] + by_held)
+
+    def warmed(self, T: Array, grad_T: Array) -> tuple[Array, Array]:
+        """Return temperatures and slopes at the points with leg ends as warm as they are held."""
+        for name, rise in self.end_rises.items():
+            value, slope = np.split(self._space.end_tests[name][..., None], [1])
+            T, grad_T = T + rise * value[0], grad_T + rise * slope
+        return T, grad_T
+
+    def warmed_by_base(self, fields: Fields) -> Fields:
+        """Return how fields change with the base temperature: leg ends of their own stay."""
+        warmer, slope = np.ones_like(fields.T), np.zeros_like(fields.grad_T)
+        for name in self.end_rises:
+            value, slopes = np.split(self._space.end_tests[name][..., None], [1])
+            warmer, slope = warmer - value[0], slope - slopes
+        return Fields(warmer, slope, np.zeros_like(fields.grad_V))
+
+
 # --- where heat and charge go ---------------------------------------------------------------------
 
 
@@ -574,27 +679,25 @@ def balance_columns(equations: LeverEquations, x: Array) -> Array:
     Currents and heats at terminals are consistent fluxes: reactions of the weak form at the nodes
     of each. The names are `balance_names`.
     """
-    return _balances(equations, equations.fluxes(x), _leaving(equations, x))
+    return _balances(equations, equations.fluxes(x), *_leaving(equations, x))
 
 
 def balance_slopes(equations: LeverEquations, x: Array, slopes: Array) -> Array:
     """Return how the `balance_columns` of states change with changes (size + 1, n) of them."""
     by_T = equations.at(x)[2].emission
     rise = equations.space.temperature.at_points(slopes)[0]
-    leaving = _Leaving(
-        equations.kirchhoff(x)[1] * equations.space.air.rise(slopes),
-        np.zeros_like(rise) if by_T is None else by_T * rise,
-        {
-            name: by["T"] * getattr(equations, name).rise(slopes)
-            for name, (_, by) in equations.losses(x).items()
-        },
-    )
-    return _balances(equations, equations.flux_changes(x, slopes), leaving)
+    theta = equations.kirchhoff(x)[1] * equations.space.air.rise(slopes)
+    faces = np.zeros_like(rise) if by_T is None else by_T * rise
+    losses = {
+        name: by["T"] * getattr(equations, name).rise(slopes)
+        for name, (_, by) in equations.losses(x).items()
+    }
+    return _balances(equations, equations.flux_changes(x, slopes), theta, faces, losses)
 
 
 def heat_left(equations: LeverEquations, x: Array) -> Array:
     """Return all heat that leaves states: by the leg ends and from the surface (mW), (n,)."""
-    return np.asarray(sum(_heat_out(equations, equations.fluxes(x), _leaving(equations, x))))
+    return np.asarray(sum(_heat_out(equations, equations.fluxes(x), *_leaving(equations, x))))
 
 
 def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
@@ -604,50 +707,45 @@ def heat_held(equations: LeverEquations, x: Array) -> tuple[Array, Array]:
     return heat.sum(axis=0), space.end_test[0] @ heat
 
 
-class _Leaving(NamedTuple):
-    """What leaves the surface of states.
+def _leaving(equations: LeverEquations, x: Array) -> tuple[Array, Array, dict[str, Array]]:
+    """Return what leaves the surface of states.
 
     θ at the sites of the air, what faces radiate (mW/µm²), and the `LeverEquations.losses` (mW).
     """
-
-    theta: Array
-    faces: Array
-    losses: dict[str, Array]
-
-
-def _leaving(equations: LeverEquations, x: Array) -> _Leaving:
     faces = equations.at(x)[1].emission
     if faces is None:
         faces = np.zeros((len(equations.space.weights), x.shape[1]))
     losses = {name: heat for name, (heat, _) in equations.losses(x).items()}
-    return _Leaving(equations.kirchhoff(x)[0], faces, losses)
+    return equations.kirchhoff(x)[0], faces, losses
 
 
 def _heat_out(
-    equations: LeverEquations, fluxes: Fluxes, leaving: _Leaving
+    equations: LeverEquations, fluxes: Fluxes, theta: Array, faces: Array, losses: dict[str, Array]
 ) -> tuple[Array, Array, Array, Array]:
     """Return the heat through the leg ends, into the air, radiated, and into the tip."""
     space = equations.space
     heat = space.weighted(np.concatenate([fluxes.heat_source[None], fluxes.heat]))
     by_ends = -np.einsum("dp,dpn->n", space.end_test, heat)
-    into_air, at_ends = space.air.heat(leaving.theta)
+    into_air, at_ends = space.air.heat(theta)
     if space.chip is not None:
         unknowns, weights = space.chip
-        at_ends = at_ends + weights @ space.air.weak_form(leaving.theta)[unknowns]
-    light = (space.weights * leaving.faces).sum(axis=0)
-    if "rim" in leaving.losses:
-        at_ends = at_ends + equations.rim.end_test @ leaving.losses["rim"]
-        light = light + leaving.losses["rim"].sum(axis=0)
-    into_tip = np.sum(leaving.losses.get("footprint", np.zeros((0, light.size))), axis=0)
+        at_ends = at_ends + weights @ space.air.weak_form(theta)[unknowns]
+    light = (space.weights * faces).sum(axis=0)
+    if "rim" in losses:
+        at_ends = at_ends + equations.rim.end_test @ losses["rim"]
+        light = light + losses["rim"].sum(axis=0)
+    into_tip = np.sum(losses.get("footprint", np.zeros((0, light.size))), axis=0)
     return by_ends - at_ends, into_air, light, into_tip
 
 
-def _balances(equations: LeverEquations, fluxes: Fluxes, leaving: _Leaving) -> Array:
-    """Return the balances of fluxes and what leaves the surface; all linear."""
+def _balances(
+    equations: LeverEquations, fluxes: Fluxes, theta: Array, faces: Array, losses: dict[str, Array]
+) -> Array:
+    """Return the balances of fluxes and what leaves the surface, see `_leaving`; all linear."""
     space = equations.space
     assert isinstance(space, FullSpace)  # a reduced lever has no ends
-    heats = _heat_out(equations, fluxes, leaving)
-    heat_generation = space.weights * (leaving.faces - fluxes.heat_source)
+    heats = _heat_out(equations, fluxes, theta, faces, losses)
+    heat_generation = space.weights * (faces - fluxes.heat_source)
     charge = space.weighted(fluxes.charge)
     of_parts = [
         _heat_of_part(heat_generation, space.parts[part]) for part in ("heater", "leg 1", "leg 2")

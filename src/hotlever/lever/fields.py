@@ -1,5 +1,7 @@
 """Fields of a solved state as they are drawn and saved: on a fine triangulation, on a line.
 
+And its heat into the air: where it leaves, by region, and how hot the air gets.
+
 `write_fields` writes those of any lever: another kind of lever than `Lever` registers how its own
 are written.
 """
@@ -7,29 +9,34 @@ are written.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import singledispatch
+from functools import cached_property, singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import meshio
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
+from shapely import Polygon
 from skfem import MeshTri
 
+from hotlever.air.operator import PanelledAir
+from hotlever.air.panels import Panels
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.files import whole_file, write_text
-from hotlever.lever.air_fields import AirFields
+from hotlever.lever.discretisation import plate_of
 from hotlever.lever.elements import FiniteElements
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.lever import Lever, State
-from hotlever.materials.doping import tapered_doping
+from hotlever.materials.air import temperature_from_kirchhoff
 from hotlever.materials.kinds import HighDopedSilicon
+from hotlever.materials.silicon import tapered_doping
 from hotlever.types import Array
 from hotlever.units import PER_CM_TO_MILLI_PER_UM
 
@@ -101,46 +108,39 @@ def seen_from_above(lever: Lever, cuts: int = 3) -> Surface:
     return Surface(corners.positions.T, triangles, corners.sampling[: corners.weights.size])
 
 
-class FieldMapper:
-    """Draws states of one lever: every triangle of its mesh is cut into smaller ones.
+def mapped_fields(lever: Lever, states: Iterable[State], cuts: int = 3) -> Iterator[FieldMap]:
+    """Yield the fields of states of a lever; every triangle is cut into ``cuts²`` smaller ones.
 
     Raises
     ------
     InputError
         If it is one of tetrahedra.
     """
+    if lever.space.mesh.elements.dim() != 2:
+        raise InputError("found a lever of tetrahedra, expected a flat one")
+    reference, surface = _cut_triangle(cuts), seen_from_above(lever, cuts)
+    mesh, conducting = lever.space.mesh, lever.space.conducting
+    centres = reference.p[:, reference.t].mean(axis=1)
+    middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
+    elements = FiniteElements(mesh.elements, lever.space.elements.basis.elem, middle)
+    space = FullSpace(mesh, elements, lever.space.wiring)
+    at_centres = LeverEquations.of_probe(space, lever.probe)
 
-    def __init__(self, lever: Lever, cuts: int = 3) -> None:
-        if lever.space.mesh.elements.dim() != 2:
-            raise InputError("found a lever of tetrahedra, expected a flat one")
-        reference = _cut_triangle(cuts)
-        self._surface = seen_from_above(lever, cuts)
-        mesh, element = lever.space.mesh, lever.space.elements.basis.elem
-        centres = reference.p[:, reference.t].mean(axis=1)
-        middle = centres, np.full(centres.shape[1], 0.5 / cuts**2)
-        elements = FiniteElements(mesh.elements, element, middle)
-        space = FullSpace(mesh, elements, lever.space.wiring)
-        self._centres = LeverEquations.of_probe(space, lever.probe)
+    def per_triangle(vectors: Array) -> Array:
+        return np.asarray((vectors / space.thickness_um)[:, :, 0].T)
 
-    def map(self, state: State) -> FieldMap:
-        """Return the fields of a state of the lever."""
-        surface, space = self._surface, self._centres.space
+    for state in states:
         T, V = (surface.sampling @ values for values in state.nodal)
         # where nothing conducts there is no potential
-        conducting = state.lever.space.conducting
         V[np.repeat(~conducting, T.size // conducting.size)] = np.nan
-        properties, fluxes = self._centres.at(state.x)[1], self._centres.fluxes(state.x)
-
-        def per_triangle(vectors: Array) -> Array:
-            return np.asarray((vectors / space.thickness_um)[:, :, 0].T)
-
-        return FieldMap(
+        properties, fluxes = at_centres.at(state.x)[1], at_centres.fluxes(state.x)
+        yield FieldMap(
             bias=state.bias_V,
             points=surface.points,
             triangles=surface.triangles,
             temperature=T,
             potential=V,
-            region=np.repeat(state.lever.space.mesh.region, space.elements.per_element),
+            region=np.repeat(mesh.region, elements.per_element),
             current_density=per_triangle(-fluxes.charge),
             heat_flux=per_triangle(-fluxes.heat),
             resistivity=_resistivity(space.thickness_um, properties.sigma),
@@ -211,9 +211,9 @@ def write_fields(
         Called with temperatures on slices through the air and the file to draw them to, if the
         lever knows the temperature all around it.
     """
-    mapper, air = FieldMapper(lever), AirFields(lever) if lever.medium == "air" else None
-    for state in states:
-        write_vtu(mapper.map(state), fields_file(folder, state, ".vtu"))
+    air = AirFields(lever) if lever.medium == "air" else None
+    for state, fields in zip(states, mapped_fields(lever, states), strict=True):
+        write_vtu(fields, fields_file(folder, state, ".vtu"))
         if air is not None:
             air.write_vtu(state, fields_file(folder, state, "_air.vtu"))
 
@@ -227,10 +227,9 @@ def write_fields_in_time(
     lever: Lever, times: Sequence[float], states: Sequence[State], folder: Path
 ) -> None:
     """Write the fields of states at some times (µs) to a folder as VTU, with their index."""
-    mapper = FieldMapper(lever)
     names = [f"fields_{index:04d}.vtu" for index in range(len(states))]
-    for name, state in zip(names, states, strict=True):
-        write_vtu(mapper.map(state), folder / name)
+    for name, fields in zip(names, mapped_fields(lever, states), strict=True):
+        write_vtu(fields, folder / name)
     write_pvd(times, names, folder / "fields.pvd")
 
 
@@ -347,3 +346,103 @@ def current_path(space: FullSpace, potential: Array) -> tuple[Array, Array]:
     points = np.array([*[*streamline(start, -1.0)][::-1], start, *streamline(start, 1.0)])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return points, np.concatenate([[0.0], np.cumsum(lengths)])
+
+
+# --- the air --------------------------------------------------------------------------------------
+
+
+class AirFields:
+    """What states of a lever in air do to the air.
+
+    Parameters
+    ----------
+    lever : Lever
+
+    Raises
+    ------
+    InputError
+        If the lever is in vacuum.
+    """
+
+    def __init__(self, lever: Lever) -> None:
+        if lever.medium == "vacuum":
+            raise InputError("the lever is in vacuum, expected one in air")
+        self._lever, self._air = lever, lever.space.air
+        self._base = lever.circuit.base_temperature_K
+        self._unit = PER_CM_TO_MILLI_PER_UM * self._air.gas_conductivity
+
+    @cached_property
+    def _panelled(self) -> PanelledAir:
+        """The panels: made again, since the operator on disk is without them."""
+        plate, around = plate_of(self._lever.probe), self._lever.probe.surroundings
+        return PanelledAir(plate, around, self._base, self._lever.panels)
+
+    @property
+    def panels(self) -> Panels:
+        """The lever's panels, and last its tip's; without either a tip in the air or surroundings
+        that are not symmetric, those above its mid-plane only.
+        """
+        return self._panelled.surface.panels
+
+    def flux(self, state: State) -> Array:
+        """Return the heat flux (mW/µm²) into the air from each of `panels`."""
+        return self._densities(state)[: len(self.panels)]
+
+    def temperature(self, state: State, points: Array) -> Array:
+        """Return the temperature (K) of the air.
+
+        Parameters
+        ----------
+        state : State
+        points : ndarray, shape (n, 3)
+            µm; the lever's mid-plane is z = 0. Inside the lever the result is its surface's.
+        """
+        theta = self._panelled.theta(points, self._densities(state))
+        return temperature_from_kirchhoff(theta / self._unit, self._base)
+
+    def heat_by_region(self, state: State) -> dict[str, float]:
+        """Return the heat (mW) that each region of the layout loses to the air."""
+        heat = self._air.operator.matrix @ self._theta(state)
+        sites, regions = self._air.operator.sites, self._lever.space.mesh.layout.regions
+        points = shapely.points(sites)
+        away = [shapely.distance(points, Polygon(part.outline, part.holes)) for part in regions]
+        region = np.argmin(away, axis=0)
+        return {part.name: float(heat[region == k].sum()) for k, part in enumerate(regions)}
+
+    def shares(self, states: Sequence[State]) -> xr.Dataset:
+        """Return the heat that each region loses to the air in some states.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``air_heat_mW`` on (region, bias), with ``bias_V``, ``tip_K`` and ``power_mW``.
+        """
+        by_region = [self.heat_by_region(state) for state in states]
+        sweep = self._lever.dataset(states)
+        table = np.array([list(heat.values()) for heat in by_region]).T
+        return labelled(
+            {
+                "tip_K": sweep.tip_K.values,
+                "power_mW": sweep.power_mW.values,
+                "air_heat_mW": (("region", "bias"), table),
+            },
+            coordinates={"bias": sweep.bias.values, "region": list(by_region[0])},
+            lever=sweep.attrs["lever"],
+        )
+
+    def write_vtu(self, state: State, path: str | os.PathLike[str]) -> None:
+        """Write the panels with heat_flux_into_air_mW_um2 as VTU, whole or not at all."""
+        corners = self.panels.corners
+        mesh = meshio.Mesh(
+            corners.reshape(-1, 3),
+            [("quad", np.arange(4 * len(corners)).reshape(-1, 4))],
+            cell_data={"heat_flux_into_air_mW_um2": [self.flux(state)]},
+        )
+        with whole_file(path) as temporary:
+            mesh.write(temporary, file_format="vtu")
+
+    def _theta(self, state: State) -> Array:
+        return self._lever.equations.kirchhoff(state.x)[0][:, 0]
+
+    def _densities(self, state: State) -> Array:
+        return self._panelled.densities(self._theta(state))

@@ -19,10 +19,9 @@ from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind, full_name
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.departures import PROFILE, SmoothFactor, departure_of
-from hotlever.materials.doping import tapered_doping
 from hotlever.materials.kinds import HighDopedSilicon, LowDopedSilicon
 from hotlever.materials.laws import Evaluated
-from hotlever.materials.silicon import Carrier
+from hotlever.materials.silicon import Carrier, tapered_doping
 from hotlever.probe.surroundings import Physics
 from hotlever.types import Array
 from hotlever.units import (

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hotlever.errors import ComputationError, InputError, as_far_as_possible
-from hotlever.lever.branch import TIP_RISE, Branch, Reach, branch_end
+from hotlever.lever.branch import TIP_RISE, Branch, Reach, Reading, branch_end, there_and_back
 from hotlever.lever.continuation import continued
 from hotlever.lever.dataset import (
     at_bias,
@@ -26,7 +26,6 @@ from hotlever.lever.discretisation import chosen_space, flat_space, surrounded
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.full_space import FullSpace
 from hotlever.lever.observables import sensitivities_of
-from hotlever.lever.readings import Reading, there_and_back
 from hotlever.lever.solved_states import state_at_bias
 from hotlever.lever.space import TIP, Constraint
 from hotlever.materials import Material

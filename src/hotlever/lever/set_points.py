@@ -160,7 +160,9 @@ class _HeldAlong:
 
     def held_at(self, targets: Array) -> HeldStates:
         """Return the states at set points."""
-        roots = [self._roots(value) for value in targets.tolist()]
+        roots = [
+            self._within(self._quantity.missed(*self._curves, value)) for value in targets.tolist()
+        ]
         for value, u in zip(targets.tolist(), roots, strict=True):
             if not u.size:
                 raise self._never(value)
@@ -179,10 +181,6 @@ class _HeldAlong:
         own = {quantity.column: values, "state": number, quantity.slope_column: slope}
         states = [State(self._lever, x[:, [k]]) for k in range(u.size)]
         return HeldStates(data.assign(labelled(own).variables), states, self._whole())
-
-    def _roots(self, value: float) -> Array:
-        """Return where along the branch the quantity has a value."""
-        return self._within(self._quantity.missed(*self._curves, value))
 
     def _within(self, curve: Piecewise) -> Array:
         """Return where a curve is zero while the supply heats the lever."""

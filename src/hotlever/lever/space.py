@@ -119,7 +119,7 @@ class Space(ABC):
     reader : tuple of (ndarray of int, ndarray), or None
         The same for the reader voltage V_r; None without a reader.
     held : dict of str to int
-        The unknowns that are potentials of held terminals, see `hotlever.lever.terminals`.
+        The unknowns that are potentials of held terminals, see `hotlever.lever.equations`.
     chip : tuple of (ndarray of int, ndarray), or None
         Unknowns and weights that give the rise of leg ends on the chip; None if it stays cold.
     end_test : ndarray, shape (1 + dimension, points)

@@ -4,7 +4,6 @@ The silicon uses the equations of `hotlever.lever` on tetrahedra; the air is sol
 the extra ``hotlever[air3d]``.
 """
 
-from hotlever.lever3d import solid_fields  # noqa: F401 (says how `write_fields` writes those of a solid)
 from hotlever.lever3d.solid_lever import SolidLever
 from hotlever.lever3d.still_air import OpenAir
 

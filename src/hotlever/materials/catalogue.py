@@ -15,8 +15,7 @@ from hotlever.materials.heat import thermal_conductivity
 from hotlever.materials.kinds import KINDS, Kind
 from hotlever.materials.laws import Law
 from hotlever.materials.parameters import STATED, Parameter
-from hotlever.materials.presets import PRESETS
-from hotlever.materials.sections import material_of
+from hotlever.materials.presets import PRESETS, material_of
 from hotlever.materials.stated import StatedLaw
 from hotlever.spieser2017 import DOI
 from hotlever.text import aligned

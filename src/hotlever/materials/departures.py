@@ -76,9 +76,8 @@ class SmoothFactor(Departure):
 
     Examples
     --------
-    >>> kappa = FACTORS["kappa"]
-    >>> kappa.names, kappa.variance_left < 0.01
-    (('kappa_1', 'kappa_2', 'kappa_3'), True)
+    >>> FACTORS["kappa"].names
+    ('kappa_1', 'kappa_2', 'kappa_3')
     """
 
     spread_cold: float = 0.0
@@ -114,15 +113,6 @@ class SmoothFactor(Departure):
         slope *= (2.0 / _WIDTH) * (inside == T)
         slope /= inside
         return np.exp(delta), slope
-
-    @property
-    def variance_left(self) -> float:
-        """The share of the variance of the process that more modes would have."""
-        x, weights = self._nodes
-        T = np.exp(x)
-        return float(
-            1.0 - weights @ (self.modes(T) ** 2).sum(axis=0) / (weights @ self.spread(T) ** 2)
-        )
 
     @property
     def _nodes(self) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import NoneType
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args
+from typing import Annotated, Any, ClassVar, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,12 +35,6 @@ from hotlever.records import Record
 from hotlever.text import with_unit
 from hotlever.types import Array
 
-#: Nodes and weights of Gauss's rule of eighth order, on 0 to 1.
-_GAUSS = [
-    (0.5 * (1.0 + node), 0.5 * weight)
-    for node, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True)
-]
-
 # A list, which becomes a tuple.
 _Numbers = Annotated[tuple[float, ...], Strict(False), PlainSerializer(list)]
 
@@ -55,6 +49,8 @@ class StatedLaw(Record):
     #: Temperatures (K) that it may be stated for.
     least_K: ClassVar[float] = 1.0
     most_K: ClassVar[float] = 1e4
+    #: Nodes and weights of Gauss's rule of eighth order, on −1 to 1.
+    rule: ClassVar = np.polynomial.legendre.leggauss(4)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -125,9 +121,9 @@ class StatedLaw(Record):
     ) -> Array:
         """Return the integrals between temperatures (K) of the law or of one of its derivatives."""
         total = np.zeros(np.broadcast_shapes(np.shape(low), np.shape(high)))
-        for node, weight in _GAUSS:
-            value, by = self(low + node * (high - low), parameters)
-            total += weight * (value if name is None else by[name])
+        for node, weight in zip(*self.rule, strict=True):
+            value, by = self(low + 0.5 * (1.0 + node) * (high - low), parameters)
+            total += 0.5 * weight * (value if name is None else by[name])
         return np.asarray(total * (high - low))
 
     def fault(
@@ -182,13 +178,13 @@ class Formula(StatedLaw):
         return self
 
     @cached_property
-    def _expression(self) -> Expression:
+    def _parsed(self) -> tuple[ast.expr, tuple[str, ...]]:
         return parsed(self.formula)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters that it has."""
-        return self._expression.names
+        return self._parsed[1]
 
     @property
     def temperature_range(self) -> tuple[float, float]:
@@ -213,8 +209,17 @@ class Formula(StatedLaw):
         return np.linspace(self.from_K, self.to_K, steps + 1)
 
     def inside(self, T: Array, parameters: Mapping[str, float]) -> Evaluated:
-        """Return values between its ends, with derivatives by ``T`` and parameters."""
-        return self._expression(T, parameters)
+        """Return values between its ends, with derivatives by ``T`` and parameters.
+
+        They are not finite where the formula divides by nothing or overflows.
+        """
+        tree, own = self._parsed
+        values: dict[str, Dual] = {"T": (T, {"T": 1.0})}
+        values |= {name: (np.float64(parameters[name]), {name: 1.0}) for name in own}
+        with np.errstate(all="ignore"):
+            value, by = _value(tree, values)
+        whole = {name: np.broadcast_to(by.get(name, 0.0), T.shape) for name in ("T", *own)}
+        return np.broadcast_to(value, T.shape), whole
 
 
 class Table(StatedLaw):
@@ -369,8 +374,6 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[[Any, Any], Any]]] = {
     "tanh": (np.tanh, lambda x, y: 1.0 - y * y),
     "atan": (np.arctan, lambda x, y: 1.0 / (1.0 + x * x)),
 }
-#: What no parameter can be called.
-RESERVED_NAMES = {"T", *FUNCTIONS, "pi"}
 #: Operators, and their derivatives by what stands before and behind them.
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], tuple[Any, Any, Any]]] = {
     ast.Add: lambda x, y: (x + y, 1.0, 1.0),
@@ -382,26 +385,6 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], tuple[Any, Any, Any]]]
 }
 
 
-class Expression(NamedTuple):
-    """A formula that was parsed: its tree, and the names of its parameters."""
-
-    tree: ast.expr
-    names: tuple[str, ...]
-
-    def __call__(self, T: Array, parameters: Mapping[str, float]) -> Evaluated:
-        """Return the value at temperatures (K), with derivatives by ``T`` and all parameters.
-
-        They are not finite where the formula divides by nothing or overflows.
-        """
-        values: dict[str, Dual] = {"T": (T, {"T": 1.0})}
-        values |= {name: (np.float64(parameters[name]), {name: 1.0}) for name in self.names}
-        with np.errstate(all="ignore"):
-            value, by = _value(self.tree, values)
-        names = ("T", *self.names)
-        whole = {name: np.broadcast_to(by.get(name, 0.0), T.shape) for name in names}
-        return np.broadcast_to(value, T.shape), whole
-
-
 def names_in(text: str) -> set[str]:
     """Return the names in a text that may be those of parameters.
 
@@ -410,11 +393,11 @@ def names_in(text: str) -> set[str]:
     >>> sorted(names_in("rho0 * exp(1e-3*(T - T0))"))
     ['T0', 'rho0']
     """
-    return set(re.findall(r"(?<![\w.])[A-Za-z_]\w*", text)) - RESERVED_NAMES
+    return set(re.findall(r"(?<![\w.])[A-Za-z_]\w*", text)) - {"T", "pi", *FUNCTIONS}
 
 
-def parsed(text: str) -> Expression:
-    """Parse a formula.
+def parsed(text: str) -> tuple[ast.expr, tuple[str, ...]]:
+    """Parse a formula: return its tree, and the names of its parameters.
 
     Raises
     ------
@@ -423,7 +406,7 @@ def parsed(text: str) -> Expression:
 
     Examples
     --------
-    >>> parsed("rho0 * (1 + tcr*(T - 293))").names
+    >>> parsed("rho0 * (1 + tcr*(T - 293))")[1]
     ('rho0', 'tcr')
     """
     if len(text) > 1000:
@@ -443,7 +426,7 @@ def parsed(text: str) -> Expression:
         raise ValueError("found a number in quotes, expected it without them, or a formula of T")
     names: dict[str, None] = {}
     _check(tree, names, text.strip(), 0, [0])
-    return Expression(tree, tuple(names))
+    return tree, tuple(names)
 
 
 def _check(node: ast.AST, names: dict[str, None], text: str, depth: int, steps: list[int]) -> None:
@@ -463,7 +446,7 @@ def _check(node: ast.AST, names: dict[str, None], text: str, depth: int, steps: 
         case ast.Name(id=name):
             if name in FUNCTIONS:
                 raise ValueError(f"{where}: {name} is a function, expected {name}(…)")
-            if name not in RESERVED_NAMES:
+            if name not in ("T", "pi"):
                 names[name] = None
             return
         case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):

@@ -412,9 +412,13 @@ class ProbeParts(Record):
         Raises
         ------
         InputError
-            If there is no such effect.
+            If there is no such effect; the nearest name is given.
         """
-        return self.model_copy(update={"physics": Physics.of(effects, where)})
+        effects = tuple(effects)
+        for name in effects:
+            if name not in Physics.model_fields:
+                raise unknown_name("effect", name, Physics.model_fields, where)
+        return self.model_copy(update={"physics": Physics(**dict.fromkeys(effects, True))})
 
     @property
     def usual_chip_K_per_mW(self) -> float:

@@ -13,7 +13,7 @@ from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text, write_text
 from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind
 from hotlever.materials.kinds import Silicon
-from hotlever.materials.sections import classes_at_hand, materials_of, remade
+from hotlever.materials.presets import classes_at_hand, materials_of, remade
 from hotlever.materials.stated import names_stated
 from hotlever.probe.circuit import Contact
 from hotlever.probe.parts import (

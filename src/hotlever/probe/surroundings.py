@@ -6,12 +6,10 @@ lever that takes up heat is at the base temperature.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Literal
 
 from pydantic import Field, model_validator
 
-from hotlever.errors import unknown_name
 from hotlever.materials.air import ATMOSPHERE, temperature_jump_length
 from hotlever.records import Record, bounded
 
@@ -100,21 +98,6 @@ class Physics(Record):
         default=False, description="heat that the current carries: Seebeck, Peltier and Thomson"
     )
     radiation: bool = Field(default=False, description="heat that the lever's surface radiates")
-
-    @classmethod
-    def of(cls, effects: Iterable[str], where: str) -> Physics:
-        """Return the physics with some effects on; no more are.
-
-        Raises
-        ------
-        InputError
-            If there is no such effect; the nearest name is given.
-        """
-        effects = tuple(effects)
-        for name in effects:
-            if name not in cls.model_fields:
-                raise unknown_name("effect", name, cls.model_fields, where)
-        return cls(**dict.fromkeys(effects, True))
 
     @property
     def at_surface(self) -> bool:

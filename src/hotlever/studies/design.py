@@ -15,8 +15,8 @@ from hotlever.datasets import frame_text, labelled
 from hotlever.errors import HotleverError, unknown_name
 from hotlever.lever import Lever
 from hotlever.materials import LOW_DOPED, full_name
-from hotlever.materials.doping import diffusion_length
 from hotlever.materials.parameters import parameter_named
+from hotlever.materials.silicon import diffusion_length
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.spieser2017 import ANNEALING_K, ANNEALING_S

@@ -1,7 +1,7 @@
 """Where does the heat go?"""
 
 from hotlever import Lever, Probe, figures, save_figure
-from hotlever.lever.air_fields import AirFields
+from hotlever.lever.fields import AirFields
 
 probe = Probe.reference().in_medium("air")
 lever = Lever(probe)

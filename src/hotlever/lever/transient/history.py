@@ -11,9 +11,14 @@ from numpy.typing import ArrayLike
 
 from hotlever.datasets import labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
-from hotlever.lever.dataset import in_a_file, probe_attributes, range_notes
+from hotlever.lever.dataset import (
+    MonitorMap,
+    in_a_file,
+    probe_attributes,
+    range_notes,
+    with_meanings,
+)
 from hotlever.lever.lever import State
-from hotlever.lever.monitors import MonitorMap, with_meanings
 from hotlever.lever.observables import with_following
 from hotlever.lever.transient.runge_kutta import Stepper, TimeStep, hermite
 from hotlever.lever.transient.transient_problem import MONITORED, TransientProblem

@@ -11,7 +11,7 @@ import numpy as np
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.laws_at_points import LawsAtPoints
 from hotlever.lever.lever import State
-from hotlever.lever.reduced.reduced_space import ReducedSpace, empirical_cubature
+from hotlever.lever.reduced_space import ReducedSpace, empirical_cubature
 from hotlever.lever.space import Space
 from hotlever.lever.transport import Motion, Properties
 from hotlever.materials import Kind
@@ -37,7 +37,7 @@ def reduced_in_time(lever: Lever, snapshots: Array) -> Lever:
     Returns
     -------
     Lever
-        Its space is a `hotlever.lever.reduced.space.ReducedSpace` on few points.
+        Its space is a `hotlever.lever.reduced_space.ReducedSpace` on few points.
     """
     every = space_of_modes(lever, snapshots)
     weights = lever.space.weights[:, 0]

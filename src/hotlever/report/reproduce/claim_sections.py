@@ -14,7 +14,7 @@ from hotlever.estimate import fit
 from hotlever.estimate.power_law import EQ12
 from hotlever.estimate.summary import parameter_rows
 from hotlever.lever import Lever
-from hotlever.lever.air_fields import AirFields
+from hotlever.lever.fields import AirFields
 from hotlever.materials import PARAMETERS
 from hotlever.materials.air import thermal_conductivity_of_air
 from hotlever.materials.heat import thermal_conductivity

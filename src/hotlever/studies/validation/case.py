@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from hotlever.contact.resistances import cold_resistance, contact_resistance
+from hotlever.contact.law import cold_resistance, contact_resistance
 from hotlever.errors import InputError, unknown_name
 from hotlever.lever import Branch, Lever
 from hotlever.lever.lever import COARSE
