@@ -452,7 +452,10 @@ class Branch:
         # with reversed signs that ramp is one upwards
         back, turns = self.mirrored, -self.turns(self.bias_by_u(circuit))[::-1]
         curve = back.bias_by_u(circuit)
-        return slow_ramp(curve, turns, back.end_u, -bias, back.tip_K, -from_u).mirrored
+        # what is at no bias, where the way back ends, is found to rounding errors
+        end = float(curve(back.end_u))
+        asked = np.where(np.abs(bias + end) < 1e-9, end, -bias)
+        return slow_ramp(curve, turns, back.end_u, asked, back.tip_K, -from_u).mirrored
 
     def with_folds(self, circuit: Circuit) -> Branch:
         """Return the branch with a solved state at each fold of the bias in a circuit.
