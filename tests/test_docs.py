@@ -24,7 +24,7 @@ from documents import (
     without_blocks,
 )
 from experiments import on_coarse_meshes
-from hotlever.cli.browser import open_app
+from hotlever.app import open_app
 from hotlever.tasks.commands import COMMANDS, command_line
 
 COMMAND_LINE = command_line(lambda *_: 0, {**COMMANDS, "app": open_app})

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from hotlever.cli import main, output, running
+from hotlever import cli
+from hotlever.cli import main, output
 from hotlever.cli.output import note, progress
 from hotlever.tasks.commands import COMMANDS, command_line
 from limits import as_in_a_terminal
@@ -54,7 +55,7 @@ def test_nothing_is_searched_for_cycles_as_a_command_ends(tmp_path):
 
 IN_A_DESTRUCTOR = """
 import signal, sys, time
-from hotlever.cli import running
+from hotlever import cli
 
 class Short:
     def __del__(self):
@@ -65,8 +66,8 @@ def work(arguments):
     time.sleep(30.0)
     return 0
 
-running._run, sys.argv = work, ["hotlever", "sweep"]
-running.main()
+cli._run, sys.argv = work, ["hotlever", "sweep"]
+cli.main()
 """
 
 
@@ -273,9 +274,9 @@ def test_every_argument_and_option_says_what_it_is():
 def test_what_a_stopped_import_says_is_not_an_internal_error(monkeypatch):
     """A compiled module whose initialisation is interrupted raises ImportError instead."""
     error = ImportError("initialization failed")
-    assert "internal error" in running._ended(error, [])[1]
-    monkeypatch.setattr(running, "_received", [signal.SIGINT])
-    assert running._ended(error, []) == (1, "stopped by the user")
+    assert "internal error" in cli._ended(error, [])[1]
+    monkeypatch.setattr(cli, "_received", [signal.SIGINT])
+    assert cli._ended(error, []) == (1, "stopped by the user")
 
 
 def test_progress_is_told_in_lines_where_there_is_no_terminal(run, monkeypatch):
@@ -292,7 +293,7 @@ def test_progress_is_told_in_lines_where_there_is_no_terminal(run, monkeypatch):
 def test_a_stop_within_exec_ends_with_the_exit_status(tmp_path, raised, status):
     """Python would end itself by a signal where a plain KeyboardInterrupt was met in `exec`."""
     script = (
-        "from hotlever.cli.running import Stopped\n"
+        "from hotlever.cli import Stopped\n"
         f"try:\n    exec('raise {raised}')\nexcept KeyboardInterrupt:\n    raise SystemExit(1)"
     )
     (tmp_path / "stopped.py").write_text(script)

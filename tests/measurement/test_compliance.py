@@ -10,7 +10,7 @@ import pytest
 from hotlever import Lever, Probe, fit
 from hotlever.lever.lever import COARSE
 from hotlever.measurement import Measurement, read_measurement
-from hotlever.measurement.compliance import without_rows_at_compliance
+from hotlever.measurement.rows import without_rows_at_compliance
 from hotlever.types import Array
 
 #: A lever whose current has a maximum and rises again, from a source that is limited to 0.95 mA:

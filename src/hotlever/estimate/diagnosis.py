@@ -26,8 +26,8 @@ from hotlever.lever.observables import Linearised
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials.parameters import parameter_named
 from hotlever.measurement import Measurement
-from hotlever.measurement.compliance import is_level
 from hotlever.measurement.data import noise_about_neighbours, resolution_of
+from hotlever.measurement.rows import is_level
 from hotlever.probe import Probe
 from hotlever.probe.priors import Prior, known_beforehand
 from hotlever.probe.probe_parameters import parameters_of

@@ -1,6 +1,6 @@
 """Measured data of one lever: the record, and the files that it is read from.
 
-`columns` knows the names and units of the columns, `rows` their order, `compliance` what an
+`columns` knows the names and units of the columns, `rows` their order and which of them an
 instrument has clipped; `measurement_file` reads the comments that give circuit and surroundings,
 refuses what no lever can show, completes the rows and takes these together.
 """

@@ -27,7 +27,6 @@ from hotlever.measurement.columns import (
     note_on_words,
     quantity_of,
 )
-from hotlever.measurement.compliance import without_rows_at_compliance
 from hotlever.measurement.data import (
     MEASURED,
     Measurement,
@@ -35,7 +34,12 @@ from hotlever.measurement.data import (
     colder_than_base,
     noise_about_neighbours,
 )
-from hotlever.measurement.rows import described, disagreements, sweeps_of
+from hotlever.measurement.rows import (
+    described,
+    disagreements,
+    sweeps_of,
+    without_rows_at_compliance,
+)
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import share_of
 from hotlever.quantities import FITTED, MEASURANDS
@@ -806,7 +810,7 @@ def given_measurement(
 ) -> Measurement:
     """Return a measurement, or read one of a probe's lever from its file.
 
-    Either is without rows at a limit of an instrument (`hotlever.measurement.compliance`).
+    Either is without rows at a limit of an instrument (`hotlever.measurement.rows`).
 
     Raises
     ------

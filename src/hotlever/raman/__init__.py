@@ -1,7 +1,7 @@
 """Raman thermometry: from silicon's spectra to the tip temperature with its error.
 
 Section III of Spieser et al. 2017. A spectrum (`spectrum`) is read from a file (`spectrum_reading`;
-`text_layout` knows text, `makers` their own formats) and fitted for its line (`lineshape`,
+`text_layout` knows which parts of a table are spectra) and fitted for its line (`lineshape`,
 `detector_noise`, `line_fit`), with what is said of it by hand (`spectrum_tables`); a hot-plate
 series (`series`) calibrates the thermometer (`thermometer`) that turns line positions into
 temperatures.
