@@ -8,19 +8,19 @@ parts of an object, as ``{factor.best_k:.2f}``.
 from __future__ import annotations
 
 import base64
+import html
 import io
 import os
 import re
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from string import Template
 from typing import Any
 
-import jinja2
-from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from hotlever import __version__
@@ -33,11 +33,36 @@ from hotlever.materials.parameters import sentence
 Block = dict[str, Any]
 
 
-def _with_links(text: str) -> Markup:
+class Html(str):
+    """Text that is HTML, which is not escaped once more."""
+
+
+def _escaped(text: str) -> str:
+    return text if isinstance(text, Html) else html.escape(text)
+
+
+def element(name: str, *inside: str, **attributes: str) -> Html:
+    """Return an element of a page: texts inside it are escaped, elements are not.
+
+    Attributes that are empty are left out.
+
+    Examples
+    --------
+    >>> element("p", "1 < 2, see ", element("a", "here", href="#here"), class_="")
+    '<p>1 &lt; 2, see <a href="#here">here</a></p>'
+    """
+    stated = ((key.rstrip("_").replace("_", "-"), value) for key, value in attributes.items())
+    written = "".join(f' {key}="{html.escape(value)}"' for key, value in stated if value)
+    if name == "img":  # which has no inside, and so no end
+        return Html(f"<img{written}>")
+    return Html(f"<{name}{written}>{''.join(map(_escaped, inside))}</{name}>")
+
+
+def _with_links(text: str) -> Html:
     """Return a text whose DOIs and other pages are links."""
     link = r'<a href="https://doi.org/\1">doi:\1</a>'
-    linked = re.sub(r"doi:(10\.\d{4,9}/[^\s,;]*[^\s,;.])", link, str(escape(text)))
-    return Markup(re.sub(r"\b(\w+\.html)\b", r'<a href="\1">\1</a>', linked))
+    linked = re.sub(r"doi:(10\.\d{4,9}/[^\s,;]*[^\s,;.])", link, _escaped(text))
+    return Html(re.sub(r"\b(\w+\.html)\b", r'<a href="\1">\1</a>', linked))
 
 
 @cache
@@ -82,10 +107,10 @@ class Page:
         anchor = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
         self._add("heading", text=text, anchor=anchor)
 
-    def linked(self, text: str) -> Markup:
+    def linked(self, text: str) -> Html:
         """Return a cell of a table that leads to the section being filled."""
         anchors = [block["anchor"] for block in self.blocks if block["kind"] == "heading"]
-        return Markup('<a href="#{}">{}</a>').format(anchors[-1] if anchors else "", text)
+        return element("a", text, href=f"#{anchors[-1] if anchors else ''}")
 
     def text(self, text: str) -> None:
         """Add a paragraph."""
@@ -147,26 +172,72 @@ class Page:
 
     def html(self, figures: Path | None = None) -> str:
         """Return the text of the page; figures are written as PDF to a folder, if one is given."""
-        blocks = []
-        for block in self.blocks:
-            if block["kind"] == "figure":
-                if figures is not None:
+        if figures is not None:
+            for block in self.blocks:
+                if block["kind"] == "figure":
                     save_figure(block["figure"], figures / f"{block['name']}.pdf")
-                image = io.BytesIO()
-                block["figure"].savefig(image, format="png", dpi=160)
-                block = {**block, "image": base64.b64encode(image.getvalue()).decode("ascii")}
-            blocks.append(block)
-        options: Any = {"undefined": jinja2.StrictUndefined, "autoescape": True}
-        options |= {"trim_blocks": True, "lstrip_blocks": True}
-        environment = jinja2.Environment(
-            loader=jinja2.PackageLoader("hotlever", "report"), **options
-        )
-        environment.filters["with_links"] = _with_links
-        return environment.get_template("page.html.j2").render(
-            title=self.title,
-            summary=self.summary,
-            blocks=blocks,
-            one_sheet=self.one_sheet,
+        frame = files("hotlever") / "report" / "page.html"
+        return Template(frame.read_text(encoding="utf-8")).substitute(
+            title=html.escape(self.title),
+            kind="one-sheet" if self.one_sheet else "",
+            body="\n".join(self._elements()),
             version=__version__,
-            contents_from=5,
         )
+
+    def _elements(self, contents_from: int = 5) -> Iterator[Html]:
+        """Give what the page shows; a table of contents above so many sections or more."""
+        yield element("h1", self.title)
+        if self.summary:
+            yield element("p", _with_links(self.summary))
+        headings = [block for block in self.blocks if block["kind"] == "heading"]
+        if len(headings) >= contents_from:
+            entries = (element("a", each["text"], href=f"#{each['anchor']}") for each in headings)
+            yield element(
+                "nav",
+                element("ol", *(element("li", entry) for entry in entries)),
+                aria_label="contents",
+            )
+        for block in self.blocks:
+            if block["kind"] == "heading":
+                yield element("h2", block["text"], id=block["anchor"])
+            elif block["kind"] == "text":
+                yield element("p", _with_links(block["text"]))
+            elif block["kind"] == "table":
+                yield _table(block["columns"], block["rows"], block["caption"], block["prose"])
+            else:
+                yield _figure(block["figure"], block["caption"])
+
+
+def _table(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], caption: str, prose: bool
+) -> Html:
+    """Return a table; in one of sentences a cell is marked by how it begins, if on a claim."""
+    marks = {"holds for some": "some", "holds": "holds", "met, ": "holds"}
+    marks |= {"does not hold": "fails", "off, ": "fails"}
+
+    def mark(cell: str) -> str:
+        return next((marks[begin] for begin in marks if prose and cell.startswith(begin)), "")
+
+    body = (
+        element("tr", *(element("td", cell, class_=mark(cell)) for cell in cells)) for cells in rows
+    )
+    return element(
+        "table",
+        *([element("caption", caption)] if caption else []),
+        element("thead", element("tr", *(element("th", cell) for cell in columns))),
+        element("tbody", *body),
+        class_="prose" if prose else "",
+    )
+
+
+def _figure(figure: Figure, caption: str) -> Html:
+    """Return a figure in the page itself, as wide as it is drawn for print and a little more."""
+    image = io.BytesIO()
+    figure.savefig(image, format="png", dpi=160)
+    source = f"data:image/png;base64,{base64.b64encode(image.getvalue()).decode('ascii')}"
+    width = f"width: {round(108 * figure.get_figwidth())}px"
+    return element(
+        "figure",
+        element("img", src=source, alt=caption, style=width),
+        element("figcaption", caption),
+    )
