@@ -37,6 +37,9 @@ class Quantity(NamedTuple):
     scale: str = ""
     #: What figures call it, if not by its meaning alone.
     label: str = ""
+    #: Headings that say no more than the unit does: what a file has of this unit counts as the
+    #: quantity where it is the only one.
+    plain: str = ""
 
     @property
     def is_temperature(self) -> bool:
@@ -81,6 +84,7 @@ QUANTITIES = {
             "vb ub vbias ubias bias biasvoltage vorspannung versorgungsspannung",
             (1e-3, 1e3),
             label="bias V$_b$",
+            plain="voltage spannung u source sourcevalue value reading",
         ),
         Quantity(
             "current_mA",
@@ -92,6 +96,7 @@ QUANTITIES = {
             small=("µA", 1e3),
             scale="current_scale",
             label="heater current I$_h$",
+            plain="source sourcevalue value reading",
         ),
         Quantity(
             "reader_V",
@@ -423,12 +428,6 @@ QUANTITIES = {
 }
 #: Everything that a measurement may hold, by symbol; ``d`` begins that of a standard error.
 MEASURANDS = {quantity.symbol: quantity for quantity in QUANTITIES.values() if quantity.symbol}
-#: Headings that say no more than the unit does: what a file has of this unit counts as the
-#: quantity where it is the only one.
-PLAIN = {
-    "V_b": ("voltage", "spannung", "u", "source", "sourcevalue", "value", "reading"),
-    "I_h": ("source", "sourcevalue", "value", "reading"),
-}
 #: What a lever shows, by the name that users give it.
 OBSERVABLES = {
     "current": MEASURANDS["I_h"],

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from functools import cache
 from typing import NamedTuple
 
 from hotlever.errors import InputError, excerpt
@@ -32,6 +33,7 @@ class _Unit(NamedTuple):
     factor: float  #: what else one of the unit is of the quantity
 
 
+@cache
 def _symbols() -> dict[str, _Unit]:
     """Return units by their symbols, with SI prefixes."""
     prefixes = {"": 0, "d": -1, "c": -2, "m": -3, "u": -6, "μ": -6, "n": -9, "p": -12, "f": -15}
@@ -47,6 +49,7 @@ def _symbols() -> dict[str, _Unit]:
     return _with_prefixes(prefixes, symbols)
 
 
+@cache
 def _words() -> dict[str, _Unit]:
     """Return units by their names, in small letters."""
     prefixes = {"": 0, "milli": -3, "micro": -6, "nano": -9, "pico": -12, "kilo": 3, "mega": 6}
@@ -73,9 +76,10 @@ def _with_prefixes(
     }
 
 
-_UNITS, _UNIT_WORDS = _symbols(), _words()
-#: Headings that name a time; of these alone a unit of time is one.
-TIMES = {"t", "time", "relative time", "elapsed time", "zeit", "relative zeit"}
+def is_time(name: str) -> bool:
+    """Whether a heading names a time; of such alone a unit of time is one."""
+    times = {"t", "time", "relative time", "elapsed time", "zeit", "relative zeit"}
+    return name.casefold() in times
 
 
 def _unit(text: str) -> _Unit | None:
@@ -98,7 +102,7 @@ def _unit(text: str) -> _Unit | None:
     celsius = {"°C", "degC", "C", "oC", "celsius", "Celsius", "degreesC", "degreesCelsius"}
     if text in celsius:
         return _Unit("°C", 0, 1.0)
-    return _UNITS.get(text) or _UNIT_WORDS.get(text.casefold())
+    return _symbols().get(text) or _words().get(text.casefold())
 
 
 def is_unit(text: str) -> bool:
@@ -136,7 +140,7 @@ def conversion(unit: str, inside: str, difference: bool = False) -> tuple[float,
     >>> conversion("µA", "mA"), conversion("°C", "K"), conversion("degC", "K", difference=True)
     ((0.001, 0.0), (1.0, 273.15), (1.0, 0.0))
     """
-    theirs, ours = _unit(unit), _UNITS[inside]
+    theirs, ours = _unit(unit), _symbols()[inside]
     if theirs is None:
         return None
     if (theirs.quantity, ours.quantity) == ("°C", "K"):
@@ -188,7 +192,7 @@ def _product(text: str) -> tuple[dict[str, int], float] | None:
         if rest or "/" in part:
             return None
         for symbol, exponent in factor.findall(part):
-            unit = _UNITS.get(symbol) or numbers.get(symbol)
+            unit = _symbols().get(symbol) or numbers.get(symbol)
             if unit is None or unit.quantity not in powers_of:
                 return None
             times = sign * int(exponent or 1)
@@ -259,7 +263,7 @@ def is_unit_of(name: str, unit: str) -> bool:
     >>> is_unit_of("time", "s"), is_unit_of("V", "s"), is_unit_of("V", "mV")
     (True, False, True)
     """
-    of_time = name.casefold() in TIMES and conversion(unit, "s") is not None
+    of_time = is_time(name) and conversion(unit, "s") is not None
     return of_time or is_unit(unit)
 
 
@@ -386,7 +390,7 @@ def setting(text: str, inside: str, where: str, *, bare: bool = False) -> float:
     (5.0, 20000.0)
     """
     value, unit = quantity(text.strip())
-    theirs, ours = _unit(unit or inside * bare), _UNITS[inside]
+    theirs, ours = _unit(unit or inside * bare), _symbols()[inside]
     if value is None or theirs is None or theirs.quantity != ours.quantity:
         raise InputError(
             f"{where}: found '{excerpt(text)}', expected a number with a unit like {inside}"

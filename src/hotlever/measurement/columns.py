@@ -14,11 +14,11 @@ import numpy as np
 from hotlever.errors import InputError, counted, excerpt, quoted, unknown_name
 from hotlever.files import read_bytes
 from hotlever.measurement.data import MEASURED
-from hotlever.quantities import FITTED, MEASURANDS, PLAIN
+from hotlever.quantities import FITTED, MEASURANDS
 from hotlever.tables import TextTable, read_table
 from hotlever.tables.table import text_lines
 from hotlever.types import Array
-from hotlever.units import TIMES, amount, conversion, name_and_unit, unknown_unit
+from hotlever.units import amount, conversion, is_time, name_and_unit, unknown_unit
 
 _SYMBOLS = {
     heading: measurand.symbol
@@ -144,7 +144,7 @@ def quantity_of(heading: str, *, assigned: bool = False) -> str | None:
     """
     name, unit = name_and_unit(heading)
     of_time = assigned or conversion(unit or "", MEASURANDS["t"].typed_unit)
-    return "t" if name.casefold() in TIMES and of_time else symbol_of(name)
+    return "t" if is_time(name) and of_time else symbol_of(name)
 
 
 def measured_table(
@@ -165,7 +165,9 @@ def measured_table(
 
     def is_heading(name: str) -> bool:
         bare = name_and_unit(name)[0]
-        named = symbol_of(bare) is not None or any(_bare(bare) in plain for plain in PLAIN.values())
+        named = symbol_of(bare) is not None or any(
+            _bare(bare) in measurand.plain.split() for measurand in MEASURANDS.values()
+        )
         return named or _is_assigned(name, assigned)
 
     expected, stated_by = "one like 'V_b (V),I_h (mA),V_r (mV)'", f"--column '{GROUP}={{group}}'"
@@ -247,9 +249,9 @@ def _take_the_only_ones(
     table: TextTable, columns: dict[str, Column], unused: Collection[int]
 ) -> None:
     """Let a plain heading be the bias, or the current, if nothing else in its unit may be it."""
-    for symbol, headings in PLAIN.items():
+    for symbol, measurand in MEASURANDS.items():
         used = {*unused, *(column.index for column in columns.values())}
-        unit = MEASURANDS[symbol].typed_unit
+        unit, headings = measurand.typed_unit, measurand.plain.split()
         may_be = [
             index
             for index, heading in enumerate(table.names)

@@ -33,7 +33,7 @@ from hotlever.tables.headings import with_units
 from hotlever.tables.table import MOST_LINES, Line, decode
 from hotlever.tables.table import number as decimal
 from hotlever.types import Array, T
-from hotlever.units import TIMES, conversion, heading_with, name_and_unit
+from hotlever.units import conversion, heading_with, is_time, name_and_unit
 
 # The tables of a file by name, whose lines are made when they are asked for.
 Groups = dict[str, Callable[[], list[str]]]
@@ -361,7 +361,7 @@ def _lines_of_group(file: Any, group: Any, where: str) -> list[str]:
     lines = [f"# {key}: {_cell(value)}" for key, value in properties.items()]
     times = _times(channels, names, where)
     columns = [channel[:].tolist() for channel in channels]
-    if times and not any(name_and_unit(name)[0].casefold() in TIMES for name in names):
+    if times and not any(is_time(name_and_unit(name)[0]) for name in names):
         names.insert(0, "time (s)")
         columns.insert(0, [times[0] + times[1] * row for row in range(length)])
     lines.append("\t".join(names))
