@@ -7,7 +7,7 @@ import pytest
 
 from hotlever import InputError, read_measurement
 from hotlever.probe import Circuit
-from hotlever.tables.headings import below_a_header
+from hotlever.tables.text_tables import below_a_header
 from table_files import STYLES, understood
 
 FILES = {f"{file.style}, {file.name}": file for style in STYLES for file in style()}

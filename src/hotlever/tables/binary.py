@@ -29,8 +29,7 @@ import numpy as np
 
 from hotlever.errors import InputError, excerpt, quoted, unknown_name
 from hotlever.files import LARGEST_TEXT
-from hotlever.tables.headings import with_units
-from hotlever.tables.table import MOST_LINES, Line, decode
+from hotlever.tables.table import MOST_LINES, Line, decode, with_units
 from hotlever.tables.table import number as decimal
 from hotlever.types import Array, T
 from hotlever.units import conversion, heading_with, is_time, name_and_unit

@@ -22,6 +22,9 @@ from hotlever.units import (
     LONGEST_NUMBER,
     NUMBER,
     conversion,
+    heading_with,
+    is_unit,
+    is_unit_of,
     key_and_value,
     name_and_unit,
     plain_minus,
@@ -419,3 +422,23 @@ class TextTable:
 def _is_grouped(cell: str) -> bool:
     """Whether a cell is a number with a mark of thousands, or with three decimals."""
     return re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", cell) is not None
+
+
+def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Return headings with units that stand in a row of their own.
+
+    Examples
+    --------
+    >>> with_units(["V_b", "I_h (mA)", "note"], ["V", "mA"])
+    ['V_b (V)', 'I_h (mA)', 'note']
+    """
+    times = "X_Value"  # LabVIEW's, which may stand before each channel
+    if list(names).count(times) > 1 and any(map(is_unit, units[2:3])):
+        # units of the channels alone, where each has times of its own
+        of_channels = iter(units[1:])
+        units = ["" if name == times else next(of_channels, "") for name in names]
+    units = [*units, *[""] * (len(names) - len(units))]
+    return [
+        heading_with(name, unit) if is_unit_of(name, unit) else name
+        for name, unit in zip(names, units, strict=False)
+    ]
