@@ -27,8 +27,6 @@ from hotlever.app.session import Session
 from hotlever.errors import InputError
 from hotlever.work import give_back
 
-#: The address that is served, and the names that a browser may have for it.
-
 
 def serve(
     project: Project,

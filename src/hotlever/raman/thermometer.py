@@ -411,7 +411,7 @@ class Thermometer:
 
         Returns
         -------
-        Reading
+        LineTemperature
             The error adds in quadrature: photon noise, the calibration's covariance, laser
             heating, stress, and what the law itself may be wrong by: for the linear law the
             paper's ±(5 K + 0.02 ΔT) or, where larger, its distance from the anharmonic law;
