@@ -317,12 +317,17 @@ class JobView:
     ) -> None:
         self._session, self._page, self._then, self._during = session, page, then, during
         self._seen: tuple[int, int] = (0, -1)
-        end, way = ("Stop", self._stop) if stops else ("Cancel", self._cancel)
+        end, way = ("Stop", session.jobs.stop) if stops else ("Cancel", session.jobs.cancel)
+
+        async def stop() -> None:
+            await way(page)
+            self._look()
+
         with ui.column().classes("w-full gap-1") as self._all:
             with ui.row().classes("w-full items-center no-wrap") as self._running:
                 self._bar = ui.linear_progress(show_value=False, size="10px").props("rounded")
                 self._text = ui.label().classes("text-xs no-wrap").props("aria-live=polite")
-                ui.button(end, on_click=way).props("dense outline color=negative")
+                ui.button(end, on_click=stop).props("dense outline color=negative")
             self._message = ui.label().classes("banner w-full").props("role=alert")
             self._notes = ui.column().classes("w-full gap-0 text-sm remark")
             self._notes.set_visibility(notes)
@@ -337,14 +342,6 @@ class JobView:
     @property
     def _has_ended(self) -> bool:
         return self._job is not None and self._job.standing != "running"
-
-    async def _stop(self) -> None:
-        await self._session.jobs.stop(self._page)
-        self._look()
-
-    async def _cancel(self) -> None:
-        await self._session.jobs.cancel(self._page)
-        self._look()
 
     async def _tell(self) -> None:
         self._look()
