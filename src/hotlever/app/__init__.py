@@ -15,7 +15,6 @@ from typer import Option
 
 from hotlever.errors import InputError, unforeseen_error
 from hotlever.tasks.arguments import Reporter, refuse
-
 from hotlever.tasks.parsing import check_number
 
 
