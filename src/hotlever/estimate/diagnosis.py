@@ -117,12 +117,7 @@ def run_of_outliers(residuals: Residuals, values: Array) -> str:
     return ""
 
 
-def outlier_notes(
-    residuals: Residuals,
-    values: Array,
-    robust: bool,
-    most: int = 10,
-) -> list[str]:
+def outlier_notes(residuals: Residuals, values: Array, robust: bool, most: int = 10) -> list[str]:
     """Name the points that lie far outside the scatter of the others, and no more than `most`."""
     options = residuals.numerics.diagnosis
     advice = "it hardly counts" if robust else "a robust fit would lessen its weight"
@@ -276,12 +271,7 @@ def _of_the_resistor(rows: MeasuredRows) -> Hypothesis:
             return ""
         return f"is the series resistance, with contacts, rather {kohm:.3g} than {stated:.3g} kΩ?"
 
-    return Hypothesis(
-        asks,
-        other,
-        starts=(stated, stated / 2, 0.8 * measured),
-        free=True,
-    )
+    return Hypothesis(asks, other, starts=(stated, stated / 2, 0.8 * measured), free=True)
 
 
 def _of_the_rows(rows: MeasuredRows) -> list[Hypothesis]:

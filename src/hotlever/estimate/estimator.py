@@ -25,18 +25,8 @@ from hotlever.estimate.options import CalibrationOptions, FitOptions, chosen
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.pulses import pulse_calibration
 from hotlever.estimate.search import Solution, solve
-from hotlever.estimate.tip_temperature import (
-    calibrated,
-    check_in_range,
-    limits_of_range,
-)
-from hotlever.estimate.verdict import (
-    check_plausible,
-    check_similar,
-    doubt_of,
-    no_ramp,
-    verdict_on,
-)
+from hotlever.estimate.tip_temperature import calibrated, check_in_range, limits_of_range
+from hotlever.estimate.verdict import check_plausible, check_similar, doubt_of, no_ramp, verdict_on
 from hotlever.measurement import Measurement, given_measurement
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import of_materials, parameters_of

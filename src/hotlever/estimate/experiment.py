@@ -27,11 +27,7 @@ from scipy.interpolate import BSpline
 
 from hotlever.contact.law import INTERFACE
 from hotlever.errors import ComputationError
-from hotlever.estimate.surrogate import (
-    CurveSurrogate,
-    Rows,
-    Surrogate,
-)
+from hotlever.estimate.surrogate import CurveSurrogate, Rows, Surrogate
 from hotlever.lever.branch import TIP_RISE, Branch, Reach
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.observables import Linearised, by_parameter

@@ -29,14 +29,7 @@ from hotlever.measurement import Measurement, with_measured_circuit
 from hotlever.measurement.data import check_sample
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.probe import Probe
-from hotlever.probe.priors import (
-    Prior,
-    as_known,
-    default_priors,
-    is_of_laws,
-    priors_of,
-    updated,
-)
+from hotlever.probe.priors import Prior, as_known, default_priors, is_of_laws, priors_of, updated
 from hotlever.quantities import FITTED, OF_A_CONTACT
 
 

@@ -40,12 +40,7 @@ if TYPE_CHECKING:
 LEVELS = (0.68, 0.95)
 
 
-def profile_likelihood(
-    result: Estimate,
-    name: str,
-    *,
-    points: int = 11,
-) -> xr.Dataset:
+def profile_likelihood(result: Estimate, name: str, *, points: int = 11) -> xr.Dataset:
     """Hold one parameter at values around its optimum and fit the others again.
 
     Parameters

@@ -12,10 +12,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from hotlever.errors import InputError
-from hotlever.estimate.diagnosis import (
-    lack_of_fit_text,
-    run_of_outliers,
-)
+from hotlever.estimate.diagnosis import lack_of_fit_text, run_of_outliers
 from hotlever.estimate.problem import Problem
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_temperature import highest_bias, not_of_a_ramp, tips_in_contact

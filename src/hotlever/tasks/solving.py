@@ -10,12 +10,7 @@ from itertools import count as count_up
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from hotlever.errors import (
-    ComputationError,
-    InputError,
-    as_far_as_possible,
-    excerpt,
-)
+from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
 from hotlever.files import FIGURE_TYPES, FILM_TYPES, output_folder
 from hotlever.tasks.arguments import (
     HistoryOptions,
