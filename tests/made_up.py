@@ -12,7 +12,7 @@ import xarray as xr
 
 from hotlever.datasets import labelled
 from hotlever.estimate import FittedParameter
-from hotlever.estimate.levers import compare_levers
+from hotlever.estimate.many import compare_levers
 from hotlever.materials import PARAMETERS
 from hotlever.studies.simulation_based_calibration import WAYS, concatenated
 

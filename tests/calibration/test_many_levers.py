@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hotlever.estimate import calibrate, read_calibration
-from hotlever.estimate.levers import (
+from hotlever.estimate.many import (
     Setting,
     compare_levers,
     levers_csv,

@@ -10,7 +10,7 @@ import pytest
 
 from hotlever.errors import InputError
 from hotlever.estimate import Estimate, FitOptions, Measurement, fit, read_fit
-from hotlever.estimate.levers import compare_levers
+from hotlever.estimate.many import compare_levers
 from hotlever.estimate.sampling import predictive_band, sample_posterior
 from hotlever.estimate.uncertainty import profile_likelihood
 from hotlever.lever import Lever

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from hotlever.errors import InputError
-from hotlever.estimate.levers import (
+from hotlever.estimate.many import (
+    Batch,
     compare_levers,
     lever_rows,
     levers_csv,
     statements,
 )
-from hotlever.estimate.many import Batch
 from hotlever.materials import PARAMETERS, PUBLISHED
 from made_up import fit_of
 

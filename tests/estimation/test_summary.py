@@ -7,7 +7,7 @@ import re
 import numpy as np
 import xarray as xr
 
-from hotlever.estimate.levers import lever_rows, levers_text
+from hotlever.estimate.many import lever_rows, levers_text
 from hotlever.estimate.uncertainty import Uncertainty
 from made_up import levers
 

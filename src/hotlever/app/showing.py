@@ -24,7 +24,7 @@ from hotlever.app.session import Task, probe_of
 from hotlever.app.workers import Report
 from hotlever.errors import HotleverError, InputError
 from hotlever.estimate import Estimate, read_calibration, read_fit
-from hotlever.estimate.levers import compare_levers, lever_rows
+from hotlever.estimate.many import compare_levers, lever_rows
 from hotlever.estimate.summary import parameter_rows
 from hotlever.estimate.tip_table import interpolated
 from hotlever.files import read_json

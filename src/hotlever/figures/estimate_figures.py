@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import chdtri, ndtri
 
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.levers import tips_along
+from hotlever.estimate.many import tips_along
 from hotlever.estimate.next_measurement import SURE, Plan
 from hotlever.estimate.options import DiagnosisOptions
 from hotlever.estimate.tip_table import PulseCalibration
@@ -346,7 +346,7 @@ def lever_parameters(levers: xr.Dataset) -> Figure:
     Parameters
     ----------
     levers : xarray.Dataset
-        From `hotlever.estimate.levers.compare_levers`; without what was held.
+        From `hotlever.estimate.many.compare_levers`; without what was held.
     """
     count = levers.sizes["lever"]
     many = are_numbered(count)
@@ -439,7 +439,7 @@ def calibrated_levers(calibrations: Mapping[str, Estimate], levers: xr.Dataset) 
     calibrations : mapping of str to Estimate
         By lever; those whose data are not described are left out.
     levers : xarray.Dataset
-        From `hotlever.estimate.levers.compare_levers`.
+        From `hotlever.estimate.many.compare_levers`.
     """
     along, count = levers.attrs["along"], levers.sizes["lever"]
     tips, many = tips_along(calibrations, along), count > len(LINES)

@@ -199,7 +199,7 @@ def values_by_lever(axes: Axes, quantity: xr.Dataset, scale: float = 1.0) -> Non
     ----------
     axes : Axes
     quantity : xarray.Dataset
-        One of `hotlever.estimate.levers.compared`; what does not count is left out.
+        One of `hotlever.estimate.many.compared`; what does not count is left out.
     scale : float
         Unit, of its own, that it is drawn in.
     """

@@ -12,8 +12,7 @@ import xarray as xr
 from hotlever import figures
 from hotlever.errors import InputError
 from hotlever.estimate.estimate import Estimate
-from hotlever.estimate.levers import law_rows, lever_rows, statements
-from hotlever.estimate.many import Batch
+from hotlever.estimate.many import Batch, law_rows, lever_rows, statements
 from hotlever.estimate.summary import (
     NEAREST,
     calibration_parts,
@@ -296,7 +295,7 @@ def levers_page(batch: Batch, levers: xr.Dataset) -> Page:
     ----------
     batch : Batch
     levers : xarray.Dataset
-        From `hotlever.estimate.levers.compare_levers`.
+        From `hotlever.estimate.many.compare_levers`.
     """
     count, results = levers.sizes["lever"], batch.results.values()
     by_tip = "tip_K" in levers.quantity

@@ -40,8 +40,7 @@ from hotlever.units import setting
 if TYPE_CHECKING:
     from hotlever.estimate import Estimate
     from hotlever.estimate.experiment import Prediction
-    from hotlever.estimate.levers import Setting
-    from hotlever.estimate.many import Batch
+    from hotlever.estimate.many import Batch, Setting
     from hotlever.estimate.uncertainty import Uncertainty
     from hotlever.measurement import Measurement
 
@@ -251,8 +250,7 @@ def calibrate_files(
         Between the rows, as 10K, 0.05mW or 0.1V; left out: for 50 rows or more.
     """
     from hotlever.estimate import calibrate, read_fit
-    from hotlever.estimate.levers import Setting
-    from hotlever.estimate.many import calibrate_many
+    from hotlever.estimate.many import Setting, calibrate_many
     from hotlever.estimate.options import CalibrationOptions
     from hotlever.estimate.power_law import read_power_law
     from hotlever.estimate.summary import calibration_text
@@ -567,7 +565,7 @@ def _tell_together(
 
     Each calibration has its table for an instrument beside it, by these options.
     """
-    from hotlever.estimate.levers import compare_levers, levers_csv, levers_text
+    from hotlever.estimate.many import compare_levers, levers_csv, levers_text
 
     compared = compare_levers(batch.results, at)
     texts = [levers_text(compared)]
