@@ -64,7 +64,6 @@ from hotlever.studies.published_lever.ensemble import (
 )
 from hotlever.studies.published_lever.statements import (
     GROUPS,
-    LAST_V,
     MAIN,
     OPTIONS,
     SEARCHED,
@@ -195,7 +194,7 @@ class Solver:
             probe = probe_of(self.length_um, values, option)
             if option not in self._similar:
                 self._similar[option] = SimilarLevers(Lever(probe, self.mesh))
-            reach = FarEnough(probe.circuit, LAST_V, hottest_K=self.options.hottest_K)
+            reach = FarEnough(probe.circuit, paper.RAMP[-1], hottest_K=self.options.hottest_K)
             found[option] = self._similar[option].linearised(
                 probe, reach, self._latest.get(option), tuple(values)
             )
@@ -420,7 +419,7 @@ def _knee(main: Lever, branch: Branch) -> dict[str, float]:
 def _power(main: Lever, branch: Branch) -> dict[str, float]:
     power = np.linspace(0.05, paper.HOTTEST_MW, 120)
     off = branch.tip_temperature(power) - EQ12.tip_temperature(power)
-    last = main.sweep([LAST_V])
+    last = main.sweep([paper.RAMP[-1]])
     knee = branch.knee
     assert knee is not None
     line = BranchLine.of(branch, knee.tip_K, knee.tip_K + SPAN_K)
@@ -446,7 +445,7 @@ def _resistances(main: Lever, branch: Branch, to_K: float) -> dict[str, float]:
         if over.size
         else float(tip[-1])
     )
-    profile = heater_profile(main.solve([LAST_V])[0])
+    profile = heater_profile(main.solve([paper.RAMP[-1]])[0])
     lowly = profile.doping < 2.0 * main.probe.material.n_d
     return {
         "legs_prevail_K": crossing,
@@ -488,7 +487,9 @@ def _errors(layout: CandidateLayout) -> dict[str, float]:
     for option, rows in (("I", [1]), ("II", [1, 2]), ("III", [1, 2, 3])):
         probe = layout.probe(option)
         similar = SimilarLevers(Lever(probe, COARSE))
-        readings = Readings(similar.linearised(probe, Reach(probe.circuit, LAST_V), None, names))
+        readings = Readings(
+            similar.linearised(probe, Reach(probe.circuit, paper.RAMP[-1]), None, names)
+        )
         values, slopes = readings.at_bias(np.array(paper.RAMP))
         values[3] += readings.branch.base_temperature_K
         shown = np.concatenate([slopes[row] / values[row].max() for row in rows])

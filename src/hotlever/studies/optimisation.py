@@ -270,9 +270,6 @@ def reads_distance(probe: Probe) -> bool:
 
 # --- the search ---------------------------------------------------------------------------------
 
-#: How near a bound is met: over its range, or over the bound of a quantity.
-_AT_BOUND = 1e-3
-
 # From and to; None where there is no bound.
 Bounds = tuple[float | None, float | None]
 
@@ -432,6 +429,9 @@ class _EnoughDesigns(Exception):
 class _Search:
     """Designs as the optimiser sees them: shares of the ranges of their numbers."""
 
+    #: How near a bound is met: over its range, or over the bound of a quantity.
+    at_bound = 1e-3
+
     def __init__(
         self,
         probe: Probe,
@@ -540,7 +540,7 @@ class _Search:
         if self.designs == 1:
             self._scale = abs(value) or 1.0
         self._last = share.copy(), solved
-        within = all(self._room(solved, *bound) >= -_AT_BOUND for bound in self._bounds)
+        within = all(self._room(solved, *bound) >= -self.at_bound for bound in self._bounds)
         if within and self._sign * value < self._least:
             self._least, self.best = self._sign * value, share.copy()
         return solved
@@ -560,7 +560,7 @@ class _Search:
         Of a number, as far as the bounds on quantities that are met leave it free: the objective's
         derivatives without what these hold, by least squares.
         """
-        met = [bound for bound in self._bounds if self._room(solved, *bound) < _AT_BOUND]
+        met = [bound for bound in self._bounds if self._room(solved, *bound) < self.at_bound]
         by = self._by_share(solved, self._quantity, self._sign / self._scale)
         if met:
             held = np.array([self._room_by(solved, *bound) for bound in met])
@@ -569,9 +569,9 @@ class _Search:
         for name, here, slope, *ends in zip(
             self.names, share, by, self._low, self._high, strict=True
         ):
-            if here < _AT_BOUND and slope > 0:
+            if here < self.at_bound and slope > 0:
                 texts.append(f"{name} at its least, {ends[0]:g}")
-            elif here > 1.0 - _AT_BOUND and slope < 0:
+            elif here > 1.0 - self.at_bound and slope < 0:
                 texts.append(f"{name} at its most, {ends[1]:g}")
         quantities = [
             f"{name} at its {'least' if sign > 0 else 'most'}, {bound:g}"

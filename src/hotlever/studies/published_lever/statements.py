@@ -172,8 +172,6 @@ MAIN = next(iter(OPTIONS))
 HALF_DIGIT = 0.005
 #: A reading of the knee off the ramp: half of what its neighbours there are apart (K).
 KNEE_READ_K = 25.0
-#: The bias at which the tip is hottest (V).
-LAST_V = paper.RAMP[-1]
 #: Power (mW) up to which Eq. 12 has data on the hot branch.
 WELL_COVERED_MW = 3.3
 #: Groups of parameters that are said to be decoupled.
@@ -225,7 +223,7 @@ def _passes(point: paper.PublishedPoint, options: Mapping[str, Readings]) -> Dev
 def _on_the_ramp(options: Mapping[str, Readings]) -> Deviation:
     circuit, names = options[MAIN].circuit, options[MAIN].linearised.names
     hot = _printed_point("hot")
-    beyond = circuit.bias(hot.lever_V, hot.current_mA) - LAST_V
+    beyond = circuit.bias(hot.lever_V, hot.current_mA) - paper.RAMP[-1]
     unit = circuit.bias(HALF_DIGIT, HALF_DIGIT)
     by = np.array([circuit.bias_by(name, hot.current_mA) for name in names])
     return np.array([max(beyond, 0.0)]) / unit, by[None] * (beyond > 0.0) / unit
@@ -244,7 +242,7 @@ def _power_law(options: Mapping[str, Readings]) -> Deviation:
 
 
 def _hottest(options: Mapping[str, Readings]) -> Deviation:
-    values, slopes = options[MAIN].at_bias(LAST_V)
+    values, slopes = options[MAIN].at_bias(paper.RAMP[-1])
     rise = paper.HOTTEST_TIP_K - options[MAIN].branch.base_temperature_K
     spread = raman_error(rise)
     return (values[3] - rise) / spread, slopes[3] / spread
@@ -304,7 +302,7 @@ SEARCHED: tuple[Printed, ...] = (
     Printed(
         "hot point on the ramp",
         "Section IV, Fig. 7b",
-        f"the bias of the hot point is at most {LAST_V:.0f} V",
+        f"the bias of the hot point is at most {paper.RAMP[-1]:.0f} V",
         _on_the_ramp,
     ),
     Printed(
@@ -323,7 +321,7 @@ SEARCHED: tuple[Printed, ...] = (
     Printed(
         "hottest tip",
         "Section IV",
-        f"{paper.HOTTEST_TIP_K:.0f} K at {LAST_V:.0f} V, to the thermometer's error",
+        f"{paper.HOTTEST_TIP_K:.0f} K at {paper.RAMP[-1]:.0f} V, to the thermometer's error",
         _hottest,
     ),
     *(
