@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from hotlever.estimate import fit, read_fit
-from hotlever.estimate.beside_a_fit import known_before_a_fit
 from hotlever.probe.parts import PriorTexts
 from hotlever.probe.priors import Prior, published_material
 
@@ -83,13 +82,12 @@ def test_a_file_without_current_is_refused(run, tmp_path):
 def test_what_was_known_before_a_fit_is_not_what_it_found(shared_fit):
     """The published levers, the probe file, what the fit was asked and what is asked now."""
     fitted = read_fit(shared_fit)
-    usual = known_before_a_fit(fitted, None)
+    usual = fitted.known_before(None)
     assert usual["n_d"] == published_material()["n_d"]
     stated = {"n_d": "3e17 ± 10%", "p": "2.7 ± 1%"}
     probe = fitted.probe.model_copy(update={"prior": PriorTexts.from_values(stated, "here")})
-    of_file = known_before_a_fit(replace(fitted, probe=probe), None)
+    of_file = replace(fitted, probe=probe).known_before(None)
     assert (of_file["n_d"], of_file["p"]) == (Prior(3e17, 0.1), Prior(2.7, 0.01))
-    assert known_before_a_fit(replace(fitted, probe=probe), {"p": "2.8 ± 1%"})["p"] == Prior(
-        2.8, 0.01
-    )
-    assert known_before_a_fit(fitted, {}) == {}
+    now = replace(fitted, probe=probe).known_before({"p": "2.8 ± 1%"})
+    assert now["p"] == Prior(2.8, 0.01)
+    assert fitted.known_before({}) == {}

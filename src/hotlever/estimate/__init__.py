@@ -10,7 +10,7 @@ posterior       `posterior`: of any quantity, also curved; its samples: `samplin
 verdict         `verdict`: whether data are described; why not: `diagnosis`
 estimate        `estimate`: all of that, and its `file`; `estimator` makes it, as a fit or as a
                 calibration with `tip_temperature`, `uncertainty_budget`, `power_law` and `pulses`;
-                `beside_a_fit`; by the paper's rule, from a `knee`; `many` of them
+                by the paper's rule, from a `knee`; `many` of them
 next            `next_measurement`: which further rows lessen an error most
 ==============  ====================================================================================
 """

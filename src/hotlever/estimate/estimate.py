@@ -17,15 +17,16 @@ from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
 from hotlever.datasets import columns_text, labelled
-from hotlever.errors import InputError, unknown_name
+from hotlever.errors import ComputationError, InputError, unknown_name
 from hotlever.estimate.experiment import experiment_of
 from hotlever.estimate.file import EstimateFile, FittedParameter, rising_band
 from hotlever.estimate.objective import Objective, PriorDensity
 from hotlever.estimate.options import FitOptions
-from hotlever.estimate.posterior import standard_errors
+from hotlever.estimate.posterior import OF_THE_MEASUREMENT, standard_errors
 from hotlever.estimate.power_law import PowerLaw
+from hotlever.estimate.problem import Problem
 from hotlever.estimate.residuals import Residuals, errors_of_scales
-from hotlever.estimate.search import Solution
+from hotlever.estimate.search import Solution, solve
 from hotlever.estimate.tip_table import (
     OF_THE_CONTACT,
     STATED,
@@ -45,11 +46,19 @@ from hotlever.lever.transient import simulate
 from hotlever.materials import full_name
 from hotlever.measurement import Measurement
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.priors import Prior, PriorUse
+from hotlever.probe.priors import (
+    SCALES,
+    Prior,
+    PriorUse,
+    as_known,
+    default_priors,
+    published_material,
+    updated,
+)
 from hotlever.probe.probe_parameters import parameters_of, usual_parameters
 from hotlever.quantities import FITTED, OF_A_CONTACT
 from hotlever.text import value_with_error
-from hotlever.types import Array
+from hotlever.types import Array, Progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -569,6 +578,71 @@ class Estimate:
             gum = gum.in_either(other.gum, choices[f"{gum.of}_K"][row].item(), limits)
         return replace(self, band_columns=band, tabulated=table, gum=gum)
 
+    # --- what it leaves, known before other data --------------------------------------------------
+
+    def known_before(self, priors: Mapping[str, Prior | str] | None) -> dict[str, Prior]:
+        """Return what was known of the lever before it was fitted, some of it by other priors.
+
+        The probe has the material that was found, so that this is no prior of its own.
+        """
+        if priors is not None and not priors:
+            return {}
+        stated = {**self.options.priors, **(priors or {})}
+        probe = as_known(self.probe, stated)
+        before = updated(default_priors(probe, published_material()), stated, probe, "priors")
+        return {name: prior for name, prior in before.items() if name not in self.options.fixed}
+
+    def solve_beside(
+        self,
+        problem: Problem,
+        priors: Mapping[str, Prior | str] | None,
+        progress: Progress | None,
+    ) -> Solution:
+        """Estimate the lever by the data of a problem and by its own.
+
+        What its own data leave of the lever itself is known before the others, as one density;
+        circuit and gas are those of each measurement.
+
+        Raises
+        ------
+        ComputationError
+            If no lever near the probe has states at all measured biases.
+        """
+        before, fixed = self.known_before(priors), dict.fromkeys(self.options.fixed)
+        options = FitOptions(
+            observables=self.observables,
+            fixed=fixed,
+            priors=before,
+            medium=self.probe.surroundings.medium,
+            numerics=problem.options.numerics,
+        )
+        fitted = solve(Problem.of(self.measurement, self.probe, options), progress)
+        if _same_data(self.measurement, problem.measurement):
+            return fitted
+        varied = fitted.problem.options.varied
+        own = [name for name in varied if name not in OF_THE_MEASUREMENT]
+        numbers = [varied.index(name) for name in own]
+        values, covariance = fitted.probe.values(own), fitted.posterior.covariance
+        relative = np.array([name not in before or before[name].relative for name in own])
+        left = PriorDensity.of_estimate(own, values, covariance[np.ix_(numbers, numbers)], relative)
+        probe = problem.probe.replace(dict(zip(own, values.tolist(), strict=True)))
+        theirs = {
+            name: prior
+            for name, prior in problem.known.items()
+            if name in {*OF_THE_MEASUREMENT, *SCALES}
+        }
+        free = tuple(name for name in own if name not in usual_parameters(probe))
+        medium = problem.probe.surroundings.medium
+        again = replace(options, observables=None, priors=theirs, free=free, medium=medium)
+        together = Problem.of(problem.measurement, probe, again, before=left)
+        try:
+            return solve(replace(together, known={**before, **theirs}), progress)
+        except ComputationError as error:
+            raise ComputationError(
+                "no lever like the fitted one shows these data; is it another lever's fit? "
+                f"({error})"
+            ) from error
+
     # --- its file ---------------------------------------------------------------------------------
 
     @classmethod
@@ -593,6 +667,14 @@ class Estimate:
     ) -> None:
         """Write the file, whole or not at all."""
         write_text(path, self.to_json(request))
+
+
+def _same_data(first: Measurement, second: Measurement) -> bool:
+    columns, others = (
+        (data.bias_V, data.observable("current"), data.observable("bridge"))
+        for data in (first, second)
+    )
+    return np.array_equal(columns, others, equal_nan=True)
 
 
 def _error_of_choice(tip_K: Array, other_K: Array) -> Array:

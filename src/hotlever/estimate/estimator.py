@@ -16,7 +16,6 @@ from typing import Any, get_args
 import numpy as np
 
 from hotlever.errors import ComputationError, HotleverError, InputError
-from hotlever.estimate.beside_a_fit import solve_beside_a_fit
 from hotlever.estimate.diagnosis import outlier_notes
 from hotlever.estimate.estimate import Estimate, read_fit
 from hotlever.estimate.experiment import Model, Seen
@@ -178,7 +177,7 @@ def calibrate(
                 alone = problem.probe.circuit.starts_cold
                 solution = solve(problem, progress, stated=causes.stated if alone else None)
             else:
-                solution = solve_beside_a_fit(problem, fit, options.priors, progress)
+                solution = fit.solve_beside(problem, options.priors, progress)
             converged, reason = verdict_on(solution)
             result = calibrated(
                 solution,

@@ -32,9 +32,24 @@ from hotlever.estimate.objective import (
     inverse_or_nan,
 )
 from hotlever.estimate.surrogate import Surrogate
+from hotlever.materials.departures import departure_of
+from hotlever.materials.parameters import is_of_material, own_name
 from hotlever.probe.priors import PriorShift
 from hotlever.text import BAND
 from hotlever.types import Array, Index
+
+#: By which source of error a parameter counts that is not the lever's own.
+OF_THE_MEASUREMENT = {
+    **dict.fromkeys(
+        ("series_resistance_ohm", "bridge_upper_ohm", "bridge_lower_ohm", "bridge_offset_V"),
+        "electronics",
+    ),
+    "gas_conductivity": "air",
+    "surface_gap_um": "air",
+    "base_temperature_K": "base temperature",
+    "chip_K_per_mW": "base temperature",
+    "interface_K_per_mW": "contact",
+}
 
 
 def standard_errors(slopes: Array, covariance: Array) -> Array:
@@ -119,6 +134,19 @@ class Posterior:
             source = name if name in self.objective.prior.sources else "measurement"
             shares[source] = shares.get(source, 0.0) + columns @ columns.T
         return shares
+
+    def errors_by_source(self, slopes: Array) -> dict[str, Array]:
+        """Return standard errors by source, by derivatives by the varied parameters (..., p).
+
+        Independent of each other, they add up to what the posterior says.
+        """
+        errors: dict[str, Array] = {}
+        for name, share in self.shares.items():
+            own = "material" if is_of_material(name) else "geometry"
+            own = own if departure_of(own_name(name)) is None else "laws"
+            source = name if name in ("measurement", "fit") else OF_THE_MEASUREMENT.get(name, own)
+            errors[source] = np.hypot(errors.get(source, 0.0), standard_errors(slopes, share))
+        return errors
 
     @cached_property
     def shifts(self) -> dict[str, PriorShift]:

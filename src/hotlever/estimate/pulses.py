@@ -23,7 +23,7 @@ from hotlever.estimate.tip_table import (
     TipTable,
     total_error,
 )
-from hotlever.estimate.tip_temperature import error_of_model, errors_by_source, measured_range
+from hotlever.estimate.tip_temperature import error_of_model, measured_range
 from hotlever.lever import Lever
 from hotlever.lever.lever import COARSE, State
 from hotlever.lever.similar import SimilarLevers
@@ -187,7 +187,7 @@ def _with_errors(
     scale = np.abs(steps).max(axis=0)
     inverse = np.linalg.pinv(steps / scale) / scale[:, None]
     by_parameter = np.einsum("pd,ndm->nmp", inverse, slopes[:, :-1])
-    parts = errors_by_source(solution.posterior, by_parameter)
+    parts = solution.posterior.errors_by_source(by_parameter)
     parts["heat capacity"] = np.abs(slopes[:, -1])
     around = probe.surroundings
     if around.medium == "air":

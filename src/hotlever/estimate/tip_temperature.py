@@ -18,7 +18,7 @@ from hotlever.estimate.diagnosis import outlier_notes
 from hotlever.estimate.estimate import Estimate
 from hotlever.estimate.experiment import TIP, PredictionAtRest
 from hotlever.estimate.options import CalibrationOptions
-from hotlever.estimate.posterior import Posterior, profile_of_tip, standard_errors
+from hotlever.estimate.posterior import profile_of_tip
 from hotlever.estimate.power_law import law_of_model, power_turns
 from hotlever.estimate.search import Solution
 from hotlever.estimate.tip_table import (
@@ -34,8 +34,6 @@ from hotlever.lever import Branch, Lever
 from hotlever.lever.branch import TIP_RISE
 from hotlever.lever.continuation import continued
 from hotlever.lever.lever import COARSE, HOTTEST
-from hotlever.materials.departures import departure_of
-from hotlever.materials.parameters import is_of_material, own_name
 from hotlever.measurement import Measurement
 from hotlever.measurement.data import resolution_of
 from hotlever.piecewise import spline_through
@@ -259,20 +257,6 @@ def knee_with_errors(solution: Solution, branch: Branch) -> Knee:
     return Knee(**dict(zip(names, values(branch).tolist(), strict=True)), **stderr)
 
 
-#: By which source of error a parameter counts that is not the lever's own.
-OF_THE_MEASUREMENT = {
-    **dict.fromkeys(
-        ("series_resistance_ohm", "bridge_upper_ohm", "bridge_lower_ohm", "bridge_offset_V"),
-        "electronics",
-    ),
-    "gas_conductivity": "air",
-    "surface_gap_um": "air",
-    "base_temperature_K": "base temperature",
-    "chip_K_per_mW": "base temperature",
-    "interface_K_per_mW": "contact",
-}
-
-
 def tip_by_bias(
     solution: Solution,
     samples: int = 0,
@@ -309,7 +293,7 @@ def tip_by_bias(
     probe, circuit, bias = solution.probe, solution.probe.circuit, _rows(solution, at_V)
     predicted = solution.predicted(bias)
     tip, slopes = predicted.values[TIP], predicted.slopes[TIP][:, solution.objective.columns]
-    parts = errors_by_source(solution.posterior, slopes)
+    parts = solution.posterior.errors_by_source(slopes)
     stderr = total_error(parts)
     rise = tip - circuit.base_temperature_K
     parts["model"] = error_of_model(probe.surroundings, bias, rise)
@@ -367,7 +351,7 @@ def _at_the_contact(
     for name, of in OF_A_CONTACT.items():
         row = list(FITTED).index(name)
         slopes = predicted.slopes[row][:, solution.objective.columns]
-        parts = errors_by_source(solution.posterior, slopes)
+        parts = solution.posterior.errors_by_source(slopes)
         risen = predicted.values[row] - base_K
         share = np.divide(risen, rise, out=np.zeros_like(rise), where=rise != 0.0)
         parts |= {source: share * error for source, error in of_tip.items() if source not in parts}
@@ -418,20 +402,6 @@ def highest_bias(solution: Solution) -> float:
 
 
 # --- how sure it is -----------------------------------------------------------------------------
-
-
-def errors_by_source(posterior: Posterior, slopes: Array) -> dict[str, Array]:
-    """Return standard errors by source, by derivatives by the varied parameters (..., p).
-
-    Independent of each other, they add up to what the posterior says.
-    """
-    errors: dict[str, Array] = {}
-    for name, share in posterior.shares.items():
-        own = "material" if is_of_material(name) else "geometry"
-        own = own if departure_of(own_name(name)) is None else "laws"
-        source = name if name in ("measurement", "fit") else OF_THE_MEASUREMENT.get(name, own)
-        errors[source] = np.hypot(errors.get(source, 0.0), standard_errors(slopes, share))
-    return errors
 
 
 def error_of_model(around: Surroundings, bias: Array, rise: Array) -> Array:
