@@ -29,7 +29,7 @@ from hotlever.types import T
 #: Environment variable that moves the cache; empty switches it off.
 CACHE_VARIABLE = "HOTLEVER_CACHE"
 #: Packages whose code makes what is kept.
-_MAKERS = ("tables", "materials", "probe", "air", "contact", "lever", "lever3d")
+_MAKERS = ("tables", "materials", "probe", "air", "contact", "lever")
 
 
 def cache_folder() -> Path | None:

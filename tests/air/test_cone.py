@@ -159,7 +159,7 @@ def test_a_plate_with_a_cone_against_three_dimensions():
     pytest.importorskip("ngsolve")
     from netgen.occ import Axes, Axis, Box, OCCGeometry, Pnt, WorkPlane, X, Y, Z
 
-    from hotlever.lever3d.still_air import OpenAir
+    from hotlever.lever3d import OpenAir
     from hotlever.probe.mesh import in_a_sphere
 
     cone = Tip(height_um=3.0, half_angle_deg=10.0, apex_radius_um=0.05, in_air=True, kappa=PERFECT)

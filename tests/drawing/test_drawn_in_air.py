@@ -9,8 +9,7 @@ from drawn import TIP, drawn, pointed_lever, turned, written
 from hotlever.lever import Lever
 from hotlever.lever.fields import AirFields
 from hotlever.lever.lever import COARSE
-from hotlever.lever3d import SolidLever
-from hotlever.lever3d.solid_lever import temperature_slices
+from hotlever.lever3d import SolidLever, temperature_slices
 from hotlever.probe import MeshOptions, Probe
 from hotlever.probe.mesh import SolidMeshOptions
 

@@ -13,8 +13,8 @@ from hotlever.figures import field_maps
 from hotlever.figures import temperature_slices as draw
 from hotlever.lever.fields import seen_from_above
 from hotlever.lever.space import TIP
-from hotlever.lever3d import SolidLever
-from hotlever.lever3d.solid_lever import (
+from hotlever.lever3d import (
+    SolidLever,
     heat_by_region,
     temperature_at,
     temperature_slices,

@@ -11,7 +11,7 @@ pytest.importorskip("ngsolve")
 
 from netgen.occ import Axes, Ellipsoid, OCCGeometry, Pnt, Sphere, X, Z
 
-from hotlever.lever3d.still_air import OpenAir
+from hotlever.lever3d import OpenAir
 from hotlever.probe.mesh import in_a_sphere
 
 CENTRE, RADIUS = (0.0, 0.0, 0.0), 4.0

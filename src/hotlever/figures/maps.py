@@ -172,7 +172,7 @@ def temperature_slices(slices: xr.Dataset) -> Figure:
     Parameters
     ----------
     slices : xarray.Dataset
-        From `hotlever.lever3d.fields.temperature_slices`.
+        From `hotlever.lever3d.temperature_slices`.
     """
     base, tip = slices.attrs["base_K"], slices.attrs["tip_K"]
     # isotherms at these rises above the base temperature, as shares of the tip's

@@ -3,7 +3,7 @@
 These are for a lever of its true thickness, alone or in a sphere of air. Its mid-plane is z = 0; a
 tip points to −z. Around the lever, if asked for, is a sphere of air, and beside it a second ball of
 the same radius whose surface is meshed like the sphere's: the image of all space outside under the
-Kelvin transform (`hotlever.lever3d.still_air`).
+Kelvin transform (`hotlever.lever3d`).
 """
 
 from __future__ import annotations
