@@ -364,7 +364,7 @@ class TipFields(Section):
         table, stated = estimate.tip_table, estimate.gum
         values: dict[str, Any] = {
             "power_law_residual_K": estimate.law_residual_K,
-            "knee": vars(estimate.knee) | {"measured": estimate.knee_measured},
+            "knee": asdict(estimate.knee) | {"measured": estimate.knee_measured},
             "uncertainty_budget_K": {
                 name: part.max() for name, part in table.budgets["budget_K"].items()
             },

@@ -15,7 +15,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -411,7 +411,7 @@ def solve(
         optimum = search.from_anywhere(experiment)
     else:
         optimum = search.near(experiment, problem.start)
-    return Solution(**vars(optimum), problem=problem, seconds=time.perf_counter() - began)
+    return search.solution(optimum, began)
 
 
 @dataclass(frozen=True)
@@ -433,6 +433,11 @@ class Search:
         """
         optimiser = self.optimiser(experiment, start, before)
         return optimiser.solve_and_confirm(start, self.problem.options.robust)
+
+    def solution(self, optimum: Optimum, began: float) -> Solution:
+        """Return an optimum as the solution of the problem, begun at a time of the clock (s)."""
+        own = {field.name: getattr(optimum, field.name) for field in fields(optimum)}
+        return Solution(**own, problem=self.problem, seconds=time.perf_counter() - began)
 
     def from_anywhere(self, experiment: ExperimentAtRest) -> Optimum:
         """Search from a lever of which little may be known.

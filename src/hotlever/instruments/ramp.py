@@ -97,11 +97,12 @@ class RowByRow:
         experiment, began = problem.experiment, time.perf_counter()
         try:
             near = experiment.predict(start, self._at)
-            optimiser = Search(problem).optimiser(experiment, start, near=near)
+            search = Search(problem)
+            optimiser = search.optimiser(experiment, start, near=near)
             optimum = optimiser.solve_and_confirm(start, problem.options.robust)
         except (InputError, ComputationError):
             return None
-        solution = Solution(**vars(optimum), problem=problem, seconds=time.perf_counter() - began)
+        solution = search.solution(optimum, began)
         converged, reason = verdict_on(solution)
         return solution if converged and not reason else None
 
