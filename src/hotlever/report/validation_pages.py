@@ -197,7 +197,8 @@ def _real_curve(page: Page, calibrations: Mapping[str, Estimate]) -> None:
     page.draw("real_curve", figures.calibration_curves(calibration))
     bias = calibration.measurement.bias_V
     page.draw("real_curve_residuals", figures.residuals_of_current(bias, off, read_uA))
-    page.sentences(*calibration_parts(calibration)[0])
+    words, *_ = calibration_parts(calibration)
+    page.sentences(*words)
     told = [
         [name, use.stated, value_with_error(use.posterior_value, use.posterior_spread)]
         for name, use in calibration.priors.items()
