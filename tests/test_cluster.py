@@ -8,10 +8,9 @@ import dask
 import pytest
 from distributed import LocalCluster, Security
 
-from hotlever.cluster import cluster_executor
 from hotlever.errors import InputError
 from hotlever.estimate.many import fit_many
-from hotlever.processes import run_all
+from hotlever.processes import cluster_executor, run_all
 
 
 def square(number: int) -> int:
@@ -58,6 +57,6 @@ def test_a_scheduler_without_dask_is_one_line(tmp_path, monkeypatch):
     (tmp_path / "a.csv").write_text(
         "V_b (V),I_h (mA)\n" + "\n".join(f"{k},{k}" for k in range(1, 9))
     )
-    monkeypatch.setitem(sys.modules, "hotlever.cluster", None)
+    monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"--scheduler tls://a:1: Dask is not installed, expected"):
         fit_many([tmp_path / "a.csv"], tmp_path / "out", scheduler="tls://a:1")

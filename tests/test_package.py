@@ -45,7 +45,7 @@ FLOORS = {
         "units",
     ),
     "texts": ("cache", "datasets", "text"),
-    "tables and processes": ("cluster", "processes", "tables"),
+    "tables and processes": ("processes", "tables"),
     "materials": ("materials",),
     "probe": ("probe",),
     "air": ("air",),

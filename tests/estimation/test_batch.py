@@ -176,7 +176,7 @@ def test_a_lost_cluster_is_said_and_what_was_done_is_written(
     levers, tmp_path, capfd, monkeypatch, lost, message
 ):
     impatient = Patience(look_s=0.5, without_workers_s=0.5)
-    monkeypatch.setattr("hotlever.cluster.ClusterExecutor.patience", impatient)
+    monkeypatch.setattr("hotlever.processes.ClusterExecutor.patience", impatient)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen(
         [sys.executable, "-c", SCHEDULER, str(Path(experiments.__file__).parent)], **pipes
@@ -303,7 +303,7 @@ def test_the_worst_failure_decides_the_exit_status():
     ],
 )
 def test_requests_for_many_levers_that_cannot_be_met(run, monkeypatch, arguments, message):
-    monkeypatch.setattr("hotlever.cluster.ClusterExecutor.patience", Patience(scheduler_s=1.0))
+    monkeypatch.setattr("hotlever.processes.ClusterExecutor.patience", Patience(scheduler_s=1.0))
     for name in ("a.csv", "b.csv"):
         Path(name).write_text("V_b (V),I_h (mA)\n1,0.1\n")
     status, out, err = run("fit", "a.csv", "b.csv", *arguments)

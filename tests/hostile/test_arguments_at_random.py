@@ -258,7 +258,7 @@ def test_wrong_arguments_are_one_line(
 ):
     monkeypatch.setattr("hotlever.files.PATIENCE_S", 0.05)
     impatient = Patience(scheduler_s=0.5)
-    monkeypatch.setattr("hotlever.cluster.ClusterExecutor.patience", impatient)
+    monkeypatch.setattr("hotlever.processes.ClusterExecutor.patience", impatient)
     before, found = state(folder), []
     for case in wrong_cases(cases(CASES)):
         with time_limit(LIMIT_S):

@@ -39,7 +39,14 @@ from hotlever.lever.reduced_lever import cached_reduction, can_be_reduced
 from hotlever.materials.parameters import heading, is_of_material, parameter_named
 from hotlever.measurement import Measurement, read_measurement_of, with_measured_circuit
 from hotlever.probe import Probe
-from hotlever.processes import PROCESSORS, Executor, guarded, local_executor, run_all
+from hotlever.processes import (
+    PROCESSORS,
+    Executor,
+    cluster_executor,
+    guarded,
+    local_executor,
+    run_all,
+)
 from hotlever.quantities import QUANTITIES
 from hotlever.text import aligned, listed, value_with_error
 from hotlever.types import Progress
@@ -240,7 +247,11 @@ def estimate_many(
             batch.reused += 1
     tell()
     if waiting:
-        with _executor(scheduler, min(processes or PROCESSORS, len(waiting))) as executor:
+        here = min(processes or PROCESSORS, len(waiting))
+        workers: AbstractContextManager[Executor] = (
+            local_executor(here) if scheduler is None else cluster_executor(scheduler)
+        )
+        with workers as executor:
             for name, reason in _not_reduced(probe, options, waiting, reducing).items():
                 batch.fail(waiting.pop(name).path, reason)
             names = list(waiting)
@@ -258,19 +269,6 @@ def estimate_many(
                 tell()
     batch.results = {name: batch.results[name] for name in files if name in batch.results}
     return batch
-
-
-def _executor(scheduler: str | None, processes: int) -> AbstractContextManager[Executor]:
-    if scheduler is None:
-        return local_executor(processes)
-    try:
-        from hotlever.cluster import cluster_executor
-    except ImportError:
-        raise InputError(
-            f"--scheduler {scheduler}: Dask is not installed, expected pip install "
-            "'hotlever[cluster]'"
-        ) from None
-    return cluster_executor(scheduler)
 
 
 def lever_names(paths: Sequence[str | os.PathLike[str]]) -> dict[str, Path]:
