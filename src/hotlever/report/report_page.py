@@ -38,7 +38,7 @@ class Html(str):
 
 
 def _escaped(text: str) -> str:
-    return text if isinstance(text, Html) else html.escape(text)
+    return text if isinstance(text, Html) else html.escape(str(text))
 
 
 def element(name: str, *inside: str, **attributes: str) -> Html:
