@@ -11,7 +11,7 @@ import dataclasses
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -434,9 +434,6 @@ class ProbeParts(Record):
             return self
         spreading = spreading_K_per_mW(self.layout(), self.circuit.base_temperature_K)
         return self if at_rest <= spreading else self.replace({"chip_K_per_mW": spreading})
-
-
-ProbesParts = TypeVar("ProbesParts", bound=ProbeParts)
 
 
 def mean_inverse_distance(a: ArrayLike, b: ArrayLike) -> Array:

@@ -19,7 +19,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -27,7 +27,7 @@ from pydantic import Field
 from hotlever.errors import InputError, unknown_name
 from hotlever.materials.departures import DEPARTURES
 from hotlever.materials.parameters import Parameter, own_name
-from hotlever.probe.parts import ProbeParts, ProbesParts
+from hotlever.probe.parts import ProbeParts
 from hotlever.probe.probe_parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.shapes import EDGE_BIAS
 from hotlever.quantities import OBSERVABLES
@@ -51,6 +51,7 @@ USUAL_SCALES = {
     scale: THERMOMETER if OBSERVABLES[observable].is_temperature else METERS
     for scale, observable in SCALES.items()
 }
+ProbesParts = TypeVar("ProbesParts", bound=ProbeParts)
 #: How a spread is written: in the parameter's unit, as a share of its value, or as a factor.
 Written = Literal["unit", "share", "factor"]
 

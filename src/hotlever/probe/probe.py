@@ -121,8 +121,8 @@ class Probe(ProbeParts):
         InputError
             Naming the section and key, what was found and what is expected.
         """
-        probe = cls.from_values(parts_of(values, where, folder, like), where)
-        check_together(probe, values, where)
+        probe = cls.from_values(_parts_of(values, where, folder, like), where)
+        _check_together(probe, values, where)
         return probe
 
     @classmethod
@@ -150,7 +150,7 @@ class Probe(ProbeParts):
         InputError
             If a name exists in no section (the nearest one is given) or a value is impossible.
         """
-        return Probe.from_sections(changed_sections(self, changes), "probe", like=self)
+        return Probe.from_sections(_changed_sections(self, changes), "probe", like=self)
 
     def with_material(self, section: str, material_class: type[Record], **values: Any) -> Probe:
         """Return the probe with a class of one's own for one of its materials.
@@ -270,7 +270,7 @@ def read_sections(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {reason}") from None
 
 
-def parts_of(
+def _parts_of(
     values: Mapping[str, Any], where: str, folder: Path | None, like: ProbeParts | None
 ) -> dict[str, Any]:
     """Make the parts of a probe, each for itself, of the sections of a probe file.
@@ -368,7 +368,7 @@ def _shape_of(
     return PARAMETRIC[name].from_values(values, here)
 
 
-def check_together(probe: ProbeParts, stated: Mapping[str, Any], where: str) -> None:
+def _check_together(probe: ProbeParts, stated: Mapping[str, Any], where: str) -> None:
     """Refuse sections that do not fit the others; those `stated` are by name.
 
     Raises
@@ -443,7 +443,7 @@ def field_of(probe: ProbeParts, name: str) -> tuple[str, str, type[Record]]:
     raise unknown_name("name", key, dict.fromkeys(choices))
 
 
-def changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def _changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the sections of a probe with some values changed, each named as in `field_of`.
 
     Raises
