@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from hotlever.datasets import PlainDataset
     from hotlever.lever import Lever
     from hotlever.lever.transient import Waveform
     from hotlever.probe import Probe
@@ -382,7 +383,7 @@ def make_lever(reporter: Reporter, probe: Probe, model: str = "flat") -> Lever:
         return Lever(probe, progress=update)
 
 
-def notes_of(data: xr.Dataset) -> list[str]:
+def notes_of(data: xr.Dataset | PlainDataset) -> list[str]:
     """Return what should be known of a dataset."""
     return [note for note in data.attrs["notes"].split("\n") if note]
 
@@ -400,7 +401,7 @@ def draw(path: Path | None, figure: Callable[[Any], Figure]) -> None:
 
 def give_table(
     reporter: Reporter,
-    data: xr.Dataset,
+    data: xr.Dataset | PlainDataset,
     columns: Sequence[str],
     output: Path | None,
     plot: Path | None,
