@@ -142,12 +142,18 @@ def run(
 
 @pytest.fixture
 def refused(run: Callable[..., tuple[int, str, str]]) -> Callable[..., str]:
-    """Run a command line that is at fault: status 2, nothing printed; returns the one line."""
+    """Run a command line that is at fault: status 2, nothing printed; returns the one line.
 
-    def call(*arguments: str) -> str:
+    Where it is asked for, what was understood of a file, and notes, may stand above it.
+    """
+
+    def call(*arguments: str, below_notes: bool = False) -> str:
         status, out, err = run(*arguments)
-        assert (status, out) == (2, "")
-        (line,) = err.splitlines()
+        assert (status, out) == (2, ""), err
+        *above, line = err.splitlines()
+        assert line.startswith("hotlever: ")
+        assert below_notes or not above
+        assert not any(one.startswith(("hotlever: ", "Traceback")) for one in above)
         return line
 
     return call

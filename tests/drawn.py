@@ -106,3 +106,13 @@ def pointed_lever(path: Path, unit_um: float = 1.0) -> Path:
     space.add_blockref("PAD", at(0, -20), dxfattribs={"layer": "GND"})
     document.saveas(path)
     return path
+
+
+def pointed_sections(path: Path, unit_um: float = 1.0) -> dict[str, dict[str, Any]]:
+    """A probe file's sections of the pointed lever, whose drawing is written."""
+    file = str(pointed_lever(path, unit_um))
+    return {
+        "probe": {"shape": "drawing", "file": file, "thickness_um": 0.4, "tip_um": [50.0, 0.0]},
+        "layers": {"silicon": "SI", "heater": "HEATER"},
+        "terminals": {"supply": "V+", "ground": "GND"},
+    }

@@ -489,11 +489,14 @@ def test_a_file_without_numbers_says_so(tmp_path):
     [
         ("openpyxl", "excel", b"PK\x03\x04 xl/workbook.xml"),
         ("h5py", "hdf5", b"\x89HDF\r\n\x1a\n"),
+        ("igor2", "igor", b"\0\5" + bytes(400)),
+        ("nptdms", "tdms", b"TDSm" + bytes(24)),
     ],
 )
 def test_without_its_library_the_extra_is_named(module, extra, content, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, module, None)
     path = tmp_path / "iv.bin"
     path.write_bytes(content)
-    with pytest.raises(InputError, match=rf"pip install 'hotlever\[{extra}\]'"):
+    with pytest.raises(InputError, match=rf"iv\.bin: .*'hotlever\[{extra}\]'") as error:
         read_measurement(path)
+    assert "\n" not in str(error.value)

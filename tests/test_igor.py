@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import sys
 
 import numpy as np
 import pytest
@@ -71,15 +70,6 @@ def test_a_damaged_wave_is_one_line(tmp_path):
     written(path, CURRENT.astype(complex))
     with pytest.raises(InputError, match="type complex128, expected real numbers"):
         read_measurement(path)
-
-
-def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "igor2", None)
-    path = tmp_path / "curve.ibw"
-    path.write_bytes(b"\0\5" + bytes(400))
-    with pytest.raises(InputError, match=r"curve\.ibw: .*pip install 'hotlever\[igor\]'") as error:
-        read_measurement(path)
-    assert "\n" not in str(error.value)
 
 
 def experiment(path, *records):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -109,15 +107,6 @@ def test_a_damaged_file_is_one_line(tmp_path):
     path.write_bytes(raw.replace((4).to_bytes(8, "little"), (2**40).to_bytes(8, "little")))
     with pytest.raises(InputError, match=r"iv\.tdms: "):
         read_measurement(path)
-
-
-def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "nptdms", None)
-    path = tmp_path / "iv.tdms"
-    path.write_bytes(b"TDSm" + bytes(24))
-    with pytest.raises(InputError, match=r"iv\.tdms: .*pip install 'hotlever\[tdms\]'") as error:
-        read_measurement(path)
-    assert "\n" not in str(error.value)
 
 
 def test_where_a_group_cannot_be_named_a_file_of_one_is_asked_for(tmp_path):

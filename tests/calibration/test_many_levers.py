@@ -119,9 +119,7 @@ def test_a_lever_that_is_not_described_has_no_numbers(calibrations, converged):
         (("a.csv", "b.csv", "-o", "out", "--at", "3K"), "expected a bias such as 8V or a power"),
     ],
 )
-def test_what_does_not_go_together_is_refused(run, arguments, message):
+def test_what_does_not_go_together_is_refused(refused, arguments, message):
     for name in ("a.csv", "b.csv"):
         Path(name).write_text("V_b (V),I_h (mA)\n1,0.1\n")
-    status, out, err = run("calibrate", *arguments)
-    assert (status, out) == (2, "")
-    assert message in err
+    assert message in refused("calibrate", *arguments, below_notes=True)

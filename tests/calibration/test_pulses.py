@@ -113,8 +113,5 @@ def test_the_rule_knows_no_pulse(measured):
         ("-1us", ""),
     ],
 )
-def test_a_wrong_timing_is_one_line(run, text, message):
-    status, _, err = run("calibrate", "src/hotlever/examples/lever-a.csv", "--pulse", text)
-    assert status == 2
-    assert message in err
-    assert len(err.splitlines()) == 1
+def test_a_wrong_timing_is_one_line(refused, text, message):
+    assert message in refused("calibrate", "src/hotlever/examples/lever-a.csv", "--pulse", text)

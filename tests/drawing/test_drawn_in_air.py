@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drawn import TIP, drawn, pointed_lever, turned, written
+from drawn import TIP, drawn, pointed_sections, turned, written
 from hotlever.lever import Lever
 from hotlever.lever.fields import AirFields
 from hotlever.lever.lever import COARSE
@@ -23,17 +23,7 @@ def parametric():
 
 
 def pointed(folder) -> Probe:
-    sections = {
-        "probe": {
-            "shape": "drawing",
-            "file": str(pointed_lever(folder / "pointed.dxf")),
-            "thickness_um": 0.4,
-            "tip_um": [50.0, 0.0],
-        },
-        "layers": {"silicon": "SI", "heater": "HEATER"},
-        "terminals": {"supply": "V+", "ground": "GND"},
-    }
-    return Probe.from_sections(sections, "test")
+    return Probe.from_sections(pointed_sections(folder / "pointed.dxf"), "test")
 
 
 @pytest.mark.parametrize("turn", [pytest.param(False, marks=pytest.mark.slow), True])

@@ -10,7 +10,7 @@ import pytest
 from reference_drawing import reference_library
 from skfem import MeshTri
 
-from drawn import LAYERS, TERMINALS, TIP, box, drawn, library_of, pointed_lever, turned, written
+from drawn import LAYERS, TERMINALS, TIP, box, drawn, library_of, pointed_sections, turned, written
 from drawn import reference_points as points
 from hotlever.lever import Lever, read_sweep, write_sweep
 from hotlever.lever.full_space import FullSpace
@@ -144,15 +144,10 @@ def test_cells_in_cells_arrays_and_holes(tmp_path):
 
 
 def test_dxf_with_arcs_blocks_and_outlines_of_lines(tmp_path):
-    shape = {"shape": "drawing", "thickness_um": 0.4, "tip_um": [50.0, 0.0]}
-    sections = {
-        "layers": {"silicon": "SI", "heater": "HEATER"},
-        "terminals": {"supply": "V+", "ground": "GND"},
-    }
     found = {}
     for unit in (1.0, 1000.0):
-        file = pointed_lever(tmp_path / f"lever{unit:g}.dxf", unit)
-        probe = Probe.from_sections({"probe": {**shape, "file": str(file)}, **sections}, "test")
+        sections = pointed_sections(tmp_path / f"lever{unit:g}.dxf", unit)
+        probe = Probe.from_sections(sections, "test")
         found[unit] = probe.layout()
     layout = found[1.0]
     assert [len(region.holes) for region in layout.regions] == [0, 0, 1]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapely import Polygon, union_all
 
-from drawn import box, pointed_lever, reference_points
+from drawn import box, pointed_sections, reference_points
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, fit
 from hotlever.lever import Lever
@@ -120,14 +120,7 @@ def test_layers_that_end_at_the_outline_follow_it():
 
 @pytest.mark.parametrize("bias", [0.1, -0.1])
 def test_slanted_legs_arcs_and_holes(tmp_path, bias):
-    file = pointed_lever(tmp_path / "lever.dxf")
-    values = {
-        "probe": {
-            "shape": "drawing", "file": str(file), "thickness_um": 0.4, "tip_um": [50.0, 0.0]
-        },
-        "layers": {"silicon": "SI", "heater": "HEATER"},
-        "terminals": {"supply": "V+", "ground": "GND"},
-    }  # fmt: skip
+    values = pointed_sections(tmp_path / "lever.dxf")
     plain = outline(Probe.from_sections(values, "p"))
     values["probe"]["edge_bias_um"] = bias
     probe = Probe.from_sections(values, "p")
@@ -211,13 +204,7 @@ def similar(request, tmp_path_factory):
         # borders that end on long edges, and the heater is no strip
         values["layers"]["heater"] = [[46.9, -2], [50.2, -2], [50.0, 2], [47.2, 2]]
     if request.param == "pointed":
-        file = pointed_lever(tmp_path_factory.mktemp("drawn") / "lever.dxf")
-        own = {"file": str(file), "thickness_um": 0.4, "tip_um": [50.0, 0.0]}
-        values = {
-            "probe": {"shape": "drawing", **own},
-            "layers": {"silicon": "SI", "heater": "HEATER"},
-            "terminals": {"supply": "V+", "ground": "GND"},
-        }
+        values = pointed_sections(tmp_path_factory.mktemp("drawn") / "lever.dxf")
     return SimilarLevers(Lever(Probe.from_sections(values, "p"), COARSE))
 
 
@@ -260,23 +247,20 @@ def test_a_window_of_another_width_is_found(coarse_meshes):
     assert found.parameters["heater.edge_bias_um"].value == pytest.approx(0.15, abs=0.02)
 
 
-def test_a_prior_of_edges_is_stated_by_layer(run, tmp_path):
+def test_a_prior_of_edges_is_stated_by_layer(run, refused, tmp_path):
     changed().to_file(tmp_path / "own.toml")
     data = "V_b (V), I_h (mA)\n" + "".join(f"{v}, {0.1 * v}\n" for v in range(1, 9))
     (tmp_path / "iv.csv").write_text(data, encoding="utf-8")
 
-    def refused(prior: str) -> str:
-        status, _, err = run("calibrate", "iv.csv", "--probe", "own.toml", "--prior", prior)
-        assert status == 2
-        assert err.count("\n") == 1
-        return err
+    def of_prior(prior: str) -> str:
+        return refused("calibrate", "iv.csv", "--probe", "own.toml", "--prior", prior)
 
-    assert "in its unit such as '± 0.2'" in refused("heater.edge_bias_um=0.1x/2")
-    assert "did you mean 'heater.edge_bias_um'" in refused("heatre.edge_bias_um=±0.1")
+    assert "in its unit such as '± 0.2'" in of_prior("heater.edge_bias_um=0.1x/2")
+    assert "did you mean 'heater.edge_bias_um'" in of_prior("heatre.edge_bias_um=±0.1")
     status, _, err = run(
         *("calibrate", "iv.csv", "--probe", "own.toml", "--prior", "edge_bias_um=±0.1"),
         *("--prior", "silicon.edge_bias_um=±0.1"),
     )
     assert (status, "silicon.edge_bias_um alone" in err) == (2, True)
-    err = refused("dimensions=±2%")
+    err = of_prior("dimensions=±2%")
     assert "a spread such as '± 0.1' of silicon.edge_bias_um, heater.edge_bias_um" in err

@@ -152,18 +152,15 @@ def test_layers_mean_nothing_with_a_parametric_shape():
         Probe.from_sections(values, "probe.toml")
 
 
-def test_in_a_file_an_error_names_the_layer_and_the_place_is_drawn(run, tmp_path):
+def test_in_a_file_an_error_names_the_layer_and_the_place_is_drawn(run, refused, tmp_path):
     library = reference_library()
     (cell,) = library.top_level()
     cell.add(gdstk.rectangle((100, 0), (104, 3), layer=2))
     written(tmp_path / "lever.gds", library)
     run("probe", "import", "lever.gds", "-o", "probe.toml")
-    status, _, err = run("probe", "show", "probe.toml", "--plot", "fault.png")
-    assert status == 2
-    assert (
-        "lever.gds: heater (layer 2/0), polygon 2, at (102.000, 1.500) µm: it lies outside" in err
-    )
-    assert err.count("\n") == 1
+    line = refused("probe", "show", "probe.toml", "--plot", "fault.png")
+    where = "lever.gds: heater (layer 2/0), polygon 2, at (102.000, 1.500) µm: it lies outside"
+    assert where in line
     assert (tmp_path / "fault.png").stat().st_size > 10_000
     assert run("sweep", "probe.toml")[0] == 2
 
@@ -202,12 +199,10 @@ def damaged() -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("name", damaged())
-def test_a_damaged_file_is_one_line(name, run, tmp_path):
+def test_a_damaged_file_is_one_line(name, refused, tmp_path):
     (tmp_path / "lever.gds").write_bytes(damaged()[name])
-    status, out, err = run("probe", "import", "lever.gds", "-o", "probe.toml")
-    assert (status, out) == (2, "")
-    assert err.startswith("hotlever: lever.gds: ")
-    assert err.count("\n") == 1
+    line = refused("probe", "import", "lever.gds", "-o", "probe.toml")
+    assert line.startswith("hotlever: lever.gds: ")
     assert not (tmp_path / "probe.toml").exists()
 
 
@@ -256,13 +251,11 @@ def test_a_dxf_outline_that_is_open(tmp_path):
         Probe.from_sections(values, "probe.toml")
 
 
-def test_what_a_drawing_cannot_do_yet_is_refused_where_it_is_met(run, tmp_path):
+def test_what_a_drawing_cannot_do_yet_is_refused_where_it_is_met(refused, tmp_path):
     probe = Probe.from_sections(reference_points(), "probe.toml")
     probe.to_file(tmp_path / "probe.toml")
     data = "V_b (V), I_h (mA)\n" + "".join(f"{v}, {0.1 * v}\n" for v in range(1, 9))
     (tmp_path / "iv.csv").write_text(data, encoding="utf-8")
-    status, _, err = run(
-        "calibrate", "iv.csv", "--probe", "probe.toml", "--prior", "dimensions=±2%"
-    )
-    assert status == 2
-    assert "edges of a drawing are off by a length, not by a share; expected thickness_um" in err
+    words = ("calibrate", "iv.csv", "--probe", "probe.toml", "--prior", "dimensions=±2%")
+    why = "edges of a drawing are off by a length, not by a share; expected thickness_um"
+    assert why in refused(*words, below_notes=True)

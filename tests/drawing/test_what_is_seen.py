@@ -173,11 +173,9 @@ def test_what_draws_no_outline_is_not_one(tmp_path):
     assert "left out: 1 IMAGE without an outline (layer SILICON)" in told
 
 
-def test_curves_in_a_unit_that_is_far_too_large_are_doubted(run, tmp_path):
+def test_curves_in_a_unit_that_is_far_too_large_are_doubted(refused, tmp_path):
     drawing_files.write_dxf(tmp_path / "lever.dxf", "kilometres stated, with curves")
-    status, _, err = run("probe", "import", "lever.dxf")
-    assert status == 2
-    assert "in um it would be 54.4 µm: --unit um\n" in err
+    assert "in um it would be 54.4 µm: --unit um" in refused("probe", "import", "lever.dxf")
     with pytest.raises(InputError, match=r"54.4 µm: unit_um = 1 in \[probe\]"):
         read_sheet(tmp_path / "lever.dxf", tolerance_um=0.002)
     document = ezdxf.readfile(tmp_path / "lever.dxf")

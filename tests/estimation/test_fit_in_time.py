@@ -54,7 +54,7 @@ def test_a_scale_of_the_heat_capacity_is_found(coarse):
     assert found.evaluations < 10
 
 
-def test_the_command_fits_a_file_in_time(coarse, run):
+def test_the_command_fits_a_file_in_time(coarse, run, refused):
     """Few rows: a pulse is followed by both levers for each of some parameters."""
     times = np.array([0.5, 1.0, 2.0, 3.0])
     twin = coarse.with_probe(coarse.probe.replace({"heat_capacity_scale": 1.1}))
@@ -83,9 +83,7 @@ def test_the_command_fits_a_file_in_time(coarse, run):
     for words in (("data.csv", "--column", "t (ms)=Time"), ("iv.csv", "--fit", "fit.json")):
         Path("iv.csv").write_text("V_b (V),I_h (mA)\n1,0.14\n2,0.28\n3,0.42\n")
         Path("data.csv").write_text("Time/ms,V_b (V),I_h (mA)\n0.001,9,1.28\n0.002,9,1.27\n")
-        status, _, err = run("calibrate", *words)
-        assert status == 2
-        assert "expects a slow sweep of the bias" in err.splitlines()[-1]
+        assert "expects a slow sweep of the bias" in refused("calibrate", *words, below_notes=True)
 
 
 def test_very_many_rows_lie_on_a_spline_between_few(coarse):

@@ -93,8 +93,16 @@ def test_it_is_off_after_the_command_is_stopped_or_killed(twin, measuring, numbe
     assert is_off(twin)
 
 
-def test_it_is_off_after_the_supervising_process_is_killed(twin, measuring):
+def test_the_supervising_process_does_not_hear_what_stops_a_command_and_may_be_killed(
+    twin, measuring
+):
     process, supervisor = measuring
+    os.kill(supervisor, signal.SIGINT)
+    os.kill(supervisor, signal.SIGTERM)
+    time.sleep(0.2)
+    assert process.poll() is None
+    assert psutil.pid_exists(supervisor)
+    assert twin.output_on
     os.kill(supervisor, signal.SIGKILL)
     assert is_off(twin)
     _, err = process.communicate(timeout=60)
@@ -117,16 +125,6 @@ def test_it_is_off_at_once_though_nothing_is_asked_of_the_process_that_was_kille
     with pytest.raises(InstrumentError, match="supervises the source meter died") as raised:
         measure()
     assert "MAY STILL BE ON" not in str(raised.value)
-
-
-def test_the_supervising_process_does_not_hear_what_stops_a_command(twin, measuring):
-    process, supervisor = measuring
-    os.kill(supervisor, signal.SIGINT)
-    os.kill(supervisor, signal.SIGTERM)
-    time.sleep(0.2)
-    assert process.poll() is None
-    assert psutil.pid_exists(supervisor)
-    assert twin.output_on
 
 
 def test_a_lost_line_is_said_aloud(twin):

@@ -254,10 +254,8 @@ def test_what_shows_nothing_is_refused():
         (["--set", "sample=polymer", "--set", "tip.height_um=0.2"], "the tip touches a sample"),
     ],
 )
-def test_bad_input_is_one_line(arguments, message, run):
-    status, out, err = run("reader", *arguments)
-    assert (status, out) == (2, "")
-    assert message in err.splitlines()[-1]
+def test_bad_input_is_one_line(arguments, message, refused):
+    assert message in refused("reader", *arguments, below_notes=True)
 
 
 @pytest.mark.slow

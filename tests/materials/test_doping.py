@@ -74,8 +74,3 @@ def test_diffusion_conserves_the_missing_dopants():
     """Diffusion moves dopants: the deficit n_hd − n integrates to that of the sharp step."""
     deficit, _ = quad(lambda x: N_HD - profile(x, 5.75e17, 0.647), -20, 20)
     assert deficit == pytest.approx((N_HD - 5.75e17) * LENGTH, rel=1e-7)
-
-
-def test_half_way_between_the_concentrations_at_the_heater_ends():
-    n = profile([-2.0, 2.0], 5.75e17, 0.3)
-    np.testing.assert_allclose(n, (5.75e17 + N_HD) / 2, rtol=1e-12)

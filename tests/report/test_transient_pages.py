@@ -30,8 +30,8 @@ def test_the_page_shows_steps_trains_time_constants_and_spectra(tmp_path):
     assert progress[-1] == (5, 5)
 
 
-def test_the_command_takes_no_wave_form_beside_it(run, tmp_path):
-    status, _, err = run("pulse", "--report", str(tmp_path / "page"), "--step", "3")
-    assert status == 2
-    assert "--step: does not go with --report" in err
+def test_the_command_takes_no_wave_form_beside_it(refused, tmp_path):
+    assert "--step: does not go with --report" in refused(
+        "pulse", "--report", str(tmp_path / "page"), "--step", "3"
+    )
     assert not (tmp_path / "page").exists()
