@@ -123,15 +123,6 @@ def test_nothing_is_said_beyond_the_hottest_state_or_below_the_base(reference):
     assert reference.power(293.0) == 0.0
 
 
-def test_a_branch_goes_on_where_it_was(coarse):
-    short = continued(coarse.equations, lambda branch: branch.u[-1] ** 2 > 300)
-    longer = continued(coarse.equations, lambda branch: branch.u[-1] ** 2 > 700, short)
-    whole = continued(coarse.equations, lambda branch: branch.u[-1] ** 2 > 700)
-    np.testing.assert_array_equal(longer.u[: short.u.size], short.u)
-    u = np.linspace(0.0, min(longer.u[-1], whole.u[-1]), 50)
-    np.testing.assert_allclose(longer.curve(u), whole.curve(u), rtol=1e-4, atol=1e-6)
-
-
 @pytest.mark.parametrize("thermoelectric", [False, True])
 def test_a_state_has_the_polarity_of_its_branch_wherever_it_is_looked_for(coarse, thermoelectric):
     """Heat does not know the direction of a current: a tip temperature has one state each way."""
@@ -174,13 +165,6 @@ def test_the_knee_is_where_the_lever_voltage_is_highest(lever, reference):
     # one knee, wherever it is read
     assert reference.knee.tip_K == pytest.approx(knee.tip_K.item(), abs=1e-9)
     assert reference.knee.power_mW == pytest.approx(knee.power_mW.item(), rel=1e-12)
-
-
-def test_the_knee_does_not_depend_on_the_circuit(coarse):
-    knees = [with_series(coarse, ohm).knee() for ohm in (0.0, 5600.0, 20000.0)]
-    for name in ("lever_V", "current_mA", "tip_K"):
-        values = [knee[name].item() for knee in knees]
-        np.testing.assert_allclose(values, values[0], rtol=1e-9)
 
 
 def test_a_lever_too_cold_has_no_knee_yet(coarse):
@@ -263,16 +247,6 @@ def test_a_lever_without_jumps_goes_back_as_it_came(coarse):
 def test_biases_that_go_back_rise_before(coarse, bias):
     with pytest.raises(InputError, match="expected"):
         coarse.sweep(bias, and_back=True)
-
-
-def test_without_a_jump_nothing_is_noted(coarse):
-    assert coarse.sweep([1.0, 5.0]).attrs["notes"] == ""
-
-
-def test_other_biases_asked_for_do_not_change_a_state(coarse):
-    alone = coarse.with_probe(coarse.probe).sweep([9.0])
-    among = coarse.with_probe(coarse.probe).sweep(np.linspace(0.5, 9.0, 60)).isel(bias=-1)
-    assert alone.tip_K.item() == pytest.approx(among.tip_K.item(), abs=1e-9)
 
 
 def test_biases_may_come_in_any_order_and_twice(coarse):

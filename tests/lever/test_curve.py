@@ -35,11 +35,6 @@ def test_a_step_of_a_higher_derivative_spoils_nothing_where_it_is_a_node():
     np.testing.assert_allclose(known(fine), exact, atol=1e-12)
 
 
-def test_two_nodes_are_enough():
-    u = np.array([0.0, 1.0])
-    np.testing.assert_allclose(smooth_curve(u, u**3, 3 * u**2)(0.5), 0.125)
-
-
 def test_hermite_weights_extrapolate_and_differentiate():
     nodes = np.array([[1.0, 2.0, 4.0]])
     values, slopes = nodes[0] ** 5, 5 * nodes[0] ** 4

@@ -48,7 +48,13 @@ def orders(lever, name):
 
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [(kind, name) for kind, probe in PROBES.items() for name in dimensions_of(probe)],
+    [
+        (kind, name)
+        for kind, probe in PROBES.items()
+        for name in dimensions_of(probe)
+        # the others of a lever with a tip are those of one without
+        if kind != "with a tip" or name not in dimensions_of(PROBES["three-leg"])
+    ],
 )
 def test_derivatives_by_dimensions_have_taylor_order_two(kind, name):
     found, rest = orders(Lever(PROBES[kind], COARSE), name)

@@ -101,7 +101,7 @@ def test_memory_is_given_back():
     matrix, process = random_matrix(1, 800), psutil.Process()
     used = []
     for _ in range(3):
-        for _ in range(8):
+        for _ in range(4):
             factorisation = KLU(matrix.indices, matrix.indptr)
             factorisation.factorised(matrix.data)
         used.append(process.memory_info().rss)

@@ -5,21 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hotlever.lever import Lever
 from hotlever.lever.branch import Branch
 from hotlever.lever.equations import steps_of
 from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.observables import Linearised
 from hotlever.lever.solved_states import solve_at
 from hotlever.materials import PARAMETERS
-from hotlever.probe import MeshOptions, Probe
 from hotlever.quantities import OBSERVABLES
 
 #: States of the branch (360, 600 and 1170 K): between them sensitivities are those of nearby ones.
 #: None is where many quadrature points pass the step of the thermal conductivity.
 NODES = [3, 7, 19]
 #: Relative steps: the remainder must be well above rounding errors and quadratic.
-STEPS = (0.004, 0.002, 0.001)
+STEPS = (0.002, 0.001)
 
 
 @pytest.fixture(scope="module")
@@ -57,14 +55,6 @@ def test_sensitivities_have_taylor_order_two(bridged, name):
         # to vanish the order is higher, and a wrong slope would make it one
         linear = rest[0] < 1e-7 * np.abs(start[column.name].values)
         assert orders[-1][~linear].min(initial=2.0) > 1.75, (observable, orders)
-
-
-def test_a_lever_without_reader_has_no_reader_sensitivity():
-    lever = Lever(Probe.u_shape(), MeshOptions(refinement=0.4))
-    sweep = lever.sweep([5.0], sensitivities=True)
-    assert np.isnan(sweep.reader_V.item())
-    assert np.isnan(sweep.sensitivity.sel(observable="reader")).all()
-    assert np.isfinite(sweep.sensitivity.sel(observable="tip")).all()
 
 
 def test_a_state_that_gives_way_to_one_at_a_step_of_a_law_leaves_no_factors(coarse):

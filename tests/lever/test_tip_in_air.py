@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-
 import numpy as np
 import pytest
 
@@ -75,18 +73,6 @@ def test_small_signals_and_history_go_to_the_state_at_rest(tipped):
     assert slow == pytest.approx((high.tip_K - low.tip_K) / 0.02, rel=1e-3)
     history = simulate(tipped, step(4.0), 0.2e6, tolerance_K=0.5)
     assert history.tip_K[-1].item() == pytest.approx(state.tip_K, abs=0.05)
-
-
-def test_it_can_be_sent_to_another_process(tipped):
-    sent = pickle.loads(pickle.dumps(tipped))
-    assert (sent.sweep(BIAS).tip_K == tipped.sweep(BIAS).tip_K).all()
-
-
-def test_a_surface_below_is_farther_than_the_tip_is_high(tipped):
-    near = AIR.with_(surface_gap_um=1.05)
-    far = AIR.with_(surface_gap_um=5.0)
-    heats = [Lever(probe, COARSE).sweep([4.0]).air_heat_mW.item() for probe in (near, far)]
-    assert heats[0] > heats[1]
 
 
 @pytest.mark.slow

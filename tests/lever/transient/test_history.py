@@ -42,10 +42,9 @@ def test_a_step_to_the_knee_takes_long(lever):
     np.testing.assert_allclose(found.tip_K, [364.735, 397.552, 715.883, 865.889], atol=0.05)
 
 
-@pytest.mark.parametrize("bias", [4.0, 8.268])
-def test_a_step_ends_in_the_state_at_rest(coarse, bias):
-    found = simulate(coarse, step(bias), at=[20000.0], tolerance_K=1e-3)
-    (rest,) = coarse.solve([bias])
+def test_a_step_to_the_knee_ends_in_the_state_at_rest(coarse):
+    found = simulate(coarse, step(8.268), at=[20000.0], tolerance_K=1e-3)
+    (rest,) = coarse.solve([8.268])
     assert found.tip_K.item() - 293.0 == pytest.approx(rest.tip_K - 293.0, rel=1e-6)
     assert found.current_mA.item() == pytest.approx(rest.current_mA, rel=1e-6)
     assert found.reader_V.item() == pytest.approx(rest.reader_V, rel=1e-6)
@@ -54,8 +53,6 @@ def test_a_step_ends_in_the_state_at_rest(coarse, bias):
 @pytest.mark.parametrize(
     "waveform",
     [
-        step(8.268),
-        pulse(10.0, 5.0),
         pulse(10.0, 5.0, 20.0, 3),
         ramp(8.0, 50.0),
         sine(3.0, 0.5, 20e3),
@@ -103,24 +100,12 @@ def test_every_lever_can_be_followed(other):
     assert not data.notes
 
 
-def test_air_slows_nothing_down_but_cools(coarse, in_air):
-    times = [1.0, 100.0]
-    vacuum, air = (simulate(one, step(6.0), at=times).tip_K.values for one in (coarse, in_air))
-    assert air[0] < vacuum[0] < air[0] + 2.0
-    assert vacuum[1] > air[1] + 5.0
-
-
 def test_between_the_steps_it_is_as_accurate(coarse):
     times = np.geomspace(0.01, 300.0, 40)
     rough, fine = (simulate(coarse, step(6.0), at=times, tolerance_K=tol) for tol in (0.1, 1e-3))
     np.testing.assert_allclose(rough.tip_K, fine.tip_K, atol=0.1)
     np.testing.assert_allclose(rough.current_mA, fine.current_mA, rtol=1e-4)
     np.testing.assert_allclose(rough.stored_nJ, fine.stored_nJ, rtol=1e-3, atol=1e-3)
-
-
-def test_without_power_it_stays_as_it_is(coarse):
-    data = simulate(coarse, step(0.0))
-    np.testing.assert_allclose(data.tip_K, 293.0, atol=1e-9)
 
 
 def test_after_a_pulse_nothing_flows(coarse):
@@ -135,13 +120,6 @@ def test_the_other_polarity_heats_alike(coarse):
     there, back = (simulate(coarse, step(bias), at=[10.0]) for bias in (5.0, -5.0))
     assert back.tip_K.item() == pytest.approx(there.tip_K.item(), abs=1e-6)
     assert back.current_mA.item() == pytest.approx(-there.current_mA.item(), rel=1e-9)
-
-
-def test_a_slow_sine_is_a_row_of_states_at_rest(coarse):
-    times = np.array([25.0, 50.0, 75.0]) * 1e3
-    data = simulate(coarse, sine(3.0, 1.0, 10.0), at=times)
-    rest = coarse.sweep([4.0, 3.0, 2.0])
-    np.testing.assert_allclose(data.tip_K, rest.tip_K, atol=0.05)
 
 
 def test_a_lever_without_resistor_runs_away_beyond_its_fold(coarse):

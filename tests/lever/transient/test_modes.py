@@ -101,7 +101,3 @@ def test_what_does_not_exist_is_refused(coarse):
         time_constants(coarse, [1.0], "voltag")
     with pytest.raises(ComputationError, match="without power"):
         time_constants(coarse, [0.0], "power")
-
-
-def test_in_air_a_lever_is_faster(coarse, in_air):
-    assert slowest(in_air, 2.0) < 0.9 * slowest(coarse, 2.0)

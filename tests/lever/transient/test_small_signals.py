@@ -34,24 +34,6 @@ def test_all_frequencies_are_those_of_a_direct_solution(coarse):
         assert data.tip_per_power_K_per_mW.values[place] == pytest.approx(abs(tip), rel=1e-6)
 
 
-@pytest.mark.parametrize("bias", [2.0, 8.0, 10.7])
-def test_slow_signals_see_the_slopes_at_rest(coarse, bias):
-    (state,) = coarse.solve([bias])
-    equations, x = coarse.equations, state.x
-    along = equations.along(x, equations.factorised(x))
-    lever_V, current_mA, _ = equations.observed_change(x, along)[:, 0]
-    data = spectrum(state, [1e-3])
-    assert data.impedance_real_ohm.item() == pytest.approx(1e3 * lever_V / current_mA, rel=1e-6)
-    warmer = 1.0 / coarse.circuit.bias(lever_V, current_mA)
-    assert data.tip_per_bias_K_per_V.item() == pytest.approx(abs(warmer), rel=1e-6)
-
-
-def test_fast_signals_see_a_resistor(coarse):
-    (state,) = coarse.solve([6.0])
-    found = impedance(spectrum(state, [1e8]))[0]
-    assert found == pytest.approx(1000.0 * state.lever_V / state.current_mA, rel=0.01)
-
-
 def test_a_history_under_a_weak_sine_answers_alike(coarse):
     (state,) = coarse.solve([4.0])
     frequency, amplitude = 10e3, 0.02
