@@ -437,7 +437,7 @@ def _power(main: Lever, branch: Branch) -> dict[str, float]:
 
 def _resistances(main: Lever, branch: Branch, to_K: float) -> dict[str, float]:
     tip = np.linspace(600.0, min(branch.hottest_K, to_K), 120)
-    parts = dataset_of_branch(main.probe, branch, branch.u_at(tip)).dataset
+    parts = dataset_of_branch(main.probe, branch, branch.u_at(tip))
     ratio = (parts.legs_ohm / parts.heater_ohm).values
     over = np.flatnonzero(ratio >= 1.0)
     crossing = (

@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 import os
 import zlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, cached_property
-from itertools import chain
+from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import hotlever
 from hotlever import __version__
-from hotlever.errors import ComputationError, InputError
+from hotlever.errors import InputError
 from hotlever.files import whole_file, write_text
 from hotlever.quantities import QUANTITIES
 from hotlever.types import Array
@@ -26,92 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class PlainVariable(NamedTuple):
-    """What a variable of xarray holds: names of its axes, values, and its unit and meaning."""
-
-    dims: tuple[str, ...]
-    values: Any
-    attrs: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class PlainDataset:
-    """What a dataset of xarray holds, read by the same words, for tables that wait for no xarray.
-
-    Its import, with that of pandas, takes half as long as to solve a lever.
-
-    Attributes
-    ----------
-    data_vars, coords : mapping of str to PlainVariable
-    attrs : mapping
-    """
-
-    data_vars: Mapping[str, PlainVariable]
-    coords: Mapping[str, PlainVariable]
-    attrs: Mapping[str, Any]
-
-    def __getitem__(self, name: str) -> PlainVariable:
-        return self.data_vars[name]
-
-    @property
-    def sizes(self) -> dict[str, int]:
-        """The lengths of the axes."""
-        every = [*self.data_vars.values(), *self.coords.values()]
-        lengths = (zip(each.dims, each.values.shape, strict=True) for each in every)
-        return dict(chain.from_iterable(lengths))
-
-    def with_(
-        self,
-        coords: Mapping[str, PlainVariable] | None = None,
-        attrs: Mapping[str, Any] | None = None,
-        **columns: PlainVariable,
-    ) -> PlainDataset:
-        """Return the same with other coordinates, attributes and columns, or more of them."""
-        more = (columns, coords or {}, attrs or {})
-        own = (self.data_vars, self.coords, self.attrs)
-        return PlainDataset(*({**had, **new} for had, new in zip(own, more, strict=True)))
-
-    def rows(self, chosen: slice, along: str) -> PlainDataset:
-        """Return some of the rows along the first axis of all that has it."""
-
-        def some(each: Mapping[str, PlainVariable]) -> dict[str, PlainVariable]:
-            return {
-                name: one._replace(values=one.values[chosen]) if along in one.dims else one
-                for name, one in each.items()
-            }
-
-        return replace(self, data_vars=some(self.data_vars), coords=some(self.coords))
-
-    @cached_property
-    def dataset(self) -> xr.Dataset:
-        """The same as users have it."""
-        import xarray as xr
-
-        offer_plots()
-        columns, coordinates = (
-            {name: _of_xarray(name, variable) for name, variable in each.items()}
-            for each in (self.data_vars, self.coords)
-        )
-        return xr.Dataset(columns, coordinates, self.attrs)
-
-
-def dataset_of(work: Callable[[], PlainDataset]) -> xr.Dataset:
-    """Return what a computation gives, or has reached where it fails, as users have it.
-
-    Raises
-    ------
-    ComputationError
-        As the computation.
-    """
-    try:
-        return work().dataset
-    except ComputationError as error:
-        if isinstance(error.partial, PlainDataset):
-            error.partial = error.partial.dataset
-        raise
-
-
-def in_a_file(data: xr.Dataset | PlainDataset, columns: Sequence[str]) -> list[str]:
+def in_a_file(data: xr.Dataset, columns: Sequence[str]) -> list[str]:
     """Return the columns of a file: the usual ones, and those that only some levers have.
 
     These are of a bridge, of set points, and of terminals and monitors, which are named by users.
@@ -129,17 +42,7 @@ def labelled(
     coordinates: Mapping[str, Any] | None = None,
     **attributes: Any,
 ) -> xr.Dataset:
-    """Return columns as a dataset with units and meanings; see `plain`."""
-    return plain(columns, dimensions, coordinates, **attributes).dataset
-
-
-def plain(
-    columns: Mapping[str, Any],
-    dimensions: str | Sequence[str] = "bias",
-    coordinates: Mapping[str, Any] | None = None,
-    **attributes: Any,
-) -> PlainDataset:
-    """Return what is in a dataset of columns with units and meanings.
+    """Return columns as a dataset with units and meanings.
 
     Parameters
     ----------
@@ -153,7 +56,10 @@ def plain(
     **attributes
         Of the dataset, beside the version of the software.
     """
-    return PlainDataset(
+    import xarray as xr  # takes half a second, which not every command has to wait for
+
+    offer_plots()
+    return xr.Dataset(
         {name: quantity(name, dimensions, values) for name, values in columns.items()},
         {name: quantity(name, name, values) for name, values in (coordinates or {}).items()},
         {**attributes, "software": f"hotlever {__version__}"},
@@ -190,17 +96,8 @@ def offer_plots() -> None:
     xr.register_dataset_accessor("hotlever")(Plots)
 
 
-def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> PlainVariable:
-    """Return a variable with its unit and meaning; for tuples see `plain`."""
-    own, array, *stated = values if isinstance(values, tuple) else (dimensions, values)
-    array, row = np.asarray(array), QUANTITIES.get(name)
-    usual = {"units": row.unit, "long_name": row.meaning} if row else {}
-    own = (own,) if isinstance(own, str) else tuple(own)
-    return PlainVariable(own if array.ndim else (), array, stated[0] if stated else usual)
-
-
-def _of_xarray(name: str, variable: PlainVariable) -> xr.Variable:
-    """Return a variable of xarray.
+def quantity(name: str, dimensions: str | Sequence[str], values: Any) -> xr.Variable:
+    """Return a variable with its unit and meaning; for tuples see `labelled`.
 
     Of other arrays xarray would ask whether they are Dask's, and import Dask for that where it is
     installed: a third of a second.
@@ -208,15 +105,21 @@ def _of_xarray(name: str, variable: PlainVariable) -> xr.Variable:
     import pandas as pd
     import xarray as xr
 
-    if variable.dims == (name,) and variable.values.dtype.kind in "ifU":
-        return xr.Variable(variable.dims, pd.Index(variable.values), variable.attrs)
+    own, array, *stated = values if isinstance(values, tuple) else (dimensions, values)
+    array, row = np.asarray(array), QUANTITIES.get(name)
+    usual = {"units": row.unit, "long_name": row.meaning} if row else {}
+    attributes = stated[0] if stated else usual
+    if array.ndim == 0:
+        own = ()
+    elif own == name and array.dtype.kind in "ifU":
+        return xr.Variable(own, pd.Index(array), attributes)
     try:
-        return xr.Variable(*variable, fastpath=True)
+        return xr.Variable(own, array, attributes, fastpath=True)
     except TypeError:  # a version of xarray that does not know it
-        return xr.Variable(*variable)
+        return xr.Variable(own, array, attributes)
 
 
-def csv_text(data: xr.Dataset | PlainDataset, columns: Sequence[str]) -> str:
+def csv_text(data: xr.Dataset, columns: Sequence[str]) -> str:
     """Return columns of a dataset as CSV text; empty where a value does not exist.
 
     What lies along a line has a column for each point, counted from 0 behind the name.
@@ -249,9 +152,7 @@ def frame_text(frame: Any, **options: Any) -> str:
     return str(finite.to_csv(lineterminator="\n", **options))
 
 
-def write_dataset(
-    data: xr.Dataset | PlainDataset, path: str | os.PathLike[str], columns: Sequence[str]
-) -> None:
+def write_dataset(data: xr.Dataset, path: str | os.PathLike[str], columns: Sequence[str]) -> None:
     """Write a dataset as ``.csv`` (some columns) or ``.nc`` (everything).
 
     Raises
@@ -263,7 +164,6 @@ def write_dataset(
     if suffix == ".csv":
         write_text(path, csv_text(data, columns))
     elif suffix == ".nc":
-        data = data.dataset if isinstance(data, PlainDataset) else data
         with whole_file(path) as temporary:
             # any reader knows damaged numbers by sums of their own; only the sum over all knows
             # those whose address in the file is damaged

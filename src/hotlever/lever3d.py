@@ -28,7 +28,7 @@ from skfem.element import ElementTetP2
 
 from hotlever.air.bodies import lever_axes
 from hotlever.cache import cache_file, store_arrays, stored
-from hotlever.datasets import PlainDataset, labelled
+from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.files import whole_file
 from hotlever.lever.branch import Branch, Reading, there_and_back
@@ -143,13 +143,14 @@ class SolidLever(Lever):
         other._flat = self._flat.with_probe(probe)
         return other
 
-    def swept(
+    def sweep(
         self,
         bias: ArrayLike,
+        *,
         sensitivities: bool = False,
         and_back: bool = False,
         progress: Progress | None = None,
-    ) -> PlainDataset:
+    ) -> xr.Dataset:
         """Solve the lever at each of some biases; see `Lever.sweep`.
 
         Sensitivities are those of the flat lever.
@@ -160,13 +161,12 @@ class SolidLever(Lever):
             lambda: self.solve(values, progress, and_back=and_back)
         )
         notes = self._flat.read(values, and_back=and_back)[1].notes(values)
-        data = at_bias(self._observed(states, notes), every[: len(states)])
+        data = at_bias(self.dataset(states, notes), every[: len(states)])
         if and_back:
             data = with_ramp(data, np.arange(len(states)) < values.size)
         if sensitivities:
-            flat = self._flat.swept(values[: len(states)], True, and_back)
-            coordinates = {name: flat.coords[name] for name in ("observable", "parameter")}
-            data = data.with_(coords=coordinates, sensitivity=flat["sensitivity"])
+            flat = self._flat.sweep(values[: len(states)], sensitivities=True, and_back=and_back)
+            data = data.assign(sensitivity=flat.sensitivity)
         if failure is not None:
             failure.partial = data
             raise failure

@@ -212,10 +212,10 @@ def test_pressures_are_a_dimension_and_rows_of_a_file():
     assert "the temperature of the air jumps as at 600 K" in data.attrs["notes"]
     assert (data.dV_dz_V_per_um.isel(pressure=0) < data.dV_dz_V_per_um.isel(pressure=1)).all()
     rows = rows_of(data)
-    text = csv_text(rows, list(rows.data_vars))
+    text = csv_text(rows, [str(name) for name in rows.data_vars])
     assert text.count("\n") == 5
     assert text.startswith("surface_gap_um,bias_V,reader_ohm,")
-    assert rows["pressure_mbar"].values.tolist() == [100.0] * 2 + [1000.0] * 2
+    assert rows.pressure_mbar.values.tolist() == [100.0] * 2 + [1000.0] * 2
     assert len(figure_of(data).axes) == 4
 
 

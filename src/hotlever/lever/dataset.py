@@ -18,11 +18,10 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_matrix, vstack
 
 from hotlever.datasets import (
-    PlainDataset,
     checksum,
     in_a_file,
+    labelled,
     offer_plots,
-    plain,
     quantity,
     write_dataset,
 )
@@ -59,7 +58,7 @@ SWEEP_COLUMNS = (
 
 def dataset_of_states(
     probe: Probe, equations: LeverEquations, x: Array, notes: Sequence[str] = ()
-) -> PlainDataset:
+) -> xr.Dataset:
     """Return what is observed of solved states (size + 1, n) of a probe's lever."""
     base = equations.base_temperature_K
     outputs = dict(zip(ELECTRICAL_OUTPUTS, equations.observed(x), strict=True))
@@ -76,7 +75,7 @@ def dataset_of_branch(
     u: Array,
     notes: Sequence[str] = (),
     sensitivities: Array | None = None,
-) -> PlainDataset:
+) -> xr.Dataset:
     """Return what is observed of a probe's lever at some places u (n,) of its branch.
 
     Sensitivities, (observables, n, p), are of `OBSERVABLES` by what a fit usually varies.
@@ -100,7 +99,7 @@ def _dataset(
     balances: Array,
     notes: Sequence[str],
     sensitivities: Array | None = None,
-) -> PlainDataset:
+) -> xr.Dataset:
     """Return what is observed of n states, of which the balances (n, k) are `balance_columns`.
 
     The outputs are what instruments see, the tip, the highest temperature, and monitors.
@@ -128,13 +127,10 @@ def _dataset(
     ordered_columns = with_following(probe, {name: columns[name] for name in every})
     variables, coordinates = with_meanings(probe, ordered_columns, "bias")
     coordinates["bias"] = columns["bias_V"]
-    for name in at_terminals:
-        meaning = f"current into the lever at terminal {name.removesuffix('_mA')}"
-        variables[name] = "bias", columns[name], {"units": "mA", "long_name": meaning}
     if sensitivities is not None:
         variables["sensitivity"] = (("observable", "bias", "parameter"), sensitivities)
         coordinates |= {"observable": list(OBSERVABLES), "parameter": list(usual_parameters(probe))}
-    return plain(
+    data = labelled(
         variables,
         coordinates=coordinates,
         **probe_attributes(probe),
@@ -142,16 +138,20 @@ def _dataset(
             [*notes, *range_notes(made_of, "a bias of {} V", columns["bias_V"], columns["max_K"])]
         ),
     )
+    for column in at_terminals:
+        meaning = f"current into the lever at terminal {column.removesuffix('_mA')}"
+        data[column].attrs = {"units": "mA", "long_name": meaning}
+    return data
 
 
-def at_bias(data: PlainDataset, bias: Array) -> PlainDataset:
+def at_bias(data: xr.Dataset, bias: Array) -> xr.Dataset:
     """Return a sweep with the biases asked for, to the last digit, not V_l + R_s I_h.
 
     Rounded sums would be other labels: ``sel`` would miss them, and sweeps of two levers
     would have no bias in common.
     """
-    coordinates = {"bias": quantity("bias", "bias", bias)}
-    return data.with_(coords=coordinates, bias_V=quantity("bias_V", "bias", bias))
+    exact = data.assign(bias_V=quantity("bias_V", "bias", bias))
+    return exact.assign_coords(bias=quantity("bias", "bias", bias))
 
 
 def _resistance(heat_mW: Array, current_mA: Array) -> Array:
@@ -258,9 +258,9 @@ def circuit_of(data: xr.Dataset) -> Circuit:
     return Circuit.from_values(_section(data, "circuit"), "sweep: [circuit]")
 
 
-def with_ramp(data: PlainDataset, up: Mask) -> PlainDataset:
+def with_ramp(data: xr.Dataset, up: Mask) -> xr.Dataset:
     """Return a sweep whose rows, (n,), are known to be of the way up or of that down."""
-    return data.with_(coords={"ramp": quantity("ramp", "bias", np.where(up, "up", "down"))})
+    return data.assign_coords(ramp=quantity("ramp", "bias", np.where(up, "up", "down")))
 
 
 def checked_bias(bias: ArrayLike, probe: Probe, and_back: bool = False) -> Array:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import PlainDataset, dataset_of
 from hotlever.errors import ComputationError, InputError, as_far_as_possible
 from hotlever.lever.branch import TIP_RISE, Branch, Reach, Reading, branch_end, there_and_back
 from hotlever.lever.continuation import continued
@@ -266,6 +265,7 @@ class Lever:
             return State(self, guess)  # without power nothing leads along the branch
         return State(self, state_at_bias(self.equations, self.circuit, bias, guess, constraint))
 
+    @one_blas_thread
     def sweep(
         self,
         bias: ArrayLike,
@@ -311,17 +311,6 @@ class Lever:
         ones (`solve`), a third of the mesh's error, the highest temperature too; 5e-5 and 0.05 K
         where a leg gets hot faster than the tip.
         """
-        return dataset_of(lambda: self.swept(bias, sensitivities, and_back, progress))
-
-    @one_blas_thread
-    def swept(
-        self,
-        bias: ArrayLike,
-        sensitivities: bool = False,
-        and_back: bool = False,
-        progress: Progress | None = None,
-    ) -> PlainDataset:
-        """Return what `sweep` does, without waiting for xarray."""
         values = checked_bias(bias, self.probe, and_back)
         branch, reading, failure = self.read(values, progress, and_back=and_back)
         up = values.size
@@ -341,12 +330,9 @@ class Lever:
             raise failure
         return data
 
+    @one_blas_thread
     def dataset(self, states: Sequence[State], notes: Sequence[str] = ()) -> xr.Dataset:
         """Return what is observed of solved states, as `sweep` does."""
-        return self._observed(states, notes).dataset
-
-    @one_blas_thread
-    def _observed(self, states: Sequence[State], notes: Sequence[str]) -> PlainDataset:
         x = np.hstack([np.zeros((self.space.size + 1, 0)), *(state.x for state in states)])
         return dataset_of_states(self.probe, self.equations, x, notes)
 
@@ -366,7 +352,7 @@ class Lever:
         if branch.knee_u is None:
             end = f"{self.equations.laws.limit[1]}, with the tip at {branch.hottest_K:.0f} K"
             raise ComputationError(f"V_l rises until {end}: there is no knee")
-        return dataset_of_branch(self.probe, branch, np.array([branch.knee_u])).dataset
+        return dataset_of_branch(self.probe, branch, np.array([branch.knee_u]))
 
 
 @dataclass(frozen=True)

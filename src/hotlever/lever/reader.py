@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import PlainDataset, plain
+from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.dataset import checked_bias, probe_attributes
 from hotlever.lever.lever import Lever
@@ -157,18 +157,6 @@ def over_surface(
         If the reader cannot show anything, see `Reader`; if a bias is not finite, or heats nothing;
         or if the tip or the lever reaches the surface.
     """
-    return seen_over_surface(lever, distance_um, bias, noise, pressure_mbar, progress).dataset
-
-
-def seen_over_surface(
-    lever: Lever,
-    distance_um: ArrayLike,
-    bias: ArrayLike,
-    noise: NoiseOptions | None = None,
-    pressure_mbar: ArrayLike | None = None,
-    progress: Progress | None = None,
-) -> PlainDataset:
-    """Return what `over_surface` does, without waiting for xarray."""
     if pressure_mbar is not None:
         return _over_pressures(lever, distance_um, bias, noise, pressure_mbar, progress)
     reader = Reader(lever.probe, noise)
@@ -195,7 +183,7 @@ def seen_over_surface(
     columns["surface_gap_um"] = "distance", distances
     columns["bias_V"] = "bias", values
     notes += reading_notes(reader, distances, values, columns)
-    return plain(
+    return labelled(
         {**columns, "source_V_per_rtHz": by_source},
         ("distance", "bias"),
         {"distance": distances, "bias": values, "source": list(SOURCES)},
@@ -274,7 +262,9 @@ def _over_pressures(
     noise: NoiseOptions | None,
     pressure_mbar: ArrayLike,
     progress: Progress | None,
-) -> PlainDataset:
+) -> xr.Dataset:
+    import xarray as xr
+
     pressures, parts = np.atleast_1d(np.asarray(pressure_mbar, float)), []
     for number, pressure in enumerate(pressures.tolist()):
 
@@ -283,36 +273,29 @@ def _over_pressures(
                 progress(before * total + done, pressures.size * total)
 
         thin = lever.with_probe(lever.probe.with_(pressure_mbar=pressure))
-        parts.append(seen_over_surface(thin, distance_um, bias, noise, None, report_progress))
-    columns = {
-        name: (("pressure", *one.dims), np.stack([part[name].values for part in parts]), one.attrs)
-        for name, one in parts[0].data_vars.items()
-    }
-    notes = zip(pressures.tolist(), (part.attrs["notes"] for part in parts), strict=True)
-    alike = {
-        name: value
-        for name, value in parts[0].attrs.items()
-        if all(part.attrs[name] == value for part in parts)
-    }
-    alike["notes"] = "\n".join(f"{pressure:g} mbar: {note}" for pressure, note in notes if note)
-    data = plain({**columns, "pressure_mbar": pressures}, "pressure", {"pressure": pressures})
-    return data.with_(coords=parts[0].coords, attrs=alike)
+        part = over_surface(thin, distance_um, bias, noise, progress=report_progress)
+        parts.append(part.expand_dims(pressure=[pressure]))
+    data = xr.concat(parts, "pressure", data_vars="minimal", combine_attrs="drop_conflicts")
+    notes = [f"{part.pressure.item():g} mbar: {part.notes}" for part in parts if part.notes]
+    more = labelled({"pressure_mbar": pressures}, "pressure", {"pressure": pressures})
+    return (
+        data.assign_coords(more.coords).assign(more.variables).assign_attrs(notes="\n".join(notes))
+    )
 
 
-def rows_of(data: xr.Dataset | PlainDataset) -> PlainDataset:
+def rows_of(data: xr.Dataset) -> xr.Dataset:
     """Return the columns of a file of what `over_surface` gives, a row for each point."""
+    import xarray as xr
+
     columns = [
         *("surface_gap_um", "bias_V", "reader_ohm", "reader_V", "dV_dz_V_per_um", "dlnR_dz_per_um"),
         *("noise_V_per_rtHz", "resolution_nm_per_rtHz"),
         *(["pressure_mbar"] if "pressure" in data.sizes else []),
     ]
     order = [name for name in ("pressure", "distance", "bias") if name in data.sizes]
-    shape, rows = [data.sizes[name] for name in order], {}
-    for name in columns:
-        own = data[name]
-        values = own.values[tuple(slice(None) if dim in own.dims else None for dim in order)]
-        rows[name] = np.broadcast_to(values, shape).ravel()
-    return plain(rows, "row")
+    (full,) = xr.broadcast(data[columns])
+    rows = full.stack(row=order)
+    return labelled({name: rows[name].values for name in columns}, "row")
 
 
 def best_bias(

@@ -177,7 +177,7 @@ class _HeldAlong:
         branch, quantity = self._branch, self._quantity
         slope = quantity.slope(self._level(u), self._curves[1](u)) / branch.curve(u, 1)[:, TIP_RISE]
         notes = self._notes(values, number, slope, branch.tip_K(u))
-        data = dataset_of_states(self._lever.probe, branch.equations, x, notes).dataset
+        data = dataset_of_states(self._lever.probe, branch.equations, x, notes)
         own = {quantity.column: values, "state": number, quantity.slope_column: slope}
         states = [State(self._lever, x[:, [k]]) for k in range(u.size)]
         return HeldStates(data.assign(labelled(own).variables), states, self._whole())
@@ -250,7 +250,7 @@ class _HeldAlong:
         """Return the branch as a sweep, from its start to its end."""
         # as many points as a figure has
         u = np.linspace(self._lowest, self._branch.end_u, 200)
-        return dataset_of_branch(self._lever.probe, self._branch, u).dataset
+        return dataset_of_branch(self._lever.probe, self._branch, u)
 
     def _notes(self, values: Array, number: Array, slope: Array, tip_K: Array) -> list[str]:
         """Say where a set point tells little of the tip, and why."""

@@ -216,8 +216,7 @@ def _row(case: BranchCase) -> dict[str, float]:
     )
     slopes = branch.by_power.slope(branch.power(ends))
     parts = dataset_of_branch(case.probe, branch, branch.u_at(ends))
-    heater, legs = parts["heater_ohm"].values, parts["legs_ohm"].values
-    shares = heater / (heater + legs)
+    shares = (parts.heater_ohm / (parts.heater_ohm + parts.legs_ohm)).values
     thickness = PER_CM_TO_MILLI_PER_UM * conducted[1] * case.probe.layout().thickness_um
     return {
         "knee_K": knee,

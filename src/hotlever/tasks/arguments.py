@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from hotlever.datasets import PlainDataset
     from hotlever.lever import Lever
     from hotlever.lever.transient import Waveform
     from hotlever.probe import Probe
@@ -383,7 +382,7 @@ def make_lever(reporter: Reporter, probe: Probe, model: str = "flat") -> Lever:
         return Lever(probe, progress=update)
 
 
-def notes_of(data: xr.Dataset | PlainDataset) -> list[str]:
+def notes_of(data: xr.Dataset) -> list[str]:
     """Return what should be known of a dataset."""
     return [note for note in data.attrs["notes"].split("\n") if note]
 
@@ -401,7 +400,7 @@ def draw(path: Path | None, figure: Callable[[Any], Figure]) -> None:
 
 def give_table(
     reporter: Reporter,
-    data: xr.Dataset | PlainDataset,
+    data: xr.Dataset,
     columns: Sequence[str],
     output: Path | None,
     plot: Path | None,

@@ -33,7 +33,6 @@ from hotlever.units import bias_setting
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hotlever.datasets import PlainDataset
     from hotlever.lever import Lever, State
     from hotlever.lever.transient import Waveform
     from hotlever.types import Array
@@ -90,7 +89,6 @@ def sweep(
     biases = parse_bias(bias, changed.lowest_bias_V)
     meshed = make_lever(reporter, changed, model)
     states: list[State] = []
-    data: xr.Dataset | PlainDataset
     curve: xr.Dataset | None = None
     failure: ComputationError | None = None
     with reporter.progress("sweep") as update:
@@ -102,19 +100,19 @@ def sweep(
             data, states, curve = held_states.data, held_states.states, held_states.curve
         else:
             data, failure = as_far_as_possible(
-                lambda: meshed.swept(biases, and_back=and_back, progress=update)
+                lambda: meshed.sweep(biases, and_back=and_back, progress=update)
             )
-        if failure is not None and not data.sizes["bias"]:
+        if failure is not None and not data.bias.size:
             raise failure
         if fields is not None and not states:
-            solved = biases if and_back else data["bias_V"].values
+            solved = biases if and_back else data.bias_V.values
             states, ended = as_far_as_possible(
                 lambda: meshed.solve(solved, update, and_back=and_back)
             )
             failure = failure or ended
         if map is not None:
-            hottest = int(data["tip_K"].values.argmax())
-            (mapped,) = states[hottest:][:1] or meshed.solve([data["bias_V"].values[hottest]])
+            hottest = int(data.tip_K.values.argmax())
+            (mapped,) = states[hottest:][:1] or meshed.solve([data.bias_V.values[hottest]])
     reporter.note(*notes_of(data))
     give_table(
         reporter,
@@ -123,9 +121,7 @@ def sweep(
         output,
         plot,
         lambda figures: (
-            figures.sweep_overview(data.dataset)
-            if points is None
-            else figures.held_states(data, curve)
+            figures.sweep_overview(data) if points is None else figures.held_states(data, curve)
         ),
     )
     draw(map, lambda figures: figures.temperature_map(mapped))
@@ -211,9 +207,8 @@ def simulate_in_time(
         Folder for a page of the lever in time; goes without a wave form.
     """
     from hotlever.datasets import in_a_file
+    from hotlever.lever.transient import simulate, with_times
     from hotlever.lever.transient.history import TIME_COLUMNS
-    from hotlever.lever.transient.modes import times_of
-    from hotlever.lever.transient.trains import simulated
 
     if report is not None:
         why = "does not go with --report, which has wave forms of its own"
@@ -244,24 +239,23 @@ def simulate_in_time(
                 states.append(state)
 
         how: Any = {"per_step": per_step, "progress": update, "callback": keep}
-        curve, failure = as_far_as_possible(lambda: simulated(meshed, bias, end, times, **how))
+        curve, failure = as_far_as_possible(lambda: simulate(meshed, bias, end, times, **how))
     if ends:
-        curve = curve.with_(attrs=times_of(curve, ends[0], ends[-1], resolved=times is None))
-    data = curve.rows(slice(None, None, per_step), "time")
+        curve = with_times(curve, ends[0], ends[-1], resolved=times is None)
+    data = curve.isel(time=slice(None, None, per_step))
     reporter.note(*notes_of(data))
     reporter.tell_table(_times(data))
     drawn = plot if data.sizes["time"] else None
     columns = in_a_file(data, TIME_COLUMNS)
     give_table(
-        *(reporter, data, columns, output, drawn),
-        lambda figures: figures.history_overview(curve.dataset),
+        reporter, data, columns, output, drawn, lambda figures: figures.history_overview(curve)
     )
     if fields is not None:
         from hotlever.lever.fields import write_fields_in_time  # its formats take long to load
 
         write_fields_in_time(meshed, kept_at, states, output_folder(fields))
     if frames is not None and film is not None and frames.states:
-        _draw_film(reporter, curve.dataset, frames.states, film)
+        _draw_film(reporter, curve, frames.states, film)
     if failure is not None:
         raise failure
 
@@ -330,17 +324,16 @@ def _write_page(reporter: Reporter, lever: Lever, folder: Path) -> None:
     reporter.give(f"{page.write(folder)}\n")
 
 
-def _times(data: PlainDataset) -> list[list[str]]:
+def _times(data: xr.Dataset) -> list[list[str]]:
     """Return rows that say how hot the tip gets, and how fast."""
     import numpy as np
 
     rows, of = [], data.attrs
-    time, tip = (data[name].values for name in ("time_us", "tip_K"))
     if "tip_mean_K" in of:
         highest = f"{of['tip_highest_K']:.1f} K at {of['tip_highest_at_us']:.4g} µs"
-        end = f"{tip[-1]:.1f} K at {time[-1]:.4g} µs"
+        end = f"{data.tip_K.values[-1]:.1f} K at {data.time.values[-1]:.4g} µs"
         rows += [["tip, highest", highest], ["tip, at the end", end]]
-        took = np.ptp(time)
+        took = np.ptp(data.time.values)
         rows += [["tip, mean", f"{of['tip_mean_K']:.1f} K over {took:.4g} µs"]]
     for name in ("heating", "cooling"):
         time = data.attrs.get(f"{name}_us", math.nan)

@@ -27,7 +27,6 @@ from hotlever.units import setting
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hotlever.datasets import PlainDataset
     from hotlever.lever import Lever
     from hotlever.lever.noise import NoiseOptions
     from hotlever.probe import Probe
@@ -208,7 +207,7 @@ def approach(
     import numpy as np
 
     from hotlever.lever.lever import COARSE, Lever
-    from hotlever.lever.reader import Reader, best_bias, rows_of, seen_over_surface
+    from hotlever.lever.reader import Reader, best_bias, over_surface, rows_of
 
     distances = parse_distances(distance)
     noise = reader_noise(bandwidth, amplifier, hooge, vibration)
@@ -230,8 +229,8 @@ def approach(
     above = jumping_at_tip(reporter, coarse, float(biases[biases.size // 2]))
     meshed = make_lever(reporter, above)
     with reporter.progress("distances") as update:
-        data = seen_over_surface(meshed, distances, biases, noise, pressures, update)
-    if not np.isfinite(data["tip_K"].values).any():
+        data = over_surface(meshed, distances, biases, noise, pressures, progress=update)
+    if not np.isfinite(data.tip_K.values).any():
         raise ComputationError(notes_of(data)[0])
     if not reader.is_held and above.circuit.swept != "reader":
         reporter.note(
@@ -241,10 +240,11 @@ def approach(
     reporter.note(*notes_of(data), "that films bend the lever when it gets warm is left out")
     reporter.tell_table(best_resolved(data, noise))
     rows = rows_of(data)
+    columns = [str(name) for name in rows.data_vars]
     whole = output is not None and output.suffix.lower() == ".nc"
+    table = data if whole else rows
     give_table(
-        *(reporter, data if whole else rows, list(rows.data_vars), output, plot),
-        lambda figures: figures.reader_overview(data.dataset),
+        reporter, table, columns, output, plot, lambda figures: figures.reader_overview(data)
     )
 
 
@@ -312,14 +312,15 @@ def reader_noise(
     )
 
 
-def best_resolved(data: PlainDataset, noise: NoiseOptions) -> list[list[str]]:
+def best_resolved(data: xr.Dataset, noise: NoiseOptions) -> list[list[str]]:
     """Return rows that say how well the best distance and bias are resolved, and by what."""
     import numpy as np
 
-    density = data["resolution_nm_per_rtHz"]
+    density = data.resolution_nm_per_rtHz
     if not np.isfinite(density.values).any():
         return []
-    place = np.unravel_index(np.nanargmin(density.values), density.values.shape)
+    # by its values: at one point xarray would import Dask, which takes as long as to solve a lever
+    place = np.unravel_index(np.nanargmin(density.values), density.shape)
     number = dict(zip(density.dims, place, strict=True))
 
     def best(name: str) -> Any:
@@ -335,7 +336,7 @@ def best_resolved(data: PlainDataset, noise: NoiseOptions) -> list[list[str]]:
         ["noise", f"{1e9 * best('noise_V_per_rtHz'):.3g} nV/√Hz, of its square"],
     ]
     shares = (best("source_V_per_rtHz") / best("noise_V_per_rtHz")) ** 2
-    for source, share in zip(data.coords["source"].values.tolist(), shares.tolist(), strict=True):
+    for source, share in zip(data.source.values.tolist(), shares.tolist(), strict=True):
         if share:
             rows.append([f"  {source}", f"{100 * share:.3g} %"])
     if not noise.hooge:

@@ -49,7 +49,7 @@ def test_periods_that_are_alike_are_copied(coarse):
     reduced = reduced_in_time(coarse, np.hstack(snapshots))
     at = np.array([0.0, *TIMES, 403.0, 430.0])
     train = Train(reduced, TRAIN, 20.0, 430.0, at, 0.1)
-    copied, full = train.history.dataset, integrate(reduced, TRAIN, 430.0, at)
+    copied, full = train.history, integrate(reduced, TRAIN, 430.0, at)
     assert 4 < train.cyclic_from < 16
     np.testing.assert_array_equal(copied.time_us, at)
     np.testing.assert_array_equal(copied.bias_V, full.bias_V)

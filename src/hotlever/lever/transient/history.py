@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import PlainDataset, dataset_of, plain, write_dataset
+from hotlever.datasets import labelled, write_dataset
 from hotlever.errors import ComputationError, HistoryEndError, InputError
 from hotlever.lever.dataset import (
     MonitorMap,
@@ -97,24 +97,13 @@ def integrate(
     waveform: Waveform,
     until: float | None = None,
     at: ArrayLike | None = None,
-    **options: Any,
-) -> xr.Dataset:
-    """Integrate a lever in time under a bias that changes; see `followed`."""
-    return dataset_of(lambda: followed(lever, waveform, until, at, **options))
-
-
-def followed(
-    lever: Lever,
-    waveform: Waveform,
-    until: float | None = None,
-    at: ArrayLike | None = None,
     *,
     tolerance_K: float = 0.1,
     per_step: int = 1,
     start: State | None = None,
     callback: Callable[[float, State], None] | None = None,
     progress: Progress | None = None,
-) -> PlainDataset:
+) -> xr.Dataset:
     """Integrate a lever in time under a bias that changes.
 
     Parameters
@@ -143,7 +132,7 @@ def followed(
 
     Returns
     -------
-    PlainDataset
+    xarray.Dataset
         One variable for each of `TIME_COLUMNS`, the highest temperature and the energies on the
         dimension ``time`` (µs); probe, material, circuit, wave form and version as attributes.
 
@@ -291,7 +280,7 @@ def checked_times(at: ArrayLike) -> Array:
     return times
 
 
-def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> PlainDataset:
+def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> xr.Dataset:
     monitors, count = recorder.monitors, len(_REPORTED)
     values = np.array(recorder.values).reshape(len(recorder.time), count + monitors.size)
     columns = dict(zip(_REPORTED, values[:, :count].T, strict=True))
@@ -308,7 +297,7 @@ def _dataset(lever: Lever, waveform: Waveform, recorder: _Recorder) -> PlainData
     return history_dataset(lever, waveform, variables)
 
 
-def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Array]) -> PlainDataset:
+def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Array]) -> xr.Dataset:
     """Return the dataset of a history of its columns, with notes on what it leaves out."""
     time, columns = columns["time_us"], with_following(lever.probe, columns)
     at_rest = lever.medium == "air" and not lever.equations.heat_in_air.size
@@ -319,7 +308,7 @@ def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Arra
     notes = [air_note] if at_rest else []
     notes += range_notes(lever.equations.laws.made_of, "{} µs on", time, columns["max_K"])
     variables, coordinates = with_meanings(lever.probe, columns, "time")
-    return plain(
+    return labelled(
         variables,
         "time",
         {"time": time, **coordinates},

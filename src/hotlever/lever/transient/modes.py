@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from hotlever.datasets import PlainDataset, labelled
+from hotlever.datasets import labelled
 from hotlever.errors import ComputationError, unknown_name
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import State
@@ -203,18 +203,11 @@ def time_constants(
 def with_times(
     history: xr.Dataset, start: State, end: State, *, resolved: bool = True
 ) -> xr.Dataset:
-    """Return a history with how fast it is, as attributes; they are those of `times_of`."""
-    return history.assign_attrs(times_of(history, start, end, resolved=resolved))
-
-
-def times_of(
-    history: xr.Dataset | PlainDataset, start: State, end: State, *, resolved: bool = True
-) -> dict[str, Any]:
-    """Return how fast a history is.
+    """Return a history with how fast it is, as attributes.
 
     Parameters
     ----------
-    history : xarray.Dataset or PlainDataset
+    history : xarray.Dataset
     start, end : State
         At its beginning and end.
     resolved : bool
@@ -222,16 +215,16 @@ def times_of(
 
     Returns
     -------
-    dict of str
-        The slowest ``time_constants_us_at_start`` and ``time_constants_us_at_end``, in the
+    xarray.Dataset
+        With the slowest ``time_constants_us_at_start`` and ``time_constants_us_at_end``, in the
         circuit; and, of a resolved one, the highest temperature of the tip, when it has that, and
         its mean over the whole time, ``tip_highest_K``, ``tip_highest_at_us`` and ``tip_mean_K``;
         ``heating_us`` and ``cooling_us``: from 10 to 90 % of the way from the colder of its ends to
         its hottest tip, NaN where there is no such time, or no rise.
     """
     attributes: dict[str, Any] = {}
-    if resolved and history.sizes["time"] > 1:
-        time, tip = history["time_us"].values, history["tip_K"].values
+    if resolved and history.time.size > 1:
+        time, tip = history.time.values, history.tip_K.values
         low, high = min(tip[0], tip[-1]), tip.max()
         # less than this is no heating: beside it count errors of steps and of a state at rest
         heats = high - low > 1e-4
@@ -243,7 +236,7 @@ def times_of(
     for name, state in (("start", start), ("end", end)):
         with suppress(ComputationError):  # none are known, such as where silicon melts
             attributes[f"time_constants_us_at_{name}"] = slowest_modes(state)[0]
-    return attributes
+    return history.assign_attrs(attributes)
 
 
 def _swing(time: Array, share: Array) -> tuple[float, float]:

@@ -20,12 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hotlever.datasets import PlainDataset, dataset_of
 from hotlever.errors import ComputationError
 from hotlever.lever.lever import State
 from hotlever.lever.transient.history import (
     checked_times,
-    followed,
     history_dataset,
     initial_state,
     integrate,
@@ -75,11 +73,17 @@ class TrainOptions:
     extrapolated_from: int = 4
 
 
+@one_blas_thread
 def simulate(
     lever: Lever,
     waveform: Waveform,
     until: float | None = None,
     at: ArrayLike | None = None,
+    *,
+    tolerance_K: float = 0.1,
+    start: State | None = None,
+    callback: Callable[[float, State], None] | None = None,
+    trains: TrainOptions | None = None,
     **options: Any,
 ) -> xr.Dataset:
     """Simulate a lever in time, on modes if the wave form is repeated often and they suffice.
@@ -95,23 +99,6 @@ def simulate(
     >>> history.tip_K.values.round().tolist()
     [410.0, 293.0]
     """
-    return dataset_of(lambda: simulated(lever, waveform, until, at, **options))
-
-
-@one_blas_thread
-def simulated(
-    lever: Lever,
-    waveform: Waveform,
-    until: float | None = None,
-    at: ArrayLike | None = None,
-    *,
-    tolerance_K: float = 0.1,
-    start: State | None = None,
-    callback: Callable[[float, State], None] | None = None,
-    trains: TrainOptions | None = None,
-    **options: Any,
-) -> PlainDataset:
-    """Return what `simulate` does, without waiting for xarray."""
     lever = lever.in_pulses()
     end, period = waveform.usual_end if until is None else until, waveform.period
     if at is not None and until is None:
@@ -127,7 +114,7 @@ def simulated(
         except ComputationError:
             pass  # it melts, or is like no train that modes are good for
     options |= {"tolerance_K": tolerance_K, "start": start, "callback": callback}
-    return followed(lever, waveform, until, at, **options)
+    return integrate(lever, waveform, until, at, **options)
 
 
 def _on_modes(
@@ -140,7 +127,7 @@ def _on_modes(
     callback: Callable[[float, State], None] | None,
     trains: TrainOptions,
     **options: Any,
-) -> PlainDataset:
+) -> xr.Dataset:
     """Return the history on modes that are certified.
 
     Raises
@@ -197,7 +184,8 @@ def _on_modes(
     )
     if train.cyclic_from is not None:
         note += f"; from period {train.cyclic_from + 1} on all are alike"
-    return history.with_(attrs={"notes": "\n".join(filter(None, [history.attrs["notes"], note]))})
+    history.attrs["notes"] = "\n".join(filter(None, [history.attrs["notes"], note]))
+    return history
 
 
 class Train:
