@@ -65,9 +65,12 @@ def test_a_fit_in_either_medium_is_one_in_the_better(cold):
     own = fit(cold, medium=either.medium, usual_priors=True, priors=priors)
     assert either.options.medium == either.medium
     # but for rounding: factorisations begin with the pivots of what was solved before
-    assert {name: parameter.value for name, parameter in either.parameters.items()} == (
-        pytest.approx({name: parameter.value for name, parameter in own.parameters.items()}, 1e-6)
-    )
+    away = [
+        (parameter.value - own.parameters[name].value) / own.parameters[name].stderr
+        for name, parameter in either.parameters.items()
+        if parameter.vary
+    ]
+    np.testing.assert_allclose(away, 0.0, atol=1e-5)
     assert np.all(either.band.tip_stderr_K >= own.band.tip_stderr_K)
     assert either.band.tip_stderr_K[-1] > 1.05 * own.band.tip_stderr_K[-1]
 

@@ -296,7 +296,7 @@ def test_nothing_is_kept_of_a_class_whose_code_may_change(monkeypatch, tmp_path)
     (tmp_path / "a.csv").write_text("V_b (V),I_h (mA)\n1,0.1\n2,0.2\n3,0.3\n")
     # a fit that was written before is not looked for
     monkeypatch.setattr(many, "_written_before", lambda *_: pytest.fail("taken again"))
-    monkeypatch.setattr(many, "_executor", lambda *_: nullcontext())
+    monkeypatch.setattr(many, "local_executor", lambda *_: nullcontext())
     monkeypatch.setattr(many, "_not_reduced", lambda *_: {})
     monkeypatch.setattr(many, "run_all", lambda *_: [])
     assert not fit_many([tmp_path / "a.csv"], tmp_path / "out", probe).failures
