@@ -182,8 +182,10 @@ def moved(before: dict[str, list[Any]], now: dict[str, list[Any]]) -> Iterator[t
                 yield math.inf, f"{name}: {old} is {new}"
             elif old is not None:
                 kelvin = name.endswith("_K")
-                allowed = OF_ERROR * error if error else KELVIN if kelvin else RELATIVE * largest
-                yield abs(new - old) / (allowed or RELATIVE), f"{name}: {old:g} is {new:g}"
+                # a column may hold rounding alone, as of the power while a bias is off
+                share = RELATIVE * (largest if largest > 1e-12 else 1.0)
+                allowed = OF_ERROR * error if error else KELVIN if kelvin else share
+                yield abs(new - old) / allowed, f"{name}: {old:g} is {new:g}"
 
 
 def store(stored: dict[str, Any]) -> None:
