@@ -4,8 +4,8 @@ M. Spieser, C. Rawlings, E. Lörtscher, U. Duerig, A. W. Knoll, "Comprehensive m
 Joule heated cantilever probes", J. Appl. Phys. 121, 174503 (2017), doi:10.1063/1.4981883,
 arXiv:1711.09582: Tables I and II, the operating points, Eq. 12 and k, the Raman thermometer, and
 how the measurements were made. The laws of Eqs. 4 to 11 and 13 are in
-`hotlever.materials.silicon`, `hotlever.materials.silicon` and `hotlever.materials.heat`, the tables
-as sets of parameters in `hotlever.materials.presets`.
+`hotlever.materials.silicon` and `hotlever.materials.heat`, the tables as sets of parameters in
+`hotlever.materials.presets`.
 """
 
 from __future__ import annotations

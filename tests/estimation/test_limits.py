@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,8 +18,8 @@ from hotlever.estimate.objective import (
     Subproblem,
 )
 from hotlever.estimate.options import Numerics
-from hotlever.estimate.posterior import Posterior, profile_of_tip
-from hotlever.estimate.sampling import sample_tip, sampled_limits_note
+from hotlever.estimate.posterior import ErrorProfile, Posterior, profile_of_tip
+from hotlever.estimate.sampling import SampledTip, sample_tip
 from hotlever.estimate.tip_temperature import error_of_model
 from hotlever.probe.priors import Prior
 from hotlever.probe.surroundings import Surroundings
@@ -159,17 +160,22 @@ def test_quantiles_of_the_posterior_are_those_of_what_is_unknown():
     """x is normal, so that the quantiles of the tip are the tips at 1.96 standard errors."""
     bend = 0.12
     predictor = SimpleNamespace(others=lambda at: [], experiment=None)
-    found, effective = sample_tip(posterior(bend), predictor, samples=2000)
-    assert effective > 500
-    low, high = found.credible_interval(TIPS[1:], SLOPES[1:], np.zeros(2))
+    found = sample_tip(posterior(bend), predictor, samples=2000)
+    assert found.enough
+    assert found.effective_samples > 500
+    low, high = found.profile.credible_interval(TIPS[1:], SLOPES[1:], np.zeros(2))
     x = BAND * np.array([[-1.0], [1.0]])
     expected = TIPS[1:] + SLOPES[1:] * (x + bend * x**2)
     np.testing.assert_allclose([low, high], expected, atol=0.12 * BAND * SLOPES[-1])
 
 
 def test_few_posterior_samples_are_not_enough():
-    assert "between quantiles" in sampled_limits_note(450.0, fewest=400)
-    assert sampled_limits_note(139.0, fewest=400).startswith("too few posterior samples")
+    enough = SampledTip(ErrorProfile(TIPS, TIPS, TIPS), effective_samples=450.0, fewest=400)
+    assert enough.enough
+    assert "between quantiles" in enough.note
+    few = replace(enough, effective_samples=139.0)
+    assert not few.enough
+    assert few.note.startswith("too few posterior samples")
 
 
 def test_what_the_model_leaves_open_is_an_error_of_it():

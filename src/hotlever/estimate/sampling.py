@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -273,15 +273,40 @@ class SampledLever:
 # --- the tip of a calibration -------------------------------------------------------------------
 
 
-def sampled_limits_note(effective: float, fewest: int) -> str:
-    """Say that limits are from samples worth so many independent ones, or why not, being fewer."""
-    worth = f"worth {effective:.0f} independent ones"
-    if effective >= fewest:
-        return f"95 % of the tip temperatures lie between quantiles of posterior samples, {worth}"
-    return (
-        f"too few posterior samples: {worth}, where {fewest} are expected; the limits are those "
-        "without samples, take more"
-    )
+@dataclass(frozen=True)
+class SampledTip:
+    """What posterior samples say of the tip temperature.
+
+    Attributes
+    ----------
+    profile : ErrorProfile
+        From the quantiles of 2.5 and 97.5 %.
+    effective_samples : float
+    fewest : int
+        So many are expected.
+    """
+
+    profile: ErrorProfile
+    effective_samples: float
+    fewest: int
+
+    @property
+    def enough(self) -> bool:
+        """Whether the quantiles can be trusted."""
+        return self.effective_samples >= self.fewest
+
+    @property
+    def note(self) -> str:
+        """What the limits are from, or why not from these samples."""
+        worth = f"worth {self.effective_samples:.0f} independent ones"
+        if self.enough:
+            return (
+                f"95 % of the tip temperatures lie between quantiles of posterior samples, {worth}"
+            )
+        return (
+            f"too few posterior samples: {worth}, where {self.fewest} are expected; the limits are "
+            "those without samples, take more"
+        )
 
 
 def sample_tip(
@@ -290,12 +315,11 @@ def sample_tip(
     *,
     samples: int,
     progress: Progress | None = None,
-) -> tuple[ErrorProfile, float]:
+) -> SampledTip:
     """Sample the parameters of an estimate, and their tip temperatures.
 
     Levers that the predictor has solved far enough from the optimum say how values bend. What is
-    sampled costs too little for processes of its own. Of the tip's quantiles of 2.5 and 97.5 % the
-    profile is returned, and how many independent samples they are from.
+    sampled costs too little for processes of its own.
     """
     objective, at, experiment = posterior.objective, posterior.at, predictor.experiment
     if isinstance(experiment, ExperimentAtRest) and at.probe.circuit.starts_cold:
@@ -313,7 +337,7 @@ def sample_tip(
     )
     low, high = np.percentile(tips, (2.5, 97.5), axis=0)
     sides = (middle - low) / (BAND * stderr), (high - middle) / (BAND * stderr)
-    return ErrorProfile(middle, *sides), effective
+    return SampledTip(ErrorProfile(middle, *sides), effective, trials.options.fewest_effective)
 
 
 # --- the parameters of a fit --------------------------------------------------------------------

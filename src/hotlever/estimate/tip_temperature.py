@@ -433,16 +433,12 @@ def _credible_interval(
         if not informed:
             raise InputError("posterior: expected priors, without which it is not that of a fit")
         # what samples takes a second to load, for which few calibrations have to wait
-        from hotlever.estimate.sampling import sample_tip, sampled_limits_note
+        from hotlever.estimate.sampling import sample_tip
 
-        fewest = solution.residuals.numerics.trials.fewest_effective
-        sampled, effective = sample_tip(
-            posterior, solution.predictor, samples=samples, progress=progress
-        )
-        note = sampled_limits_note(effective, fewest)
-        if effective >= fewest:
-            return *sampled.credible_interval(tip, stderr, of_model), note
-        too_few = note
+        sampled = sample_tip(posterior, solution.predictor, samples=samples, progress=progress)
+        if sampled.enough:
+            return *sampled.profile.credible_interval(tip, stderr, of_model), sampled.note
+        too_few = sampled.note
     profile = profile_of_tip(posterior, solution.predictor.experiment) if informed else None
     if profile is None or profile.linear:
         away = BAND * np.hypot(stderr, of_model)

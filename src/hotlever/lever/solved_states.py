@@ -139,11 +139,12 @@ def solve_at(
     """
     problem = Constrained(equations, parametrisation.constraint(u), parametrisation.values(u))
     roots = find_roots(problem, guess, options, factors, fresh=fresh)
-    if not parametrisation.reversed_at(u, roots.x).any():
+    is_reversed = parametrisation.reversed_at(u, roots.x)
+    if not is_reversed.any():
         return roots
     # Newton's method went past the state without a current, to one of the other polarity
     potentials = ~equations.space.is_temperature[:, None]
-    turned = np.where(potentials & parametrisation.reversed_at(u, roots.x), -roots.x, roots.x)
+    turned = np.where(potentials & is_reversed, -roots.x, roots.x)
     roots = find_roots(problem, turned, options)
     if parametrisation.reversed_at(u, roots.x).any():
         raise NewtonError("only states of the other polarity were found", partial=roots.x)
