@@ -330,6 +330,8 @@ def test_reproduce_writes_the_page(run, tmp_path):
         (("sweep", "boron-lever.toml", "--set", "n_d=1e17"), "'n_d': did you mean 'hot.n_d'?"),
         (("sweep", "--set", "leg_um=3"), "unknown name 'leg_um': did you mean 'leg_width_um'?"),
         (("sweep", "--set", "surface_gap_um=1"), "--set surface_gap_um: counts in air, and this"),
+        (("sweep", "--set", "medium=air", "--medium", "vacuum"), "--set medium and --medium:"),
+        (("sweep", "--set", "radiation=true", "--physics", "none"), "radiation and --physics:"),
         (
             ("design", "--minimise", "tip_K", "--at", "700K", "--within", "heater_width_um=1:2"),
             "--minimise tip_K: it is what --at 700K holds, expected another quantity",

@@ -363,8 +363,8 @@ def amount(
     scale = behind if unit is None else conversion(unit, inside)
     if unit is not None and scale is None:
         raise unknown_unit(unit, inside, where)
-    # as in 5.6x, or with a setting of something else behind it
-    odd = (behind is None and rest[:1].strip(" ,;([±")) or re.search("[=:]", rest)
+    # as in 5.6x, or with a setting of something else behind it, or a sum
+    odd = (behind is None and rest[:1].strip(" ,;([±")) or re.search(r"[=:]|[+*/]\s*\d", rest)
     unclear = may_be_thousands(text, thousands)
     if number is None or odd or unclear:
         if unit is not None:

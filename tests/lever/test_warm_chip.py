@@ -97,6 +97,8 @@ def test_a_long_pulse_ends_where_a_lever_on_its_chip_rests(coarse):
     rest = on_chip.in_pulses().sweep([5.0])
     assert history.tip_K.values[0] == pytest.approx(293.0, abs=0.01)
     assert history.tip_K.values[1] == pytest.approx(rest.tip_K.item(), abs=0.3)
+    assert "the holder of the chip stays cold" in history.notes
+    assert simulate(on_chip.in_pulses(), pulse(5.0, 1.0), at=[1.0]).notes == ""
 
 
 def test_calibrations_are_on_a_chip_unless_laws_are_the_papers():

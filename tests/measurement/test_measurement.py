@@ -121,6 +121,8 @@ def test_settings_as_people_write_them(tmp_path, comment, ohm, kelvin, medium):
         *("base temprature (K): 300", "base temperature is 300 K", "T0 = 12:30", "T_base: 68 F"),
         *("medium air", "medium:", "gas: on", "pressure: low", "p = 2.65", "293 K"),
         *("bias resistor: 10k", "resistance 10", "stage temperature = 353", "temp: 80", "T: 353"),
+        *("gas_conductivity: 0.5", "surface_gap_um = 3", "surroundings.accommodation = 0.9"),
+        *("R_s: 5.6 kOhm + 20 Ohm", "chip_K_per_mW: 2"),
     ],
 )
 def test_what_looks_like_a_setting_and_is_not_clear_is_noted(tmp_path, comment):
@@ -130,7 +132,9 @@ def test_what_looks_like_a_setting_and_is_not_clear_is_noted(tmp_path, comment):
     assert f"data.csv: line 1: '# {comment}' is not understood and not used" in note
 
 
-@pytest.mark.parametrize("comment", ["lever C", "2024-05-01 12:30", "laser: 532 nm", "RS-232"])
+@pytest.mark.parametrize(
+    "comment", ["lever C", "chip: 3", "2024-05-01 12:30", "laser: 532 nm", "RS-232"]
+)
 def test_other_comments_are_no_matter(tmp_path, comment):
     assert read(tmp_path, f"# {comment}\n{PLAIN}").notes == ()
 

@@ -42,6 +42,7 @@ from hotlever.measurement.rows import (
 )
 from hotlever.probe import Circuit, Probe
 from hotlever.probe.priors import share_of
+from hotlever.probe.surroundings import Surroundings
 from hotlever.quantities import FITTED, MEASURANDS
 from hotlever.tables import TextTable, groups_in
 from hotlever.types import Array, Mask
@@ -277,6 +278,9 @@ def _setting(text: str, where: str, thousands: str) -> dict[str, Any] | None:
     units = unit or "", unit_behind(rest)
     measured = any(conversion(each, inside) for each in units for inside in ("ohm", "K", "mbar"))
     measured = measured and (number is not None or key[-1:] in (")", "]"))
+    # of a probe file, where alone it counts; a chip or a swept terminal may be anything else's
+    of_a_probe = {*Circuit.model_fields, *Surroundings.model_fields} - {"chip", "swept"}
+    measured |= bool(value) and key.rpartition(".")[2] in of_a_probe
     # what seems to be a setting is said to be unclear
     alike = (
         r"(?i)(?:series.?resist|base.?temp|(?:medium|pressure)\b)"

@@ -7,7 +7,7 @@ with one that names what is written, what that is (`Written`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -262,6 +262,13 @@ def at_most_one(**options: Any) -> None:
         raise InputError(f"{' and '.join(stated)}: expected only one of them")
 
 
+def refuse_set(changes: Iterable[str], option: str, keys: Collection[str]) -> None:
+    """Refuse what ``--set`` says, by name, of `keys` that an option states too."""
+    for name in changes:
+        if name.rpartition(".")[2] in keys:
+            raise InputError(f"--set {name} and --{option}: expected only one of them")
+
+
 def check_medium(medium: str | None, *more: str) -> None:
     """Refuse a medium that does not exist."""
     from hotlever.probe.surroundings import Medium
@@ -324,12 +331,15 @@ def read_probe(
         If the file, or one of these, is at fault.
     """
     from hotlever.probe import Probe
+    from hotlever.probe.surroundings import Physics
 
     probe = Probe.reference() if path is None else Probe.from_file(path)
-    probe = probe.with_(**parse_settings(settings, probe)) if settings else probe
+    changes = parse_settings(settings, probe)
+    probe = probe.with_(**changes) if changes else probe
     reporter.note(*probe.shape.notes())
     if physics is None:
         return probe
+    refuse_set(changes, "physics", Physics.model_fields)
     names = [name.strip() for name in physics.split(",")]
     return probe.with_physics(() if names == ["none"] else names, "--physics")
 
@@ -346,7 +356,9 @@ def read_surrounded_probe(
 
     check_medium(lever.medium)
     probe = read_probe(reporter, lever.probe, lever.set, lever.physics)
-    probe = probe if lever.medium is None else probe.in_medium(lever.medium)
+    if lever.medium is not None:
+        refuse_set(parse_settings(lever.set, probe), "medium", ["medium"])
+        probe = probe.in_medium(lever.medium)
     if probe.surroundings.medium == "vacuum" and not finds_air:
         for name, value in parse_settings(lever.set, probe).items():
             section, key, _ = field_of(probe, name)

@@ -89,7 +89,8 @@ def simulate(
     """Simulate a lever in time, on modes if the wave form is repeated often and they suffice.
 
     Parameters and errors are those of `hotlever.lever.transient.history.integrate`; ``notes`` of
-    the dataset say whether modes were used, and how far from the full lever they are.
+    the dataset say whether modes were used, and how far from the full lever they are, and that
+    a warm holder of the chip is left out.
 
     Examples
     --------
@@ -99,7 +100,15 @@ def simulate(
     >>> history.tip_K.values.round().tolist()
     [410.0, 293.0]
     """
-    lever = lever.in_pulses()
+    at_rest, lever = lever.circuit.chip_K_per_mW, lever.in_pulses()
+    in_time = lever.circuit.chip_K_per_mW
+    if in_time < at_rest:
+        cold_holder = (
+            f"the holder of the chip stays cold: leg ends get warmer by {in_time:.2g} K/mW, which "
+            f"is what spreads in the chip, and not by chip_K_per_mW = {at_rest:g} as at rest"
+        )
+    else:
+        cold_holder = ""
     end, period = waveform.usual_end if until is None else until, waveform.period
     if at is not None and until is None:
         end = float(checked_times(at)[-1])
@@ -110,11 +119,12 @@ def simulate(
     if period is not None and often and trains.fewest * period <= end and cold:
         try:
             how: Any = {"callback": callback, "trains": trains, **options}
-            return _on_modes(lever, waveform, period, end, at, tolerance_K, **how)
+            history = _on_modes(lever, waveform, period, end, at, tolerance_K, **how)
+            return _with_note(history, cold_holder)
         except ComputationError:
             pass  # it melts, or is like no train that modes are good for
     options |= {"tolerance_K": tolerance_K, "start": start, "callback": callback}
-    return integrate(lever, waveform, until, at, **options)
+    return _with_note(integrate(lever, waveform, until, at, **options), cold_holder)
 
 
 def _on_modes(
@@ -184,6 +194,10 @@ def _on_modes(
     )
     if train.cyclic_from is not None:
         note += f"; from period {train.cyclic_from + 1} on all are alike"
+    return _with_note(history, note)
+
+
+def _with_note(history: xr.Dataset, note: str) -> xr.Dataset:
     history.attrs["notes"] = "\n".join(filter(None, [history.attrs["notes"], note]))
     return history
 
