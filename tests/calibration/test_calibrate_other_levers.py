@@ -74,6 +74,18 @@ def test_a_lever_in_air_is_estimated_in_air(lever, reference):
     assert by_rule.k == pytest.approx(calibration.k, rel=0.05)
 
 
+def test_k_is_no_surer_than_the_knee_in_vacuum_that_nobody_measured(in_air, coarse):
+    """It had the error of the knee in air alone, which data show: a tenth of what it is off by."""
+    air = in_air.branch()
+    curve = measured_curve(air, np.random.default_rng(5), to_V=12.0)
+    calibration = calibrate(measurement_of(curve), medium="air")
+    knee, k = calibration.knee, calibration.k
+    true = air.need_knee().power_mW / coarse.branch().need_knee().power_mW
+    assert abs(k - true) < 3.0 * calibration.k_stderr
+    assert 0.02 * k < calibration.k_stderr < 0.06 * k
+    assert calibration.k_stderr / k > 5.0 * knee.power_mW_stderr / knee.power_mW
+
+
 @pytest.mark.slow
 def test_a_fit_in_vacuum_is_what_is_known_before_a_measurement_in_air(in_air, reference):
     """What the fit knows of material and dimensions narrows the band in air."""

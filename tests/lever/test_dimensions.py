@@ -11,6 +11,7 @@ from experiments import full_experiment
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever.branch import Reach
 from hotlever.lever.lever import COARSE, Lever
+from hotlever.lever.observables import shown_at_knee_by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import heat as heat_laws
 from hotlever.probe import Probe
@@ -161,3 +162,20 @@ def test_dimensions_that_hold_parts_together_are_held():
         SimilarLevers(Lever(probe, COARSE)).equations(probe, ("gap_um",))
     # what remains can move
     SimilarLevers(Lever(probe, COARSE)).linearised(probe, REACH, None, tuple(nuisances(probe)))
+
+
+@pytest.mark.parametrize("name", ["heater_length_um", "c_kappa", "base_temperature_K"])
+def test_what_the_knee_shows_moves_as_its_derivatives_say(coarse, name):
+    similar, probe, reach = SimilarLevers(coarse), coarse.probe, Reach(coarse.circuit, 10.0)
+    solved = similar.linearised(probe, reach, None, (name,))
+    branch = solved.branch
+    slopes = shown_at_knee_by_parameter(branch, branch.u, solved.output_slopes)[:, 0]
+    (value,), share = probe.values([name]).tolist(), 1e-3
+    ends = [
+        similar.linearised(probe.replace({name: value + way}), reach, solved, (name,)).branch
+        for way in (share * value, -share * value)
+    ]
+    above, below = (each.curve(each.knee_u) for each in ends)
+    # V, mA, V and K for twice the value; the knee of a lever with another κ is as hot
+    moved = (above - below) / (2.0 * share)
+    np.testing.assert_allclose(value * slopes, moved, rtol=1e-2, atol=0.02)

@@ -164,10 +164,29 @@ def at_fixed_bias(
     return np.moveaxis(output_slopes + along[:, :, None] * u_by_parameter[:, None], 1, 0)
 
 
-def knee_by_parameter(branch: Branch, output_slopes: Array, names: Sequence[str]) -> Array:
-    """Return how the tip temperature where V_l is highest changes with parameters, (p,).
+def shown_at_knee_by_parameter(branch: Branch, u: Array, output_slopes: Array) -> Array:
+    """Return how V_l, I_h, V_r and the rise of the tip where V_l is highest change, (4, p).
 
     A parameter bends V_l at fixed rises of the tip; its maximum moves until it is level again.
+
+    Parameters
+    ----------
+    branch : Branch
+        One that has a knee.
+    u : ndarray, shape (k,)
+        Rising; of some of its states about the knee, or of all.
+    output_slopes : ndarray, shape (k, 4, p)
+        Derivatives of what these show by parameters, see `by_parameter`.
+    """
+    at = branch.knee_u
+    assert at is not None
+    slopes = spline_through(u, output_slopes, 5)
+    u_by_parameter = -slopes(at, 1)[0] / branch.curve(at, 2)[0]
+    return np.asarray(slopes(at) + branch.curve(at, 1)[:, None] * u_by_parameter)
+
+
+def knee_by_parameter(branch: Branch, output_slopes: Array, names: Sequence[str]) -> Array:
+    """Return how the tip temperature where V_l is highest changes with parameters, (p,).
 
     Parameters
     ----------
@@ -178,13 +197,8 @@ def knee_by_parameter(branch: Branch, output_slopes: Array, names: Sequence[str]
     names : sequence of str
         The parameters.
     """
-    u = branch.knee_u
-    assert u is not None
-    steeper = spline_through(branch.u, output_slopes[:, 0], 5).derivative()(u)
-    along, curvature = branch.curve(u, 1)[TIP_RISE], branch.curve(u, 2)[0]
-    return np.asarray(
-        -along * steeper / curvature + [float(name == "base_temperature_K") for name in names]
-    )
+    shown = shown_at_knee_by_parameter(branch, branch.u, output_slopes)
+    return shown[TIP_RISE] + [float(name == "base_temperature_K") for name in names]
 
 
 # --- derivatives by parameters --------------------------------------------------------------------
