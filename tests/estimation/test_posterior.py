@@ -234,14 +234,14 @@ def test_band_holds_the_fit_and_rises_with_power(fitted, lever, posterior):
 
 @pytest.fixture(scope="module")
 def informed(coarse):
-    """A fit of the material and a dimension, with priors, of data with stated errors."""
+    """A fit of the material, a law and a dimension, with priors, of data with stated errors."""
     true = coarse.probe.with_(n_d=5.3e17, heater_length_um=4.1)
     exact = Measurement.of_sweep(Lever(true, COARSE).sweep(BIAS))
     error = 3e-3 * exact.current_mA
     noisy = exact.current_mA + error * np.random.default_rng(1).normal(size=BIAS.size)
     nothing = np.full(BIAS.size, np.nan)
     data = Measurement(BIAS, noisy, nothing, nothing, nothing, further={"current_error_mA": error})
-    stated = ("n_d", "c_kappa", "heater_length_um", "series_resistance_ohm")
+    stated = ("n_d", "c_kappa", "n_i_1", "heater_length_um", "series_resistance_ohm")
     priors = {name: default_priors(coarse.probe)[name] for name in stated}
     return fit(data, coarse.probe, priors=priors, fixed={"a0": None, "a1": None})
 
@@ -264,6 +264,14 @@ def test_the_posterior_of_a_fit_with_priors_agrees_with_its_covariance(informed,
     low, _, _, _, high = band.tip_K.values
     stderr = informed.band.tip_stderr_K.values
     np.testing.assert_allclose((high - low) / 3.92, stderr, rtol=0.5, atol=0.3)
+
+
+def test_the_inversion_temperature_of_a_sample_is_that_of_its_laws_too(informed, of_informed):
+    drawn = of_informed[informed.names].to_dataframe()
+    for draw in np.argsort(of_informed.n_i_1.values)[[0, 75, 149]]:
+        silicon = informed.probe.with_(**drawn.iloc[draw]).heater_silicon
+        own = of_informed.inversion_temperature.values[draw]
+        assert own == pytest.approx(float(silicon.inversion_temperature()), abs=1.0)
 
 
 def test_a_profile_counts_priors(informed):

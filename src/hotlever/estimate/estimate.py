@@ -332,21 +332,35 @@ class Estimate:
         return float("nan") if silicon is None else float(silicon.inversion_temperature())
 
     @cached_property
+    def inversion_temperature_slopes_K(self) -> Array:
+        """Derivatives of it by what was varied, (len(names),), in K per unit; NaN without one.
+
+        They are those of where the conductivity is lowest: T_i moves until d ln σ/dT is 0 again.
+        """
+        silicon, T_i = self.probe.heater_silicon, self.inversion_temperature_K
+        if silicon is None or np.isnan(T_i):
+            return np.full(len(self.names), np.nan)
+
+        def steepness(T: float, **changes: float) -> float:
+            """Return d ln σ/dT (1/K) of a silicon with some other parameters."""
+            other = silicon.model_copy(update=changes)
+            sigma, by = other.electrical_conductivity(np.asarray(T), other.n_d)
+            return float(by["T"] / sigma)
+
+        along = 0.5 * (steepness(T_i + 1.0) - steepness(T_i - 1.0))
+        slopes, material = np.zeros(len(self.names)), self.probe.layout().heater.material
+        for own in silicon.parameters:
+            if (name := full_name(material, own)) in self.names:
+                value = getattr(silicon, own)
+                step = 1e-4 * (abs(value) or 1.0)
+                high, low = (steepness(T_i, **{own: value + way}) for way in (step, -step))
+                slopes[self.names.index(name)] = -(high - low) / (2.0 * step) / along
+        return slopes
+
+    @property
     def inversion_temperature_stderr_K(self) -> float:
-        """Its standard error (K), by central differences; NaN if unknown."""
-        silicon, slope = self.probe.heater_silicon, np.zeros(len(self.names))
-        if silicon is None:
-            return float("nan")
-        material = self.probe.layout().heater.material
-        for own in ("n_d", "p"):
-            name, value = full_name(material, own), getattr(silicon, own)
-            if name in self.names:
-                low, high = (
-                    silicon.model_copy(update={own: value * way}).inversion_temperature()
-                    for way in (1 - 1e-4, 1 + 1e-4)
-                )
-                slope[self.names.index(name)] = float(high - low) / (2e-4 * value)
-        return float(standard_errors(slope, self.covariance))
+        """Its standard error (K); NaN if unknown."""
+        return float(standard_errors(self.inversion_temperature_slopes_K, self.covariance))
 
     # --- the lever, and what it is compared with --------------------------------------------------
 

@@ -426,13 +426,16 @@ def _outermost(points: Array) -> list[int]:
 def _dataset(fit: Estimate, values: Array, effective: float) -> xr.Dataset:
     columns = dict(zip(fit.names, values.T, strict=True))
     silicon, material = fit.probe.heater_silicon, fit.probe.layout().heater.material
-    if silicon is not None:
+    slopes = fit.inversion_temperature_slopes_K
+    if silicon is not None and slopes.any():  # else it is what it was
         owned = {full_name(material, own): own for own in ("n_d", "p")}
         sampled = {owned[name]: column for name, column in columns.items() if name in owned}
-        if sampled:  # else it is what it was
-            columns["inversion_temperature"] = silicon.model_copy(
-                update=sampled
-            ).inversion_temperature()
+        # the carriers' laws, whose departures move it by some kelvins, to first order
+        by_laws = np.where([name in owned for name in fit.names], 0.0, slopes)
+        columns["inversion_temperature"] = (
+            silicon.model_copy(update=sampled).inversion_temperature()
+            + (values - fit.probe.values(fit.names)) @ by_laws
+        )
     held = [name for name in usual_parameters(fit.probe) if name not in fit.names]
     at_rest = zip(held, fit.probe.values(held).tolist(), strict=True)
     data = labelled(
