@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -10,7 +11,10 @@ from fit_twins import twin
 
 from hotlever.estimate import FitOptions
 from hotlever.estimate.problem import Problem
+from hotlever.estimate.residuals import Residuals, errors_of_scales
 from hotlever.estimate.search import solve
+from hotlever.measurement import Measurement
+from hotlever.probe.priors import Prior
 
 
 @pytest.fixture(scope="module")
@@ -32,3 +36,22 @@ def test_the_fit_says_that_the_zero_drifts(coarse, coarse_fast, drifting):
     at, slopes = estimated.prediction, estimated.posterior.slopes
     notes = estimated.residuals.drifting_zeros(at.values, slopes)
     assert any(text.startswith("current: the zero seems to go from") for text in notes)
+
+
+@pytest.mark.parametrize("spread", [None, 2e-3, 0.2])
+def test_what_the_scale_of_a_meter_explains_does_not_hide_a_zero(spread):
+    """With a prior of the scale the zero seemed to go from -0.002 to 0.005 mA, or not at all."""
+    bias, noise = np.linspace(1.0, 11.0, 60), 1e-3
+    shown = 1.0 - np.exp(-bias / 3.0)
+    current = shown + np.linspace(0.01, 0.03, bias.size)
+    current += noise * np.random.default_rng(0).standard_normal(bias.size)
+    further = {"current_error_mA": np.full(bias.size, noise)}
+    data = Measurement(bias, current, *3 * [np.full(bias.size, np.nan)], further=further)
+    prior = {} if spread is None else {"current_scale": Prior(1.0, spread)}
+    common = errors_of_scales(data, ["current"], prior, 293.0) if prior else []
+    residuals = Residuals(data, ["current"], "errors", common=common)
+    # of one parameter, which is none of these
+    (note,) = residuals.drifting_zeros(shown[None], np.sin(bias)[None, :, None])
+    first, last = map(float, re.findall(r"[+-][\d.]+", note))
+    assert first == pytest.approx(0.01, abs=2e-3)
+    assert last == pytest.approx(0.03, abs=2e-3)

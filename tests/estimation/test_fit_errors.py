@@ -103,7 +103,7 @@ def test_noise_gives_errors_of_its_size(noisy_fit):
 
 
 def test_the_inversion_temperature_follows_all_that_its_law_depends_on(coarse):
-    """Of a fit with uncertain laws it had the error by doping and p alone, 25 K in place of 14 K."""
+    """Of a fit with uncertain laws it had the error by doping and p alone, 25 K for 14 K."""
     names = ["n_d", "c_kappa", "p", "n_i_1", "mobility_1", "intrinsic_scale"]
     probe = coarse.probe.with_(n_i_1=0.4, mobility_1=-0.3)
     found = Estimate(

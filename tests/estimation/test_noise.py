@@ -151,6 +151,18 @@ def test_no_data_are_better_than_the_model(stated):
     assert share == pytest.approx(np.hypot(5e-4, stated or 0.0), rel=0.01)
 
 
+@pytest.mark.parametrize("rows", [1, 25])
+def test_a_misfit_is_no_noise_of_means_of_many_rows_either(rows):
+    """It was taken for as many times the noise as there are rows."""
+    own = noise(3, 2e-3) / np.sqrt(rows)
+    bias, nothing = np.arange(1.0, 41.0), np.full(TRUTH.size, np.nan)
+    data = Measurement(bias, TRUTH + own + 0.02 * np.sin(bias / 12.0), *3 * [nothing])
+    data = replace(data, rows=None if rows == 1 else np.full(TRUTH.size, float(rows)))
+    errors = Residuals(data, ("current",)).errors
+    squares = errors.noise_squares((data.current_mA - TRUTH)[None])
+    assert squares == pytest.approx(np.mean((errors.weights * own) ** 2), rel=0.5)
+
+
 def test_degrees_of_freedom_are_those_of_what_is_estimated():
     """Half of a variance that is a scatter makes four times as many (Welch, Satterthwaite)."""
     current = TRUTH + noise(7, 2e-3 * TRUTH[-1])

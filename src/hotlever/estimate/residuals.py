@@ -255,7 +255,9 @@ class DataErrors:
         count, weights = self.present.sum(axis=1), self.weights
         squares = np.nan_to_num(weights * difference) ** 2
         every = np.sqrt(np.sum(squares, axis=1) / np.maximum(count, 1))
-        mean = np.sqrt(np.nanmean(np.where(self.present, weights, np.nan) ** 2, axis=1))
+        # neighbours tell the noise of a row of a file, of which a datum may be the mean of many
+        of_row = np.where(self.present, weights / self._root, np.nan)
+        mean = np.sqrt(np.nanmean(of_row**2, axis=1))
         noise = np.minimum(self._noise(difference * self._root)[:, 0] * mean, every)
         return float(np.average(noise**2, weights=count))
 
@@ -654,6 +656,7 @@ class Residuals:
         zeros = zeros[:, :, np.any(zeros, axis=(0, 1))]
         residual, jacobian = -self.weighted(values), self.jacobian(slopes)
         columns = (self.errors.weights[..., None] * zeros)[self.present]
+        columns = self._common_covariance.decorrelated(columns)
         basis = np.linalg.qr(jacobian)[0]
         columns = columns - basis @ (basis.T @ columns)
         try:
