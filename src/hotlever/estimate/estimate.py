@@ -347,7 +347,7 @@ class Estimate:
             sigma, by = other.electrical_conductivity(np.asarray(T), other.n_d)
             return float(by["T"] / sigma)
 
-        along = 0.5 * (steepness(T_i + 1.0) - steepness(T_i - 1.0))
+        along = (steepness(T_i + 0.1) - steepness(T_i - 0.1)) / 0.2
         slopes, material = np.zeros(len(self.names)), self.probe.layout().heater.material
         for own in silicon.parameters:
             if (name := full_name(material, own)) in self.names:
