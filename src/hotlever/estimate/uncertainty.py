@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -30,11 +30,6 @@ from hotlever.probe.probe_parameters import parameter_of, parameters_of, usual_p
 from hotlever.processes import PROCESSORS, local_processes
 from hotlever.text import BAND, aligned, with_unit
 from hotlever.types import Array, Progress
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from hotlever.estimate.estimate import Estimate
 
 #: Confidence levels whose intervals are read off the profile of a parameter.
 LEVELS = (0.68, 0.95)

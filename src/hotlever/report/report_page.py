@@ -13,7 +13,7 @@ import io
 import os
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
@@ -84,8 +84,6 @@ class Page:
     Attributes
     ----------
     title, summary : str
-    added : callable, optional
-        Called with each block as soon as it is there.
     one_sheet : bool
         Whether it is printed on one sheet of A4, in small letters.
     blocks : list of dict
@@ -93,14 +91,11 @@ class Page:
 
     title: str
     summary: str = ""
-    added: Callable[[Block], None] | None = None
     one_sheet: bool = False
     blocks: list[Block] = field(default_factory=list)
 
     def _add(self, kind: str, **block: Any) -> None:
         self.blocks.append({"kind": kind, **block})
-        if self.added is not None:
-            self.added(self.blocks[-1])
 
     def heading(self, text: str) -> None:
         """Start a section, to which links lead by its anchor."""

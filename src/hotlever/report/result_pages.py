@@ -29,43 +29,26 @@ from hotlever.lever.transient.frequency_domain import harmonics
 from hotlever.lever.transient.modes import Source
 from hotlever.materials.parameters import sentence
 from hotlever.quantities import QUANTITIES
-from hotlever.report.report_page import Block, Page
+from hotlever.report.report_page import Page
 from hotlever.text import significant, with_unit
 from hotlever.types import Array, Progress
 from hotlever.work import each
 
 
-def estimate_page(
-    estimate: Estimate,
-    uncertainty: Uncertainty | None = None,
-    added: Callable[[Block], None] | None = None,
-) -> Page:
-    """Return the report page of an estimate, and of what was sampled and profiled of it.
-
-    It takes a second; ``added`` is called with each block as soon as it is there.
-    """
-    if estimate.route:
-        return calibration_page(estimate, added)
-    return fit_page(estimate, uncertainty, added)
+def estimate_page(estimate: Estimate) -> Page:
+    """Return the report page of an estimate, be it a fit or a calibration."""
+    return calibration_page(estimate) if estimate.route else fit_page(estimate)
 
 
 # --- of a fit -----------------------------------------------------------------------------------
 
 
-def fit_page(
-    fit: Estimate,
-    uncertainty: Uncertainty | None = None,
-    added: Callable[[Block], None] | None = None,
-) -> Page:
-    """Return the report page of one fit, and of what was sampled and profiled of it.
-
-    It takes a second; ``added`` is called with each block as soon as it is there.
-    """
+def fit_page(fit: Estimate, uncertainty: Uncertainty | None = None) -> Page:
+    """Return the report page of one fit, and of what was sampled and profiled of it."""
     page = Page(
         f"Fit of {fit.measurement.path}",
         f"Material parameters of a {fit.probe.shape.shape} lever from its measured "
         f"{', '.join(fit.observables)}.",
-        added,
     )
     add_fit(page, fit)
     if uncertainty is not None:
@@ -142,12 +125,9 @@ def _add_uncertainty(page: Page, uncertainty: Uncertainty) -> None:
 # --- of a calibration ---------------------------------------------------------------------------
 
 
-def calibration_page(calibration: Estimate, added: Callable[[Block], None] | None = None) -> Page:
-    """Return the report page of a calibration, which two sheets of paper hold.
-
-    ``added`` is called with each block as soon as it is there.
-    """
-    page = Page(f"Calibration of {calibration.measurement.path}", added=added)
+def calibration_page(calibration: Estimate) -> Page:
+    """Return the report page of a calibration, which two sheets of paper hold."""
+    page = Page(f"Calibration of {calibration.measurement.path}")
     before, tables, after = calibration_parts(calibration)
     page.sentences("; ".join(before), *after)
     for caption, (head, *rows) in tables:
