@@ -226,15 +226,34 @@ class _Reader:
                     f"'{excerpt(unit)}' in the row of units, expected the same"
                 )
         names = with_units(self.names, units)
-        cells = [self._cells(*line, self._separator) for line in self.rows]
-        try:
-            return with_units(names, units_beside(names, cells))
-        except ValueError as error:
-            row, unit, above = error.args
-            raise InputError(
-                f"{self._path}: line {self.rows[row][0]}: the unit is '{excerpt(unit)}', expected "
-                f"'{excerpt(above)}' as above"
-            ) from None
+        return with_units(names, self._units_beside(names))
+
+    def _units_beside(self, names: Sequence[str]) -> list[str]:
+        """Return the unit of each column that stands in the cells of the next one, '' for others.
+
+        The next one's heading is ``Unit``, behind any column, or ``Source Unit`` behind
+        ``Source Value``.
+        """
+        units, cells = (
+            [""] * len(names),
+            [self._cells(*line, self._separator) for line in self.rows],
+        )
+        # what Keithley writes there, in capitals or not
+        of_buffers = {"volt dc": "V", "amp dc": "A", "vdc": "V", "adc": "A"}
+        for index, name in enumerate(names[1:], start=1):
+            of, _, word = name.casefold().rpartition(" ")
+            if word not in ("unit", "units") or not names[index - 1].casefold().startswith(of):
+                continue
+            written = [row[index] for row in cells]
+            first = written[0]
+            for (number, _), unit in zip(self.rows, written, strict=True):
+                if unit != first:
+                    raise InputError(
+                        f"{self._path}: line {number}: the unit is '{excerpt(unit)}', expected "
+                        f"'{excerpt(first)}' as above"
+                    )
+            units[index - 1] = of_buffers.get(first.casefold(), first)
+        return units
 
     def dialect(self, rows: list[Line]) -> Dialect:
         """Return how the rows are written: with decimal commas, if any number has one."""
@@ -628,31 +647,6 @@ def is_row_of_units(line: str) -> bool:
     """Whether a comment says that it has the units of the columns."""
     first = line[:20].strip(_MARKS).lower()
     return first.startswith(("y_unit_label", "vertical units", "unit"))
-
-
-def units_beside(names: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the unit of each column that stands in the cells of the next one, '' for others.
-
-    The next one's heading is ``Unit``, behind any column, or ``Source Unit`` behind
-    ``Source Value``.
-
-    Raises
-    ------
-    ValueError
-        With a row's index and the units there and above, if they differ.
-    """
-    units = [""] * len(names)
-    # what Keithley writes there, in capitals or not
-    of_buffers = {"volt dc": "V", "amp dc": "A", "vdc": "V", "adc": "A"}
-    for index, name in enumerate(names[1:], start=1):
-        of, _, word = name.casefold().rpartition(" ")
-        if word in ("unit", "units") and names[index - 1].casefold().startswith(of):
-            written = [row[index] for row in rows]
-            other = next((row for row, cell in enumerate(written) if cell != written[0]), None)
-            if other is not None:
-                raise ValueError(other, written[other], written[0])
-            units[index - 1] = of_buffers.get(written[0].casefold(), written[0])
-    return units
 
 
 def names_above(above: Sequence[Line], dialect: Dialect, width: int) -> tuple[list[str], int]:
