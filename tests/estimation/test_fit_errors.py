@@ -9,8 +9,11 @@ import pytest
 from fit_twins import BIAS, TRUTH, twin
 
 from hotlever.errors import InputError
-from hotlever.estimate import Estimate, fit
+from hotlever.estimate import Estimate, FitOptions, fit
 from hotlever.estimate.diagnosis import Diagnosis
+from hotlever.estimate.problem import Problem
+from hotlever.estimate.search import solve
+from hotlever.probe.priors import default_priors
 
 
 def with_errors(measurement, current=None, reader=None, tip=None):
@@ -100,6 +103,21 @@ def test_noise_gives_errors_of_its_size(noisy_fit):
     assert np.allclose(np.diag(noisy_fit.correlation), 1.0)
     assert np.allclose(noisy_fit.correlation, noisy_fit.correlation.T)
     assert 0 < noisy_fit.inversion_temperature_stderr_K < 60
+
+
+def test_data_with_stated_errors_are_no_better_than_the_model_where_priors_count(
+    coarse, coarse_fast
+):
+    """They were: a current to 1e-4 tied parameters as if the laws were exactly the lever's."""
+    measured = twin(coarse, noise=1e-4)
+    largest = np.nanmax(measured.current_mA)
+    data = with_errors(measured, current=1e-4 * largest)
+    stated = ("n_d", "c_kappa", "delta", "a0")
+    priors = {name: default_priors(coarse.probe)[name] for name in stated}
+    options = FitOptions(observables=["current"], priors=priors)
+    solution = solve(Problem.of(data, coarse.probe, options, model=coarse_fast))
+    assert solution.converged
+    assert (solution.residuals.errors.scale >= 5e-4 * largest).all()
 
 
 def test_the_inversion_temperature_follows_all_that_its_law_depends_on(coarse):

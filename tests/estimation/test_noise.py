@@ -175,6 +175,20 @@ def test_degrees_of_freedom_are_those_of_what_is_estimated():
         assert dof == pytest.approx(factor * TRUTH.size, rel=0.05)
 
 
+def test_scatter_is_compared_with_what_was_stated_and_by_what_is_left_free():
+    """A discrepancy is no scatter, and parameters with priors take up less than a datum each."""
+    sd, nothing = 1e-4 * TRUTH[-1], np.full(TRUTH.size, np.nan)
+    current = TRUTH + noise(7, sd)
+    further = {"current_error_mA": np.full(TRUTH.size, sd)}
+    data = Measurement(np.arange(1.0, 41.0), current, *3 * [nothing], further=further)
+    residuals = Residuals(data, ("current",), "errors")
+    residuals.take_scatter(np.stack([TRUTH, TRUTH, TRUTH]), discrepancy=5e-4)
+    leverage = np.full((1, TRUTH.size), 0.25)
+    found = residuals.errors.reduced_chi_square((current - TRUTH)[None], leverage)
+    squares = np.sum(((current - TRUTH) / sd) ** 2)
+    assert found == pytest.approx(squares / (0.75 * TRUTH.size), rel=1e-6)
+
+
 def test_the_discrepancy_of_a_model_falls_out_of_differences():
     """Of rows in contact and away from it, that is; rows in contact alone have all of it."""
     nothing = np.full(TRUTH.size, np.nan)

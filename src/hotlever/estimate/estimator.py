@@ -272,7 +272,7 @@ def _with_remarks(solution: Solution, estimate: Estimate) -> Estimate:
     notes = outlier_notes(residuals, values, options.robust)
     notes += residuals.drifting_zeros(values, solution.posterior.slopes)
     chi_square = residuals.errors.reduced_chi_square(
-        residuals.difference(values), len(estimate.names)
+        residuals.own_difference(values), solution.posterior.leverage
     )
     if chi_square is not None:
         text = (

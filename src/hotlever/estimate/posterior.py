@@ -89,6 +89,11 @@ class Posterior:
         return np.asarray(self._by_residuals @ self._by_residuals.T)
 
     @property
+    def leverage(self) -> Array:
+        """Which share of each datum's noise the parameters have taken up, (observables, n)."""
+        return self.objective.leverage(self.at.slopes, self._point)
+
+    @property
     def _by_residuals(self) -> Array:
         """How far each datum's own residual, enlarged by its leverage, moves parameters, (p, N)."""
         objective = self.objective

@@ -286,14 +286,17 @@ class DataErrors:
         """The largest weighted value of an observable: one, unless weights are those of errors."""
         return float(np.max(np.where(self.present, self.weights * self.largest, 0.0)))
 
-    def reduced_chi_square(self, difference: Array, varied: int) -> float | None:
-        """Return that of the observables with measurement errors; None without."""
+    def reduced_chi_square(self, difference: Array, leverage: Array) -> float | None:
+        """Return that of the observables with measurement errors, by these; None without.
+
+        The `leverage`, (observables, n), is the share of each datum's noise that a fit has taken
+        up: with priors that is less than a datum for each parameter.
+        """
         if not self.measured or self.without.all():
             return None
-        weighted = (difference / self.scale)[~self.without]
-        count = np.isfinite(weighted).sum()
-        share = varied / int(self.present.sum())
-        return float(np.nansum(weighted**2) / max(count - share * count, 1.0))
+        weighted = (difference / self._stated)[~self.without]
+        free = np.isfinite(weighted).sum() - np.nansum(leverage[~self.without])
+        return float(np.nansum(weighted**2) / max(free, 1.0))
 
 
 @dataclass(frozen=True)

@@ -213,9 +213,11 @@ class Optimiser:
 
     @property
     def _takes_scatter(self) -> bool:
-        """Whether the noise of some observables is found with the optimum."""
-        unknown = bool(self.residuals.errors.without.any())
-        return unknown and self.objective.informed and self._options.scatter_rounds > 0
+        """Whether the errors of data, what a model is off by among them, follow from the optimum.
+
+        With priors data whose errors are stated are no better than the model either.
+        """
+        return self.objective.informed and self._options.scatter_rounds > 0
 
     def _settled(self, previous: Optimum, optimum: Optimum) -> bool:
         """Whether the parameters have moved too little for another confirmation to matter."""

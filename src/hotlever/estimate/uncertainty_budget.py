@@ -349,8 +349,7 @@ def budget_of_estimate(solution: Solution, row: TipTable, of: BudgetOf) -> Tempe
     slopes = predicted.slopes[observable, 0, objective.columns]
     contributions = {name: slopes @ by for name, by in solution.posterior.influences.items()}
     u = residuals.noise(solution.prediction.values).tolist()
-    leverage = objective.leverage(solution.prediction.slopes, objective.point(solution.probe))
-    dof = residuals.errors.degrees_of_freedom(leverage).tolist()
+    dof = residuals.errors.degrees_of_freedom(solution.posterior.leverage).tolist()
     rows = []
     for name, size, free in zip(residuals.observables, u, dof, strict=True):
         sensitivity = float(np.linalg.norm(contributions.pop(name))) / size
