@@ -330,8 +330,16 @@ def test_reproduce_writes_the_page(run, tmp_path):
         (("sweep", "boron-lever.toml", "--set", "n_d=1e17"), "'n_d': did you mean 'hot.n_d'?"),
         (("sweep", "--set", "leg_um=3"), "unknown name 'leg_um': did you mean 'leg_width_um'?"),
         (("sweep", "--set", "surface_gap_um=1"), "--set surface_gap_um: counts in air, and this"),
-        (("sweep", "--set", "medium=air", "--medium", "vacuum"), "--set medium and --medium:"),
-        (("sweep", "--set", "radiation=true", "--physics", "none"), "radiation and --physics:"),
+        (("sweep", "--set", "medium=air", "--medium", "vacuum"), "it is what --medium states"),
+        (("sweep", "--set", "radiation=true", "--physics", "none"), "it is what --physics states"),
+        (("reader", "--set", "surface_gap_um=1"), "it is what --distance states"),
+        (
+            (
+                *("contact", "--sample", "glass", "--set", "contact.sample=polymer"),
+                *("--set", "tip.height_um=0.7"),
+            ),
+            "--set contact.sample: it is what --sample states",
+        ),
         (
             ("design", "--minimise", "tip_K", "--at", "700K", "--within", "heater_width_um=1:2"),
             "--minimise tip_K: it is what --at 700K holds, expected another quantity",

@@ -266,7 +266,7 @@ def refuse_set(changes: Iterable[str], option: str, keys: Collection[str]) -> No
     """Refuse what ``--set`` says, by name, of `keys` that an option states too."""
     for name in changes:
         if name.rpartition(".")[2] in keys:
-            raise InputError(f"--set {name} and --{option}: expected only one of them")
+            raise InputError(f"--set {name}: it is what --{option} states, expected one of them")
 
 
 def check_medium(medium: str | None, *more: str) -> None:

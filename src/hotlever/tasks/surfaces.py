@@ -20,8 +20,15 @@ from hotlever.tasks.arguments import (
     notes_of,
     read_surrounded_probe,
     refuse,
+    refuse_set,
 )
-from hotlever.tasks.parsing import parse_bias, parse_distances, parse_pressures, parse_times
+from hotlever.tasks.parsing import (
+    parse_bias,
+    parse_distances,
+    parse_pressures,
+    parse_settings,
+    parse_times,
+)
 from hotlever.units import setting
 
 if TYPE_CHECKING:
@@ -68,6 +75,14 @@ def touch(
     else:
         refuse("does not go with a wave form, which has biases of its own", bias=bias)
     read = read_surrounded_probe(reporter, lever)
+    told = {
+        "sample": (sample, "sample"),
+        "radius": (radius, "apex_radius_um"),
+        "interface": (interface, "interface_K_per_mW"),
+    }
+    for option, (text, key) in told.items():
+        if text is not None:
+            refuse_set(parse_settings(lever.set, read), option, [key])
     touching = in_contact(reporter, read, sample, radius, interface)
     biases = parse_bias(bias, touching.lowest_bias_V)
     meshed = make_lever(reporter, touching)
@@ -213,6 +228,10 @@ def approach(
     noise = reader_noise(bandwidth, amplifier, hooge, vibration)
     pressures = None if pressure is None else parse_pressures(pressure)
     read = read_surrounded_probe(reporter, lever, finds_air=True)
+    changes = parse_settings(lever.set, read)
+    refuse_set(changes, "distance", ["surface_gap_um"])
+    if pressures is not None:
+        refuse_set(changes, "pressure", ["pressure_mbar"])
     above = over_a_surface(reporter, read, lever.medium, distances)
     biases = None if bias is None else parse_bias(bias, above.lowest_bias_V)
     reader = Reader(above, noise)
