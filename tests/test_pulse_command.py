@@ -86,6 +86,9 @@ def test_a_file_gives_the_bias(run, tmp_path):
         assert 5.0 < data.attrs["heating_us"] < 7.0
         first, last = (data.attrs[f"time_constants_us_at_{end}"] for end in ("start", "end"))
         assert 20.0 < first[0] < last[0] < 26.0
+    # as of a table that was written without its first row
+    (tmp_path / "later.csv").write_text("time_us,bias_V\n1,4\n")
+    assert "rests at its first bias, 4 V" in run("pulse", "--waveform", "later.csv")[2]
 
 
 def test_ramps_sines_and_trains_in_any_medium(run):

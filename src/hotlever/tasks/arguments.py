@@ -139,6 +139,15 @@ class WaveformOptions:
                 return waveform_from_text(kind, text, self.period, self.count, mark="--")
         return None
 
+    def notes(self, told: Waveform) -> list[str]:
+        """Return what should be known of the wave form that is told."""
+        if self.waveform is None or not told.before_V:
+            return []
+        return [
+            f"{told.text}: the lever rests at its first bias, {told.before_V:g} V, before it; a "
+            "cold lever needs 0 V there"
+        ]
+
 
 @dataclass(frozen=True)
 class HistoryOptions(WaveformOptions):

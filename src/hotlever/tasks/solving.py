@@ -219,6 +219,7 @@ def simulate_in_time(
     bias = drive.read()
     if bias is None:
         raise InputError("found none: expected one of --step, --pulse, --ramp, --sine, --waveform")
+    reporter.note(*drive.notes(bias))
     end, times = parse_times(drive.until, drive.at)
     meshed = make_lever(reporter, read_surrounded_probe(reporter, lever))
     frames = None if film is None else _Frames(times or _even(bias, end))

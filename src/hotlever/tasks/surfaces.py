@@ -74,6 +74,7 @@ def touch(
         refuse(why, until=history.until, at=history.at)
     else:
         refuse("does not go with a wave form, which has biases of its own", bias=bias)
+        reporter.note(*history.notes(drive))
     read = read_surrounded_probe(reporter, lever)
     told = {
         "sample": (sample, "sample"),

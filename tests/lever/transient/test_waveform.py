@@ -83,6 +83,7 @@ def test_times_of_a_file_stand_as_they_are(tmp_path):
     [
         ("a,b\n1,2\n", "no time column"),
         ("time (us),x\n1,2\n", "no bias column"),
+        ("time (us),bias (V),V (V)\n0,1,2\n", "2 bias columns"),
         ("time (V),bias (V)\n1,2\n", "unit"),
         ("time,bias (V)\n1,2\n", "unit"),
         ("time (us),bias (V)\n0,1\n2,1\n1,1\n", "line 4: expected a time not before"),

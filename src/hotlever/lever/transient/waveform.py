@@ -243,22 +243,22 @@ def read_waveform(path: str | os.PathLike[str]) -> Waveform:
     Raises
     ------
     InputError
-        If a column is missing, has no known unit, or the times fall or begin before 0.
+        If a column is missing or stands twice, has no known unit, or the times fall or begin before
+        0.
     """
     expected = "a header row like 'time (us),bias (V)'"
     table = read_table(path, expected)
     names = [name_and_unit(heading)[0] for heading in table.names]
     columns = []
     for pattern, inside, what in (("t|time", "us", "time"), ("V|V_?b|bias|voltage", "V", "bias")):
-        column = next(
-            (k for k, name in enumerate(names) if re.fullmatch(pattern, name, re.I)), None
-        )
-        if column is None:
+        found = [k for k, name in enumerate(names) if re.fullmatch(pattern, name, re.I)]
+        if len(found) != 1:
             header = excerpt(",".join(table.names))
             raise InputError(
-                f"{table.where(-1)}: no {what} column in '{header}', expected {expected}"
+                f"{table.where(-1)}: {len(found) or 'no'} {what} column{'s' if found else ''} in "
+                f"'{header}', expected {expected}"
             )
-        columns.append(table.values(column, inside, what))
+        columns.append(table.values(found[0], inside, what))
     times, volts = columns
     for wrong, requirement in (
         (~np.isfinite(times + volts), "a time and a bias"),
