@@ -585,12 +585,14 @@ class Estimate:
             name: {**parts, "medium": choices["apex_K" if name == "apex_budget_K" else "tip_K"]}
             for name, parts in self.tip_table.budgets.items()
         }
+        at_knee = _error_of_choice(np.array(self.knee.tip_K), np.array(other.knee.tip_K)).item()
+        knee = replace(self.knee, tip_K_stderr=float(np.hypot(self.knee.tip_K_stderr, at_knee)))
         table, gum = TipTable(columns, budgets), self.gum
         if gum is not None and other.gum is not None:
             row = columns["bias_V"].tolist().index(gum.bias_V)
             limits = limits_of(table.rows(slice(row, row + 1)), gum.of)
             gum = gum.in_either(other.gum, choices[f"{gum.of}_K"][row].item(), limits)
-        return replace(self, band_columns=band, tabulated=table, gum=gum)
+        return replace(self, band_columns=band, tabulated=table, knee=knee, gum=gum)
 
     # --- what it leaves, known before other data --------------------------------------------------
 

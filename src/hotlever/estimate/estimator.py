@@ -198,12 +198,16 @@ def calibrate(
         return solution, replace(result, notes=list(dict.fromkeys(notes)))
 
     solution, result = in_medium(options.medium, within)
-    if options.pulse is not None and result.describes_data:
-        return replace(result, pulse=pulse_calibration(solution, options.pulse, progress))
-    if options.pulse is not None:
+    if options.pulse is None:
+        return result
+    if not result.describes_data:
         note = "the pulse was not followed, since it would be that of another lever"
         return replace(result, notes=[*result.notes, note])
-    return result
+    notes = list(result.notes)
+    if "medium" in result.tip_table.budgets["budget_K"]:
+        notes.append(f"the pulse is that of a lever in {result.medium}, and so are its errors")
+    pulse = pulse_calibration(solution, options.pulse, progress)
+    return replace(result, pulse=pulse, notes=notes)
 
 
 # --- a medium that nobody knows -----------------------------------------------------------------
