@@ -53,7 +53,7 @@ def lack_of_fit_text(residuals: Residuals, values: Array) -> str:
         residuals.observables, difference, residuals.errors.down, strict=True
     ):
         present = np.isfinite(whole)
-        if FITTED[name].unit == "K" or present.sum() < max(options.fewest_rows, run):
+        if FITTED[name].is_temperature or present.sum() < max(options.fewest_rows, run):
             continue
         # what a robust fit has forgotten stands alone, or is seen as a run
         squares = float(np.sum((down * whole)[present] ** 2))
@@ -105,7 +105,7 @@ def run_of_outliers(residuals: Residuals, values: Array) -> str:
     in_order = np.argsort(residuals.along, kind="stable")
     along = residuals.along[in_order]
     for name, row in zip(residuals.observables, residuals.deviations(values), strict=True):
-        if FITTED[name].unit == "K" or row.size < options.fewest_rows:
+        if FITTED[name].is_temperature or row.size < options.fewest_rows:
             continue
         far = np.append(np.abs(row[in_order]) > options.outlier, True)
         together = np.lib.stride_tricks.sliding_window_view(far, run).all(axis=1)
@@ -465,9 +465,19 @@ def _with_powers(probe: Probe, priors: Mapping[str, Prior]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Explanation:
-    """Where a search with a hypothesis ended: what is left unexplained, and with what.
+    """Where a search with a hypothesis ended.
 
-    These are logarithms over the values of the curve's probe.
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+    curve : _Curve
+        Of the lever that was solved, from which the search went on.
+    squares : float
+        Sum of squares that is left unexplained.
+    unknown : float
+        That of the hypothesis, as it was found.
+    away : ndarray, shape (p,)
+        Logarithms of the lever's parameters over those of the curve's probe.
     """
 
     hypothesis: Hypothesis

@@ -1,4 +1,4 @@
-"""Tables of tip temperatures with an error budget: by bias, or by the height of a pulse."""
+"""Tip temperatures in tables with an error budget, by bias or a pulse's height; and the knee."""
 
 from __future__ import annotations
 
@@ -209,6 +209,48 @@ def rms(difference: Array) -> float:
     return float(np.sqrt(np.mean(present**2))) if present.size else float("nan")
 
 
+@dataclass(frozen=True)
+class Knee:
+    """The knee of a lever, as its points show it or as it was estimated.
+
+    Attributes
+    ----------
+    lever_V, current_mA, power_mW, bias_V : float
+    lever_V_stderr, current_mA_stderr, power_mW_stderr, bias_V_stderr : float
+        From the scatter of the points, or of an estimated lever.
+    current_noise : float
+        Standard deviation of the current over the current, as the points scatter.
+    points : int
+        How many were used.
+    tip_K, tip_K_stderr : float
+        Tip temperature there, which points do not show.
+
+    All but the power and the tip are NaN where no point is near enough.
+    """
+
+    lever_V: float = np.nan
+    current_mA: float = np.nan
+    power_mW: float = np.nan
+    bias_V: float = np.nan
+    lever_V_stderr: float = np.nan
+    current_mA_stderr: float = np.nan
+    power_mW_stderr: float = np.nan
+    bias_V_stderr: float = np.nan
+    current_noise: float = np.nan
+    points: float = np.nan
+    tip_K: float = np.nan
+    tip_K_stderr: float = np.nan
+
+    @property
+    def measured(self) -> bool:
+        """Whether the points show it."""
+        return bool(np.isfinite(self.lever_V))
+
+    def without_errors(self) -> Knee:
+        """Return the same knee, with standard errors that nobody knows."""
+        return Knee(self.lever_V, self.current_mA, self.power_mW, self.bias_V, tip_K=self.tip_K)
+
+
 # --- of pulses ----------------------------------------------------------------------------------
 
 
@@ -289,45 +331,3 @@ def _column(moment: str) -> str:
     if moment not in MOMENTS:
         raise unknown_name("moment", moment, MOMENTS)
     return f"{moment}_K"
-
-
-@dataclass(frozen=True)
-class Knee:
-    """The knee of a lever, as its points show it or as it was estimated.
-
-    Attributes
-    ----------
-    lever_V, current_mA, power_mW, bias_V : float
-    lever_V_stderr, current_mA_stderr, power_mW_stderr, bias_V_stderr : float
-        From the scatter of the points, or of an estimated lever.
-    current_noise : float
-        Standard deviation of the current over the current, as the points scatter.
-    points : int
-        How many were used.
-    tip_K, tip_K_stderr : float
-        Tip temperature there, which points do not show.
-
-    All but the power and the tip are NaN where no point is near enough.
-    """
-
-    lever_V: float = np.nan
-    current_mA: float = np.nan
-    power_mW: float = np.nan
-    bias_V: float = np.nan
-    lever_V_stderr: float = np.nan
-    current_mA_stderr: float = np.nan
-    power_mW_stderr: float = np.nan
-    bias_V_stderr: float = np.nan
-    current_noise: float = np.nan
-    points: float = np.nan
-    tip_K: float = np.nan
-    tip_K_stderr: float = np.nan
-
-    @property
-    def measured(self) -> bool:
-        """Whether the points show it."""
-        return bool(np.isfinite(self.lever_V))
-
-    def without_errors(self) -> Knee:
-        """Return the same knee, with standard errors that nobody knows."""
-        return Knee(self.lever_V, self.current_mA, self.power_mW, self.bias_V, tip_K=self.tip_K)

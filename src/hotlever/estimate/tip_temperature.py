@@ -195,7 +195,7 @@ def _of_exact_edges(probe: Probe, priors: Container[str]) -> list[str]:
     ]
 
 
-def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: np.ndarray) -> list[str]:
+def what_data_lack(measured: Measurement, circuit: Circuit, tip_K: Array) -> list[str]:
     """Say what the data lack, to tell more of a lever."""
     remarks, count = [], np.isfinite(measured.current(circuit)).sum()
     few = 6

@@ -159,7 +159,7 @@ def temperature_power(
 ) -> Figure:
     """Draw tip temperature against power beside the power law (paper's Fig. 6b)."""
 
-    def expected(power: Any) -> np.ndarray:
+    def expected(power: Any) -> Array:
         return law.tip_temperature(power, base_temperature_K)
 
     with figure(4.6, 4.6, 2, 1, sharex=True, height_ratios=(2.2, 1.0)) as (fig, (axes, below)):

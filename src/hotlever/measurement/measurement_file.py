@@ -373,7 +373,7 @@ def check(contents: Contents, *, signed: bool = False, series_ohm: float = 0.0) 
             contents.note_rows(negative, f"{symbol} is negative")
     # probe files take no colder base
     base = settings.get("base_temperature_K", 250.0)
-    for symbol in (each.symbol for each in FITTED.values() if each.unit == "K"):
+    for symbol in (each.symbol for each in FITTED.values() if each.is_temperature):
         contents.note_rows(
             colder_than_base(values[symbol], values["d" + symbol], base),
             f"{symbol} is below the base temperature ({base:g} K), perhaps in another unit",
