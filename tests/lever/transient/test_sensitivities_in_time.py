@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from hotlever.errors import HistoryEndError, InputError
+from hotlever.lever import Lever
+from hotlever.lever.lever import COARSE
 from hotlever.lever.transient import pulse, simulate, step, switched_off
 from hotlever.lever.transient.history import time_steps
 from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.materials import PARAMETERS
+from hotlever.probe import Probe
 from hotlever.quantities import observables_of
 
 #: So that every observable is there.
@@ -95,6 +98,13 @@ def test_what_has_none_is_refused(coarse, options, message):
     arguments = {"waveform": step(4.0), "at": [1.0], "names": ["n_d"], **options}
     with pytest.raises(InputError, match=message):
         with_sensitivities(coarse, **arguments)
+
+
+def test_a_lever_that_begins_warm_has_none():
+    reader = {"circuit.reader.kind": "supply", "circuit.reader.current_mA": 0.5}
+    warm = Lever(Probe.reference().with_(**reader), COARSE)
+    with pytest.raises(InputError, match=r"\[circuit.reader\]: a derivative in time takes a lever"):
+        with_sensitivities(warm, step(4.0), [1.0], ["n_d"])
 
 
 def test_where_silicon_melts_there_are_none(coarse):

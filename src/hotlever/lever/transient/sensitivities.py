@@ -79,14 +79,16 @@ def with_sensitivities(
     Raises
     ------
     InputError
-        If a time is out of bounds, the wave form begins at a bias, or there are no derivatives by a
-        parameter.
+        If a time is out of bounds, the wave form begins at a bias, something else than the swept
+        supply heats the lever, or there are no derivatives by a parameter.
     HistoryEndError, ComputationError
         If silicon melts, or a step fails.
     """
     lever, times = lever.in_pulses(), checked_times(at)
     if waveform.before_V != 0.0:
         raise InputError(f"found a wave form that begins at {waveform.before_V:g} V, expected 0 V")
+    # how the parameters move the state before it is left out
+    lever.circuit.need_cold_start("a derivative in time")
     if not names:
         raise InputError("found no parameter, expected one by which there are derivatives")
     declared = parameters_of(lever.probe, anywhere=True)
