@@ -102,11 +102,16 @@ def test_standard_errors_are_honest_at_the_papers_counts_with_spikes_and_band():
 @pytest.mark.parametrize(
     ("instrument", "options"),
     [
-        (Instrument(band=0.0, spike_rate=3.0), PeakOptions()),
-        (Instrument(gain=4.0, read_noise=15.0, spike_rate=0.0), PeakOptions()),
-        (Instrument(counts=3000.0, fano=-0.06), PeakOptions("fano")),
-        (Instrument(counts=3000.0, resolution=1.5), PeakOptions("voigt", resolution=1.5)),
         (Instrument(counts=3000.0, resolution=2.0), PeakOptions("voigt")),
+        *(
+            pytest.param(*one, marks=pytest.mark.slow)
+            for one in (
+                (Instrument(band=0.0, spike_rate=3.0), PeakOptions()),
+                (Instrument(gain=4.0, read_noise=15.0, spike_rate=0.0), PeakOptions()),
+                (Instrument(counts=3000.0, fano=-0.06), PeakOptions("fano")),
+                (Instrument(counts=3000.0, resolution=1.5), PeakOptions("voigt", resolution=1.5)),
+            )
+        ),
     ],
 )
 def test_errors_of_the_centre_are_honest_on_other_instruments(instrument, options):

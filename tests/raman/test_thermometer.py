@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -143,6 +144,28 @@ def test_reference_of_the_day_replaces_the_calibrations(hot_plate):
     assert thermometer.reference_stderr == pytest.approx(room.centre_stderr, rel=0.02)
     wrong = Thermometer(found).read([shifted[20].peak.centre], [0.1])
     assert abs(wrong.temperature[0] - 795.0) > 40.0
+
+
+def test_references_that_differ_by_more_than_their_noise_say_how_sure_they_are():
+    """As on an axis that comes back to 0.1 cm⁻¹: three of them are known to 0.06."""
+    peak = fit_peak(*synthetic.spectrum(295.0, np.random.default_rng(3)))
+    lines = [(replace(peak, centre=520.0 + d, centre_stderr=0.01), None) for d in (-0.1, 0.0, 0.1)]
+    thermometer = Thermometer(calibrate_raman(points(PLATE)))
+    assert thermometer.with_reference(lines).reference_stderr == pytest.approx(0.1 / np.sqrt(3.0))
+    assert thermometer.with_reference(lines[:1]).reference_stderr == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.04, 0.3])
+def test_what_lines_of_the_series_scatter_beyond_their_noise_others_do_too(scatter):
+    """Places known to 0.04 cm⁻¹, on an axis that comes back to so much."""
+    pulls = []
+    for seed in range(60):
+        *series, line = points(np.append(PLATE, 700.0), noise=np.hypot(0.04, scatter), seed=seed)
+        reading = Thermometer(calibrate_raman(series)).read([line.centre_cm], [0.04])
+        assert reading.noise <= reading.error
+        pulls.append((reading.temperature - 700.0).item() / reading.error.item())
+    # some of the scatter by chance seems to be none
+    assert 0.7 < np.std(pulls) < 1.3
 
 
 def test_reference_at_another_temperature_is_brought_to_room_temperature():

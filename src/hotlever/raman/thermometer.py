@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, ValidationError, model_validator
+from scipy.special import chdtri
 
 from hotlever import __version__
 from hotlever import spieser2017 as paper
@@ -132,6 +133,24 @@ class RamanCalibration(Record):
     def options(self) -> PeakOptions:
         """How the lines of its spectra were fitted, and those of others must be."""
         return PeakOptions(self.line_shape, self.resolution_cm, band_evidence=self.band_evidence)
+
+    @property
+    def scatter_cm(self) -> float:
+        """Standard deviation (cm⁻¹) of lines of the series about the law, beyond their noise.
+
+        It may be the axis that does not come back, or the hot plate, and nobody can tell which. It
+        is 0 where noise scatters as much in one series of a hundred.
+        """
+        law, noise = self.anharmonic, np.array([point.centre_stderr_cm for point in self.points])
+        freedom = noise.size - (2 if law.ratio_fixed else 3)
+        if self.reference_cm is None or freedom < 1 or not (noise > 0.0).all():
+            return 0.0
+        temperature = np.array([point.temperature_K for point in self.points])
+        shift = np.array([point.centre_cm for point in self.points]) - self.reference_cm
+        away = shift - law.shift(temperature, self.room_temperature_K)[0]
+        if np.sum((away / noise) ** 2) < chdtri(freedom, 0.01):
+            return 0.0
+        return float(np.sqrt(max(np.sum(away**2) / freedom - np.mean(noise**2), 0.0)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the calibration as JSON, whole or not at all."""
@@ -342,7 +361,7 @@ class LineTemperature:
     shift: Array  #: (n,), against the line at room temperature, cm⁻¹
     temperature: Array  #: (n,), K; NaN where silicon has no such line
     error: Array  #: (n,), K
-    noise: Array  #: (n,), K; the part of the error that is each one's own: photon noise
+    noise: Array  #: (n,), K; the part of the error that is each one's own: noise and scatter
     outside: np.ndarray  #: (n,), whether the temperature lies outside the calibrated range
 
 
@@ -395,10 +414,14 @@ class Thermometer:
             raise InputError("reference: no spectrum with a silicon line")
         centres, weights, temperatures = np.array(lines).T
         references = centres - self.calibration.anharmonic.shift(temperatures, room)[0]
+        reference, covariance, chi_square = _least_squares(
+            np.ones((len(lines), 1)), references, weights**-0.5
+        )
         return replace(
             self,
-            reference=float(np.average(references, weights=weights)),
-            reference_stderr=float(np.sum(weights) ** -0.5),
+            reference=float(reference[0]),
+            # lines that differ by more than their noise say how well each of them is known
+            reference_stderr=float(np.sqrt(covariance[0, 0] * max(chi_square, 1.0))),
         )
 
     def read(self, centre: ArrayLike, stderr: ArrayLike) -> LineTemperature:
@@ -412,12 +435,13 @@ class Thermometer:
         Returns
         -------
         LineTemperature
-            The error adds in quadrature: photon noise, the calibration's covariance, laser
-            heating, stress, and what the law itself may be wrong by: for the linear law the
-            paper's ±(5 K + 0.02 ΔT) or, where larger, its distance from the anharmonic law;
-            for the anharmonic law its distance from a parabola through the same points (the
-            paper's band, where the constants are the published ones). Both grow outside the
-            calibrated range. All but the photon noise is common to the lines.
+            The error adds in quadrature: photon noise, what lines of the series scatter by
+            beyond it, the calibration's covariance, laser heating, stress, and what the law
+            itself may be wrong by: for the linear law the paper's ±(5 K + 0.02 ΔT) or, where
+            larger, its distance from the anharmonic law; for the anharmonic law its distance
+            from a parabola through the same points (the paper's band, where the constants are
+            the published ones). Both grow outside the calibrated range. All but noise and
+            scatter is common to the lines.
         """
         calibration, room = self.calibration, self.calibration.room_temperature_K
         linear, law = calibration.linear, calibration.anharmonic
@@ -428,7 +452,7 @@ class Thermometer:
             covariance[0, :] = covariance[:, 0] = 0.0
             covariance[0, 0] = reference_stderr**2
         shift = np.atleast_1d(np.asarray(centre, dtype=float)) - reference
-        noise = np.atleast_1d(np.asarray(stderr, dtype=float))
+        noise = np.hypot(np.atleast_1d(np.asarray(stderr, dtype=float)), calibration.scatter_cm)
         temperature = law.temperature(shift, room)
         # where the law has no inverse there is no temperature; any will do to go on with
         exists = np.isfinite(temperature)

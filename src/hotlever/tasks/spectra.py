@@ -353,6 +353,13 @@ def _describe(reporter: Reporter, calibration: RamanCalibration) -> None:
         reporter.note(
             f"the line leaves the paper's error band at {where} K: the shift is not linear"
         )
+    if scatter_cm := calibration.scatter_cm:
+        scatter_K = scatter_cm * abs(line.slope_K_cm)
+        reporter.note(
+            f"its lines scatter by {scatter_cm:.2g} cm⁻¹ ({scatter_K:.2g} K) beyond their noise: "
+            "if the hot plate is sure, the axis does not come back, and each temperature's error "
+            "holds that"
+        )
     if law.ratio_fixed:
         reporter.note(
             "too few temperatures to tell three- from four-phonon terms: their ratio is the "
