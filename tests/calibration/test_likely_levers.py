@@ -137,6 +137,6 @@ def test_samples_of_a_calibration_are_hotter_than_its_last_row_as_often_as_colde
     sampled = calibrate(below_the_knee, samples=2000)
     assert any("quantiles of posterior samples" in note for note in sampled.notes)
     last = sampled.table.isel(bias=-1)
-    low, _, high = known.likely.band(below_the_knee.bias_V[-1:])[:, 0]
+    low, high = known.likely.band(below_the_knee.bias_V[-1:])[:, 0]
     found = [float(last.tip_low_K), float(last.tip_high_K)]
     assert found == pytest.approx([low, high], abs=0.25 * float(last.tip_stderr_K))

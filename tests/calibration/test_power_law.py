@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from hotlever.errors import InputError
 from hotlever.estimate.power_law import EQ12, fit_power_law, law_of_model, read_power_law
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 POWER = np.linspace(0.1, 4.0, 80)
 
 

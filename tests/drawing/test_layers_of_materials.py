@@ -28,6 +28,8 @@ from of_materials import (
     silicon_with_a_film,
 )
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 OPTION_III = published("option III").material
 BIAS = [2.0, 7.22, 9.0]
 

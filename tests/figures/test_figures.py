@@ -31,6 +31,8 @@ from hotlever.probe import Probe
 from hotlever.report.report_page import Page
 from made_up import levers
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 STORED = Path(__file__).parents[1] / "stored" / "1.0.0"
 
 

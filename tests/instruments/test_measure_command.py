@@ -28,7 +28,7 @@ def test_a_twin_is_measured_and_calibrated(run, tmp_path):
     assert text.index("# source: KEITHLEY") < text.index("V_b (V),I_h (mA),V_r (V)")
     last = read_calibration(tmp_path / "cal.json").table.isel(bias=-1)
     told = float(re.search(r"the tip is at (\d+) K", out)[1])
-    assert told == pytest.approx(float(last.tip_K), abs=0.5 * float(last.tip_stderr_K))
+    assert told == pytest.approx(float(last.tip_K), abs=0.1 * float(last.tip_stderr_K))
     assert 350.0 < told < 500.0
 
 

@@ -15,6 +15,8 @@ from hotlever.lever.newton import NewtonOptions
 from hotlever.lever.solved_states import solve_at
 from hotlever.probe import Probe
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 EXAMPLES = Path(__file__).parents[2] / "src/hotlever/examples"
 
 

@@ -18,6 +18,8 @@ from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import dimensions_of, nuisances
 from hotlever.probe.tip import Tip
 
+pytestmark = pytest.mark.usefixtures("coarse_meshes")
+
 REACH = Reach(Probe.reference().circuit, 6.0)
 PROBES = {
     "three-leg": Probe.reference(),

@@ -154,8 +154,8 @@ class LikelyLevers:
         return np.take_along_axis(np.take_along_axis(tips, order, 0), np.transpose(rows), 0)
 
     def band(self, bias_V: Array) -> Array:
-        """Return below what (K) 2.5, 50 and 97.5 % of the tips lie at some biases (V), (3, n)."""
-        return self.quantiles(bias_V, np.array([0.025, 0.5, 0.975]))
+        """Return between what (K) 95 % of the tips lie at some biases (V), (2, n)."""
+        return self.quantiles(bias_V, np.array([0.025, 0.975]))
 
     @property
     def first_order(self) -> bool:

@@ -173,10 +173,11 @@ def _rows(ramp: Ramp) -> dict[str, Any]:
         "limit_K": ramp.limit_K,
     }
     biases = np.linspace(0.0, max(shown["bias_V"]), 101)[1:]
-    low, tip, high = ramp.known.likely.band(biases)
+    low, high = ramp.known.likely.band(biases)
     return shown | {
         "band_V": biases.tolist(),
-        "tip_K": tip.tolist(),
+        # that of the most likely lever, as a calibration and what is foretold have it
+        "tip_K": ramp.known.tip(biases)[0].tolist(),
         "low_K": low.tolist(),
         "high_K": high.tolist(),
     }
@@ -189,10 +190,10 @@ def _result(output: Path, ramp: Ramp) -> str:
     readings = ramp.readings
     text = f"{counted(len(readings), 'row')} in {output}: {ramp.reason}.\n"
     if ramp.tells:
-        last_V = max(reading.bias_V for reading in readings)
-        low, tip, high = ramp.known.likely.band(np.array([last_V]))[:, 0].tolist()
+        at = np.array([max(reading.bias_V for reading in readings)])
+        tip_K, (low, high) = ramp.known.tip(at)[0].item(), ramp.known.likely.band(at)[:, 0]
         text += (
-            f"At {last_V:.4g} V the tip is at {tip:.0f} K, with 95 % between {low:.0f} and "
+            f"At {at.item():.4g} V the tip is at {tip_K:.0f} K, with 95 % between {low:.0f} and "
             f"{high:.0f} K.\n"
         )
     return text
