@@ -15,6 +15,7 @@ from hotlever.errors import InputError
 from hotlever.estimate import Measurement, fit, read_fit
 from hotlever.estimate.experiment_in_time import ExperimentInTime
 from hotlever.lever.transient import pulse, simulate, sine, step
+from hotlever.probe import Probe
 
 TIMES = np.array([0.2, 1.0, 3.0, 6.0, 10.0, 15.0, 20.0])
 WAVE = pulse(9.0, 30.0)
@@ -84,6 +85,16 @@ def test_the_command_fits_a_file_in_time(coarse, run, refused):
         Path("iv.csv").write_text("V_b (V),I_h (mA)\n1,0.14\n2,0.28\n3,0.42\n")
         Path("data.csv").write_text("Time/ms,V_b (V),I_h (mA)\n0.001,9,1.28\n0.002,9,1.27\n")
         assert "expects a slow sweep of the bias" in refused("calibrate", *words, below_notes=True)
+
+
+def test_the_full_lever_too_is_one_whose_holder_stays_cold():
+    on_chip = Probe.reference().with_(chip_K_per_mW=20.0)
+    with on_coarse_meshes():
+        model = ExperimentInTime.of(on_chip, np.array([1.0, 500.0]), step(6.0), ["n_d"])
+    at = model.predict(on_chip)
+    # by the same mesh there is nothing to correct
+    confirmed = model.confirmed(at).predict(on_chip, at)
+    np.testing.assert_allclose(confirmed.values, at.values, rtol=1e-4)
 
 
 def test_very_many_rows_lie_on_a_spline_between_few(coarse):

@@ -189,9 +189,8 @@ class ExperimentInTime:
         """
         if self.full is None:
             return self
-        history = integrate(
-            self.full.lever(at.probe), self.waveform, at=self.times.at, tolerance_K=self.tolerance_K
-        )
+        lever = self.full.lever(at.probe).in_pulses()
+        history = integrate(lever, self.waveform, at=self.times.at, tolerance_K=self.tolerance_K)
         return replace(self, offset=observables_of(history) - at.coarse)
 
 
