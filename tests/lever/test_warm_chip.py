@@ -9,7 +9,9 @@ from taylor import remainder_orders
 from hotlever.lever import Lever
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import COARSE
-from hotlever.lever.transient import pulse, simulate
+from hotlever.lever.transient import pulse, rise_times, simulate, spectrum
+from hotlever.lever.transient.frequency_domain import harmonics
+from hotlever.lever.transient.modes import slowest_modes
 from hotlever.probe import Probe
 from hotlever.probe.parts import mean_inverse_distance, spreading_K_per_mW
 from hotlever.probe.priors import Prior, as_known, known_beforehand
@@ -99,6 +101,32 @@ def test_a_long_pulse_ends_where_a_lever_on_its_chip_rests(coarse):
     assert history.tip_K.values[1] == pytest.approx(rest.tip_K.item(), abs=0.3)
     assert "the holder of the chip stays cold" in history.notes
     assert simulate(on_chip.in_pulses(), pulse(5.0, 1.0), at=[1.0]).notes == ""
+
+
+def test_the_holder_does_not_follow_what_oscillates(run):
+    on_chip = Lever(Probe.reference().with_(chip_K_per_mW=20.0), COARSE)
+    spread = on_chip.in_pulses().circuit.chip_K_per_mW
+    (state,) = on_chip.solve([6.0])
+    # in vacuum a holder that stays as warm is a warmer base
+    warmer = 293.0 + (20.0 - spread) * state.lever_V * state.current_mA
+    like = Probe.reference().with_(chip_K_per_mW=spread, base_temperature_K=warmer)
+    (other,) = Lever(like, COARSE).solve([6.0])
+    frequency = [1.0, 3e3, 1e6]
+    answers = [spectrum(each, frequency) for each in (state, other)]
+    for name in ("impedance_real_ohm", "tip_per_bias_K_per_V"):
+        found, expected = (answer[name].values for answer in answers)
+        np.testing.assert_allclose(found, expected, rtol=1e-4)
+    constants = [slowest_modes(each)[0] for each in (state, other)]
+    np.testing.assert_allclose(*constants, rtol=1e-4)
+    first, expected = (
+        harmonics(each.lever, 6.0, 1e-3, frequency).first_harmonic_V.values
+        for each in (state, other)
+    )
+    np.testing.assert_allclose(first, expected, rtol=5e-4)
+    times = [rise_times(each, [4.0]).heating_us for each in (on_chip, on_chip.in_pulses())]
+    assert times[0] == times[1]
+    words = ("--bias", "6", "--frequency", "1kHz", "--set", "chip_K_per_mW=20")
+    assert "note: the holder of the chip does not follow" in run("spectrum", *words)[2]
 
 
 def test_calibrations_are_on_a_chip_unless_laws_are_the_papers():

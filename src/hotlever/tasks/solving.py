@@ -177,6 +177,7 @@ def respond(
             data = spectrum(state, frequencies)
         else:
             data = harmonics(meshed, volts, swing, frequencies, update)
+    reporter.note(*notes_of(data))
     columns = in_a_file(data, SPECTRUM_COLUMNS if swing is None else HARMONIC_COLUMNS)
     give_table(reporter, data, columns, output, plot, lambda figures: figures.figure_of(data))
 

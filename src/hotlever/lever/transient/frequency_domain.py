@@ -10,6 +10,8 @@ answer is found at once, by harmonic balance: at some times of a period the equa
 are evaluated side by side, their Fourier coefficients are the residual, and each of these is
 corrected by the equations linearised about the mean state. Modes are those of steps up and down
 from the operating point: such a step holds all times from the shortest to the longest.
+
+The holder of a chip, which takes milliseconds and longer, follows the mean alone.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from hotlever.lever.dataset import probe_attributes
 from hotlever.lever.equations import LeverEquations
 from hotlever.lever.lever import State
 from hotlever.lever.space import LEVER
-from hotlever.lever.transient.history import integrate
+from hotlever.lever.transient.history import integrate, note_on_holder
 from hotlever.lever.transient.modes import slowest_modes
 from hotlever.lever.transient.reduced import space_of_modes
 from hotlever.lever.transient.waveform import step
@@ -80,7 +82,7 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
     frequency = checked_frequencies(frequency_Hz)
     if state.current_mA == 0.0:
         raise InputError("found no current, expected a bias at which the lever is heated")
-    equations, x = state.lever.equations, state.x
+    equations, x = state.lever.in_pulses().equations, state.x
     unit = np.zeros_like(x)
     unit[-1] = 1.0
     current = equations.observed_gradient(x)[..., 1]
@@ -132,7 +134,12 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
         name: getattr(state, name) for name in ("bias_V", "lever_V", "current_mA", "tip_K")
     }
     seen |= probe_attributes(state.lever.probe)
+    seen["notes"] = note_on_holder(state.lever, _FOLLOWS_NOT)
     return labelled(columns, "frequency", {"frequency": frequency}, **seen)
+
+
+#: What the holder of a chip does.
+_FOLLOWS_NOT = "does not follow what oscillates"
 
 
 def _polar(name: str, unit: str, values: Complex) -> dict[str, Array]:
@@ -212,7 +219,8 @@ def harmonics(
     space = space_of_modes(lever, _steps(lever, rest, amplitude_V), rest.x)
     equations = LeverEquations.of_probe(space, lever.probe)
     start = space.coordinates(rest.x)
-    balance = HarmonicBalance(equations, lever.circuit, start, offset_V, amplitude_V)
+    in_time = lever.in_pulses().equations.terminals.chip_mW_per_K
+    balance = HarmonicBalance(equations, lever.circuit, start, offset_V, amplitude_V, in_time)
     answers = [balance.solved(hertz) for hertz in each(frequency.tolist(), progress)]
     lever_V, mean = np.array([volts for volts, _ in answers]), [kelvin for _, kelvin in answers]
     columns: dict[str, ArrayLike] = {"frequency_Hz": frequency, "mean_tip_K": mean}
@@ -226,6 +234,7 @@ def harmonics(
             columns |= _polar(f"{name}_{of}harmonic", "V", volts[:, number])
     attributes: dict[str, Any] = {"bias_V": offset_V, "amplitude_V": amplitude_V}
     attributes |= probe_attributes(lever.probe)
+    attributes["notes"] = note_on_holder(lever, _FOLLOWS_NOT)
     return labelled(columns, "frequency", {"frequency": frequency}, **attributes)
 
 
@@ -240,6 +249,8 @@ class HarmonicBalance:
         The state at rest at the offset.
     offset, amplitude : float
         Of the bias (V).
+    chip_mW_per_K : float
+        Of the chip below the leg ends, for what oscillates.
     times : int
         Of a period; even.
     """
@@ -251,9 +262,11 @@ class HarmonicBalance:
         start: Array,
         offset: float,
         amplitude: float,
+        chip_mW_per_K: float,
         times: int = 16,
     ) -> None:
         self._equations, self._circuit, self._start = equations, circuit, start
+        self._chip_mW_per_K = chip_mW_per_K
         self._times = times
         angles = 2.0 * np.pi * np.arange(times) / times
         self._bias = offset + amplitude * np.cos(angles)
@@ -271,15 +284,15 @@ class HarmonicBalance:
         turns = 1j * per_us * np.arange(self._times // 2 + 1)
         turns[-1] = 0.0
         x = np.repeat(self._start, self._times, axis=1)
-        of_air = self._taken_up(turns)
+        taken_up = self._taken_up(turns)
         inverses = None
         for done in range(200):
             if inverses is None or done in (2, 8):
-                inverses = self._inverses(x.mean(axis=1, keepdims=True), turns, of_air)
+                inverses = self._inverses(x.mean(axis=1, keepdims=True), turns, taken_up)
             stored = self._equations.storage(x)
             rest = self._equations.balance_in(self._circuit, x, self._bias)
             residual = np.fft.rfft(rest, axis=1) + turns * np.fft.rfft(stored, axis=1)
-            residual += np.einsum("kij,jk->ik", of_air, np.fft.rfft(x, axis=1))
+            residual += np.einsum("kij,jk->ik", taken_up, np.fft.rfft(x, axis=1))
             change = -np.einsum("kij,jk->ik", inverses, residual)
             x = x + np.fft.irfft(change, self._times, axis=1)
             if not np.isfinite(x).all():
@@ -302,33 +315,45 @@ class HarmonicBalance:
         return True
 
     def _taken_up(self, turns: Complex) -> Complex:
-        """Return what the air takes up of each harmonic, (harmonics, size + 1, size + 1)."""
-        air = self._equations.heat_in_air
-        own = air.coordinates
-        return np.array([own.T @ air.taken_up(turn) @ own for turn in turns])
+        """Return what the air takes up of each harmonic, (harmonics, size + 1, size + 1).
 
-    def _inverses(self, x: Array, turns: Complex, of_air: Complex) -> Complex:
+        And the chip, beyond what it does at rest.
+        """
+        air, terminals = self._equations.heat_in_air, self._equations.terminals
+        own = air.coordinates
+        by_harmonic = np.array([own.T @ air.taken_up(turn) @ own for turn in turns])
+        if np.isfinite(self._chip_mW_per_K):
+            unit, more = np.eye(len(self._start)), np.zeros((len(self._start),) * 2)
+            terminals.add_heat_into_chip(more, unit, self._chip_mW_per_K - terminals.chip_mW_per_K)
+            by_harmonic[1:] += more
+        return by_harmonic
+
+    def _inverses(self, x: Array, turns: Complex, taken_up: Complex) -> Complex:
         """Return the inverses of the equations linearised about a state, for each harmonic."""
         unit = np.eye(len(x))
         many = np.repeat(x, len(x), axis=1)
         residual = self._equations.balance_change_in(self._circuit, many, unit)
         moving = self._equations.storage_change(many, unit)
-        return np.linalg.inv(turns[:, None, None] * moving + residual + of_air)
+        return np.linalg.inv(turns[:, None, None] * moving + residual + taken_up)
 
 
 def _steps(lever: Lever, start: State, amplitude: float) -> Array:
-    """Return states of a lever at rest whose bias is stepped up, and down."""
+    """Return states of a lever at rest whose bias is stepped up, and down.
+
+    If a holder of its chip gets warm, as it does for the mean, then with a cold one as well.
+    """
     # after so many of the slowest time constants the lever is at rest
     until = 12.0 * abs(float(slowest_modes(start)[0][0]))
-    states = [start.x]
-    for bias in (start.bias_V + amplitude, start.bias_V - amplitude):
-        integrate(
-            lever,
-            step(bias),
-            until,
-            start=start,
-            tolerance_K=1e-2,
-            per_step=2,
-            callback=lambda t, state: states.append(state.x),
-        )
+    states, in_time = [start.x], lever.in_pulses()
+    for one in [lever] if in_time is lever else [lever, in_time]:
+        (begin,) = [start] if one is lever else one.solve([start.bias_V])
+        away = start.x - begin.x
+
+        def keep(t: float, state: State, away: Array = away) -> None:
+            states.append(state.x + away)
+
+        for bias in (start.bias_V + amplitude, start.bias_V - amplitude):
+            integrate(
+                one, step(bias), until, start=begin, tolerance_K=1e-2, per_step=2, callback=keep
+            )
     return np.hstack(states)

@@ -318,6 +318,17 @@ def history_dataset(lever: Lever, waveform: Waveform, columns: Mapping[str, Arra
     )
 
 
+def note_on_holder(lever: Lever, does: str) -> str:
+    """Say what the holder of a chip does while a lever changes, if it gets warm at rest."""
+    at_rest, in_time = (each.circuit.chip_K_per_mW for each in (lever, lever.in_pulses()))
+    if in_time == at_rest:
+        return ""
+    return (
+        f"the holder of the chip {does}: leg ends get warmer by {in_time:.2g} K/mW, which is what "
+        f"spreads in the chip, and not by chip_K_per_mW = {at_rest:g} as at rest"
+    )
+
+
 def write_history(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write a history as ``.csv`` (the columns of `TIME_COLUMNS`) or ``.nc`` (everything).
 

@@ -9,6 +9,8 @@ Air without an end has no modes of its own: its answer has a cut where the modes
 A time constant in air is where the lever would resonate, with the heat capacity of the air that
 goes along, to second order in what leaks into the cut; the last per cent of a lever's rise follow
 no exponential.
+
+All this is faster than the holder of a chip, which stays as warm as it is at rest.
 """
 
 from __future__ import annotations
@@ -67,7 +69,7 @@ def slowest_modes(state: State, source: Source = "bias", count: int = 4) -> tupl
     """
     if source not in get_args(Source):
         raise unknown_name("source", source, get_args(Source))
-    equations, x = state.lever.equations, state.x
+    equations, x = state.lever.in_pulses().equations, state.x
     held = {
         "bias": (1.0, state.lever.circuit.series_kohm),
         "voltage": (1.0, 0.0),
@@ -255,7 +257,8 @@ def _swing(time: Array, share: Array) -> tuple[float, float]:
 def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
     """Return how long heating and cooling take between 10 and 90 % of the tip's rise.
 
-    The bias is switched on, and, when the lever has come to rest, off.
+    The bias is switched on, and, when the lever has come to rest, off; the holder of a chip stays
+    cold meanwhile.
 
     Returns
     -------
@@ -274,6 +277,7 @@ def rise_times(lever: Lever, bias: ArrayLike) -> xr.Dataset:
     >>> found.heating_us.values.round().tolist(), found.cooling_us.values.round().tolist()
     ([50.0], [43.0])
     """
+    lever = lever.in_pulses()
     states = lever.solve(bias)
     base, columns = lever.circuit.base_temperature_K, np.empty((3, len(states)))
     for row, state in enumerate(states):

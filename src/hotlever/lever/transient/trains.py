@@ -27,6 +27,7 @@ from hotlever.lever.transient.history import (
     history_dataset,
     initial_state,
     integrate,
+    note_on_holder,
 )
 from hotlever.lever.transient.reduced import on_all_nodes, reduced_in_time
 from hotlever.lever.transient.waveform import Polyline, Waveform
@@ -100,15 +101,7 @@ def simulate(
     >>> history.tip_K.values.round().tolist()
     [410.0, 293.0]
     """
-    at_rest, lever = lever.circuit.chip_K_per_mW, lever.in_pulses()
-    in_time = lever.circuit.chip_K_per_mW
-    if in_time < at_rest:
-        cold_holder = (
-            f"the holder of the chip stays cold: leg ends get warmer by {in_time:.2g} K/mW, which "
-            f"is what spreads in the chip, and not by chip_K_per_mW = {at_rest:g} as at rest"
-        )
-    else:
-        cold_holder = ""
+    cold_holder, lever = note_on_holder(lever, "stays cold"), lever.in_pulses()
     end, period = waveform.usual_end if until is None else until, waveform.period
     if at is not None and until is None:
         end = float(checked_times(at)[-1])
