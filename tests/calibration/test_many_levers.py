@@ -95,6 +95,15 @@ def test_levers_are_compared_where_all_were_measured(calibrations):
     assert beyond.counts.sel(quantity="tip_K").values.tolist() == [True, True, False]
 
 
+def test_many_levers_do_not_make_what_is_wrong_with_all_smaller(calibrations):
+    table = compare_levers({f"{number}": calibrations["a"] for number in range(9)})
+    alone, mean = table.stderr.isel(lever=0), table.mean_stderr
+    assert mean.sel(quantity="tip_K") == pytest.approx(alone.sel(quantity="tip_K"))
+    # what was measured of each is another matter
+    measured = {"quantity": "knee_lever_V"}
+    assert mean.sel(measured) == pytest.approx(alone.sel(measured) / 3.0)
+
+
 @pytest.mark.parametrize("converged", [True, False])
 def test_a_lever_that_is_not_described_has_no_numbers(calibrations, converged):
     refused = replace(calibrations["a"], reason="current differs by 5%", converged=converged)

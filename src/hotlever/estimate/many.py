@@ -479,7 +479,9 @@ def _by_the_tip(
         name: [values[name] for values in tips.values()] for name in ("tip_low_K", "tip_high_K")
     }
     more = {at.along: [at.value] * len(tips), **limits, **more, "reason": reasons}
-    table = compared(calibrations, quantities, named, more)
+    # laws, drawing and thermometer are those of all, and known no better by the number of levers
+    in_common = ["tip_K", "knee_tip_K", "k"]
+    table = compared(calibrations, quantities, named, more, in_common)
     return table.assign_attrs(along=at.along)
 
 
@@ -488,6 +490,7 @@ def compared(
     quantities: Mapping[str, Mapping[str, tuple[float, float | None]]],
     written: Mapping[str, Compared],
     more: Mapping[str, Any] | None = None,
+    in_common: Sequence[str] = (),
 ) -> xr.Dataset:
     """Put quantities of several levers side by side.
 
@@ -505,6 +508,8 @@ def compared(
         By quantity.
     more : mapping, optional
         Further columns on ``lever``.
+    in_common : sequence of str, optional
+        Quantities of which the levers may have what is wrong in common.
 
     Returns
     -------
@@ -515,7 +520,7 @@ def compared(
         standard deviation between levers (NaN for one lever); ``chi_square`` of the values about
         their mean, NaN without standard errors; ``birge_ratio``, the root of it over the degrees
         of freedom; and ``mean_stderr``, the standard error of the mean, larger by the Birge ratio
-        where that is above 1.
+        where that is above 1, and no smaller than the mean of the errors that are in common.
 
     Raises
     ------
@@ -547,6 +552,7 @@ def compared(
     chi_square = squares.where(stated.any("lever"))
     birge_ratio = (chi_square / freedom) ** 0.5
     mean_stderr = (total**-0.5).where(stated.any("lever")) * np.fmax(birge_ratio, 1.0)
+    of_all = ((weight * stderr).sum("lever") / total).where(np.isin(names, in_common), 0.0)
     away = counting - counting.mean("lever")
     columns: dict[str, xr.DataArray] = {
         "value": value,
@@ -554,7 +560,7 @@ def compared(
         "counts": counts,
         "described": described,
         "mean": mean,
-        "mean_stderr": mean_stderr,
+        "mean_stderr": mean_stderr.where(~(mean_stderr < of_all), of_all),
         "scatter": ((away**2).sum("lever") / freedom) ** 0.5,
         "chi_square": chi_square,
         "birge_ratio": birge_ratio,
