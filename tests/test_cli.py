@@ -330,6 +330,11 @@ def test_reproduce_writes_the_page(run, tmp_path):
         (("sweep", "boron-lever.toml", "--set", "n_d=1e17"), "'n_d': did you mean 'hot.n_d'?"),
         (("sweep", "--set", "leg_um=3"), "unknown name 'leg_um': did you mean 'leg_width_um'?"),
         (("sweep", "--set", "surface_gap_um=1"), "--set surface_gap_um: counts in air, and this"),
+        (("sweep", "--set", "emissivity=0.3"), "off; expected --physics radiation too"),
+        (
+            ("sweep", "--set", "scattering_exponent=0", "--physics", "radiation"),
+            "--set scattering_exponent: counts with an effect that is off",
+        ),
         (("sweep", "--set", "medium=air", "--medium", "vacuum"), "it is what --medium states"),
         (("sweep", "--set", "radiation=true", "--physics", "none"), "it is what --physics states"),
         (("reader", "--set", "surface_gap_um=1"), "it is what --distance states"),

@@ -266,7 +266,7 @@ def test_zero_bias_is_the_base_temperature(coarse):
     assert (state.tip_K, state.current_mA, state.bias_V) == (293.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("bias", [[-1.0], [np.nan], [np.inf], []])
+@pytest.mark.parametrize("bias", [[-1.0], [np.nan], [np.inf], [], [[4.0, 8.0]], [4j]])
 def test_impossible_biases_are_refused(coarse, bias):
     with pytest.raises(InputError, match="expected"):
         coarse.sweep(bias)

@@ -247,6 +247,7 @@ def test_what_shows_nothing_is_refused():
         (["--medium", "vacuum"], "in vacuum a reader sees no surface, expected air"),
         (["--set", "tip.height_um=0.7"], "0.3 µm, expected distances above the tip's height, 0.7"),
         (["--bandwidth", "1kHz:1Hz"], "expected LOW:HIGH, such as 1Hz:1kHz"),
+        (["--bandwidth", "1Hz"], "found '1Hz', expected LOW:HIGH, such as 1Hz:1kHz"),
         (["--amplifier", "5"], "--amplifier: found '5', expected a number with a unit like V"),
         (["--hooge", "-1"], "hooge: found -1, expected a number from 0 to 1"),
         (["--vibration", "1"], "--vibration: found '1', expected a number with a unit like nm"),

@@ -272,7 +272,12 @@ def checked_bias(bias: ArrayLike, probe: Probe, and_back: bool = False) -> Array
         If one is not finite or there is none; or one is negative, unless that is another state
         than the positive one; or they do not rise where they must.
     """
-    values = np.atleast_1d(np.asarray(bias, dtype=float))
+    values = np.atleast_1d(np.asarray(bias))
+    if values.ndim > 1 or values.dtype.kind not in "iuf":
+        raise InputError(
+            f"found biases as {values.dtype} of shape {values.shape}, expected a row of numbers"
+        )
+    values = values.astype(float)
     lowest = probe.lowest_bias_V
     wrong = values[~np.isfinite(values) | (values < lowest)]
     if wrong.size:

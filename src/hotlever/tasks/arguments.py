@@ -359,7 +359,7 @@ def read_surrounded_probe(
     """Read a probe as `read_probe` does, in a medium.
 
     Unless the command takes air where nothing is said (`finds_air`), settings of the air around a
-    lever in vacuum are refused, since they would do nothing.
+    lever in vacuum are refused, since they would do nothing; so are those of effects that are off.
     """
     from hotlever.probe.probe import field_of
 
@@ -376,6 +376,13 @@ def read_surrounded_probe(
                     f"--set {name}: counts in air, and this lever is in vacuum; expected --medium "
                     "air too"
                 )
+    of_effect = {"emissivity": "radiation", "scattering_exponent": "thermoelectric"}
+    for name in parse_settings(lever.set, probe):
+        effect = of_effect.get(name.rpartition(".")[2])
+        if effect is not None and effect not in probe.physics.effects:
+            raise InputError(
+                f"--set {name}: counts with an effect that is off; expected --physics {effect} too"
+            )
     return probe
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt
+from hotlever.errors import ComputationError, InputError, as_far_as_possible, excerpt, quoted
 from hotlever.tasks.arguments import (
     HistoryOptions,
     LeverArguments,
@@ -322,7 +322,10 @@ def reader_noise(
     """
     from hotlever.lever.noise import NoiseOptions
 
-    low, _, high = bandwidth.partition(":")
+    low, colon, high = bandwidth.partition(":")
+    if not colon:
+        found = quoted(bandwidth)
+        raise InputError(f"--bandwidth: found {found}, expected LOW:HIGH, such as 1Hz:1kHz")
     return NoiseOptions(
         setting(low, "Hz", "--bandwidth"),
         setting(high, "Hz", "--bandwidth"),
