@@ -166,6 +166,16 @@ def test_files_head_it_as_laboratories_do_and_it_has_either_sign(tmp_path, headi
     assert not any("negative" in note and "V_bridge is" in note for note in data.notes)
 
 
+def test_the_offset_of_the_amplifier_has_no_polarity(bridged, sweep, tmp_path):
+    circuit, path = bridged.circuit, tmp_path / "measured.csv"
+    turned_V = circuit.bridge_voltage(-sweep.lever_V.values, -BIAS)
+    rows = zip(-BIAS, turned_V, strict=True)
+    path.write_text("V_b (V),V_bridge (V)\n" + "".join(f"{a},{b}\n" for a, b in rows))
+    data = read_measurement(path, circuit=circuit)
+    np.testing.assert_allclose(data.bias_V, BIAS)
+    np.testing.assert_allclose(data.further["bridge_output_V"], sweep.bridge_output_V, atol=1e-9)
+
+
 def test_the_example_shows_the_current_of_the_reference_probe_s():
     circuit = Probe.from_file(EXAMPLES / "bridge.toml").circuit
     by_bridge = read_measurement(EXAMPLES / "bridge.csv")

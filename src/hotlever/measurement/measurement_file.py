@@ -531,8 +531,10 @@ def _compare_voltages(contents: Contents) -> None:
         _put_resistance(contents, float(f"{1000.0 * kohm:.4g}"), origin, origin)
 
 
-def mirror(contents: Contents) -> None:
+def mirror(contents: Contents, bridge_offset_V: float = 0.0) -> None:
     """Turn rows of negative bias into those of the other polarity.
+
+    What the bridge's amplifier shows of no voltage (V) has no polarity.
 
     Raises
     ------
@@ -547,7 +549,8 @@ def mirror(contents: Contents) -> None:
     # what changes its sign with the polarity
     turned = ("V_b", "V_l", "I_h", "V_r", "V_bridge")
     for symbol in turned:
-        values[symbol] = sign * values[symbol]
+        offset = bridge_offset_V if symbol == "V_bridge" else 0.0
+        values[symbol] = offset + sign * (values[symbol] - offset)
         size = np.nanmax(np.abs(values[symbol]), initial=0.0)
         if not MEASURANDS[symbol].signed:
             contents.refuse(values[symbol] < -NOISE * size, "the same sign", bias, symbol)
@@ -765,7 +768,7 @@ def _complete_at_rest(
     find_bias(contents, circuit, None)
     bias = contents.values["V_b"]
     if symmetric:
-        mirror(contents)
+        mirror(contents, 0.0 if circuit is None else circuit.bridge_offset_V)
     check(contents, signed=not symmetric, series_ohm=series_ohm)
     sweeps = sweeps_of(bias)
     order = described(bias, sweeps)
