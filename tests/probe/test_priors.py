@@ -168,3 +168,10 @@ def test_a_prior_of_the_gas_counts_in_air_only():
     assert priors_of(texts, PROBE.in_medium("air"), "here") == {
         "gas_conductivity": Prior(1.0, 0.05)
     }
+
+
+def test_in_contact_the_gap_is_known_as_the_height_of_the_tip_that_it_is():
+    over = Probe.reference().with_(**{"tip.height_um": 0.7}, medium="air", surface_gap_um=0.7)
+    table = parameters_of(over.with_(sample="glass"))
+    assert table["surface_gap_um"].spread == table["height_um"].spread
+    assert parameters_of(over)["surface_gap_um"].spread == 0.1

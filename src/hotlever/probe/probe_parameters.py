@@ -152,9 +152,9 @@ def parameters_of(
     for name in probe.shape.dimensions():
         own = shifts if own_name(name) == EDGE_BIAS else {}
         add(name, 0.05 if name in matter else None, **own)
+    of_micrograph = 0.2
     for name in _of_the_tip(probe):
-        # from a micrograph
-        add(name, 0.2)
+        add(name, of_micrograph)
     if probe.contact is not None and 0 < probe.contact.interface_K_per_mW < OUT_OF_CONTACT:
         # nothing is known of it but its power of ten
         add("interface_K_per_mW", math.log(10.0), (1e-3, 1e3))
@@ -176,7 +176,8 @@ def parameters_of(
         # humidity, what is around, and dimensions as far as they matter to what air takes up
         add("gas_conductivity", 0.1, (0.2, 5.0))
         if probe.surroundings.surface_gap_um is not None:
-            add("surface_gap_um", 0.1)
+            # that of a tip in contact is its height
+            add("surface_gap_um", 0.1 if probe.contact is None else of_micrograph)
     return table
 
 
