@@ -271,7 +271,8 @@ def test_the_inversion_temperature_of_a_sample_is_that_of_its_laws_too(informed,
     for draw in np.argsort(of_informed.n_i_1.values)[[0, 75, 149]]:
         silicon = informed.probe.with_(**drawn.iloc[draw]).heater_silicon
         own = of_informed.inversion_temperature.values[draw]
-        assert own == pytest.approx(float(silicon.inversion_temperature()), abs=1.0)
+        # by the laws to first order, of a temperature that is known to 14 K
+        assert own == pytest.approx(float(silicon.inversion_temperature()), abs=2.5)
 
 
 def test_a_profile_counts_priors(informed):

@@ -67,6 +67,7 @@ def test_a_strip_heats_as_the_sum_of_its_modes(strip):
 
 def test_its_time_constants_are_those_of_its_modes(strip):
     lever = SimpleNamespace(equations=strip, circuit=Circuit(series_resistance_ohm=0.0))
+    lever.in_pulses = lambda: lever
     state = State(lever, np.zeros((strip.space.size + 1, 1)))
     found, _ = slowest_modes(state, count=3)
     expected = (LENGTH / np.pi / np.array([1, 2, 3])) ** 2 / DIFFUSIVITY

@@ -9,7 +9,7 @@ is.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -92,6 +92,8 @@ def profile_likelihood(result: Estimate, name: str, *, points: int = 11) -> xr.D
     rows = {value: (0.0, result.probe.values(result.names))}
     reasons: dict[str, str] = {}
     longer_steps = 6  # that are added on a side until the interval closes
+    # the noise is that of the optimum all along, or squares would not compare
+    options = replace(residuals.numerics.search, scatter_rounds=0)
     for side, sign, way, bound in (
         ("lower", -1.0, "down", parameter.lower),
         ("upper", 1.0, "up", parameter.upper),
@@ -109,7 +111,7 @@ def profile_likelihood(result: Estimate, name: str, *, points: int = 11) -> xr.D
             try:
                 start = near.probe.replace({name: target})
                 predictor = Predictor(experiment, near=near)
-                near = Optimiser(penalised, predictor).solve(start).prediction
+                near = Optimiser(penalised, predictor, options).solve(start).prediction
             except ComputationError:
                 reasons[side] = f"as far as the lever can be solved ({target:.4g} cannot)"
                 break

@@ -250,7 +250,7 @@ class HarmonicBalance:
     offset, amplitude : float
         Of the bias (V).
     chip_mW_per_K : float
-        Of the chip below the leg ends, for what oscillates.
+        Of the chip below the leg ends, for what oscillates; infinite if it stays cold.
     times : int
         Of a period; even.
     """
@@ -262,7 +262,7 @@ class HarmonicBalance:
         start: Array,
         offset: float,
         amplitude: float,
-        chip_mW_per_K: float,
+        chip_mW_per_K: float = np.inf,
         times: int = 16,
     ) -> None:
         self._equations, self._circuit, self._start = equations, circuit, start
