@@ -141,13 +141,11 @@ class RamanCalibration(Record):
         It may be the axis that does not come back, or the hot plate, and nobody can tell which. It
         is 0 where noise scatters as much in one series of a hundred.
         """
-        law, noise = self.anharmonic, np.array([point.centre_stderr_cm for point in self.points])
-        freedom = noise.size - (2 if law.ratio_fixed else 3)
+        residuals = self.residuals()
+        away, noise = residuals["anharmonic_cm"], residuals["noise_cm"]
+        freedom = noise.size - (2 if self.anharmonic.ratio_fixed else 3)
         if self.reference_cm is None or freedom < 1 or not (noise > 0.0).all():
             return 0.0
-        temperature = np.array([point.temperature_K for point in self.points])
-        shift = np.array([point.centre_cm for point in self.points]) - self.reference_cm
-        away = shift - law.shift(temperature, self.room_temperature_K)[0]
         if np.sum((away / noise) ** 2) < chdtri(freedom, 0.01):
             return 0.0
         return float(np.sqrt(max(np.sum(away**2) / freedom - np.mean(noise**2), 0.0)))
@@ -159,7 +157,8 @@ class RamanCalibration(Record):
     def residuals(self) -> dict[str, Array]:
         """Of the series, by temperature: what each law reads less the hot plate, the paper's band.
 
-        Keys are ``temperature_K``, ``shift_cm``, ``linear_K``, ``anharmonic_K`` and ``band_K``.
+        Keys are ``temperature_K``, ``shift_cm``, ``noise_cm``, ``linear_K``, ``anharmonic_cm``,
+        ``anharmonic_K`` and ``band_K``.
         """
         points = sorted(self.points, key=lambda point: point.temperature_K)
         temperature = np.array([point.temperature_K for point in points])
@@ -170,6 +169,8 @@ class RamanCalibration(Record):
         return {
             "temperature_K": temperature,
             "shift_cm": shift,
+            "noise_cm": np.array([point.centre_stderr_cm for point in points]),
+            "anharmonic_cm": shift - predicted,
             "linear_K": linear - temperature,
             # near the fit the law is its tangent; this also holds where it has no inverse
             "anharmonic_K": (shift - predicted) / slope,

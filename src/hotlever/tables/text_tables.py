@@ -234,10 +234,8 @@ class _Reader:
         The next one's heading is ``Unit``, behind any column, or ``Source Unit`` behind
         ``Source Value``.
         """
-        units, cells = (
-            [""] * len(names),
-            [self._cells(*line, self._separator) for line in self.rows],
-        )
+        units = [""] * len(names)
+        cells = [self._cells(*line, self._separator) for line in self.rows]
         # what Keithley writes there, in capitals or not
         of_buffers = {"volt dc": "V", "amp dc": "A", "vdc": "V", "adc": "A"}
         for index, name in enumerate(names[1:], start=1):

@@ -365,11 +365,12 @@ def read_surrounded_probe(
 
     check_medium(lever.medium)
     probe = read_probe(reporter, lever.probe, lever.set, lever.physics)
+    changes = parse_settings(lever.set, probe)
     if lever.medium is not None:
-        refuse_set(parse_settings(lever.set, probe), "medium", ["medium"])
+        refuse_set(changes, "medium", ["medium"])
         probe = probe.in_medium(lever.medium)
     if probe.surroundings.medium == "vacuum" and not finds_air:
-        for name, value in parse_settings(lever.set, probe).items():
+        for name, value in changes.items():
             section, key, _ = field_of(probe, name)
             if section == "surroundings" and key != "medium" and value not in (None, False):
                 raise InputError(
@@ -377,7 +378,7 @@ def read_surrounded_probe(
                     "air too"
                 )
     of_effect = {"emissivity": "radiation", "scattering_exponent": "thermoelectric"}
-    for name in parse_settings(lever.set, probe):
+    for name in changes:
         effect = of_effect.get(name.rpartition(".")[2])
         if effect is not None and effect not in probe.physics.effects:
             raise InputError(

@@ -76,6 +76,7 @@ def touch(
         refuse("does not go with a wave form, which has biases of its own", bias=bias)
         reporter.note(*history.notes(drive))
     read = read_surrounded_probe(reporter, lever)
+    changes = parse_settings(lever.set, read)
     told = {
         "sample": (sample, "sample"),
         "radius": (radius, "apex_radius_um"),
@@ -83,7 +84,7 @@ def touch(
     }
     for option, (text, key) in told.items():
         if text is not None:
-            refuse_set(parse_settings(lever.set, read), option, [key])
+            refuse_set(changes, option, [key])
     touching = in_contact(reporter, read, sample, radius, interface)
     biases = parse_bias(bias, touching.lowest_bias_V)
     meshed = make_lever(reporter, touching)

@@ -133,13 +133,14 @@ def spectrum(state: State, frequency_Hz: ArrayLike) -> xr.Dataset:
     seen: dict[str, Any] = {
         name: getattr(state, name) for name in ("bias_V", "lever_V", "current_mA", "tip_K")
     }
-    seen |= probe_attributes(state.lever.probe)
-    seen["notes"] = note_on_holder(state.lever, _FOLLOWS_NOT)
+    seen |= _described(state.lever)
     return labelled(columns, "frequency", {"frequency": frequency}, **seen)
 
 
-#: What the holder of a chip does.
-_FOLLOWS_NOT = "does not follow what oscillates"
+def _described(lever: Lever) -> dict[str, Any]:
+    """Return attributes of a lever, and a note if the holder of its chip gets warm at rest."""
+    notes = note_on_holder(lever, "does not follow what oscillates")
+    return {**probe_attributes(lever.probe), "notes": notes}
 
 
 def _polar(name: str, unit: str, values: Complex) -> dict[str, Array]:
@@ -233,8 +234,7 @@ def harmonics(
         for number, name in enumerate(("first", "second", "third")):
             columns |= _polar(f"{name}_{of}harmonic", "V", volts[:, number])
     attributes: dict[str, Any] = {"bias_V": offset_V, "amplitude_V": amplitude_V}
-    attributes |= probe_attributes(lever.probe)
-    attributes["notes"] = note_on_holder(lever, _FOLLOWS_NOT)
+    attributes |= _described(lever)
     return labelled(columns, "frequency", {"frequency": frequency}, **attributes)
 
 
@@ -250,7 +250,7 @@ class HarmonicBalance:
     offset, amplitude : float
         Of the bias (V).
     chip_mW_per_K : float
-        Of the chip below the leg ends, for what oscillates; infinite if it stays cold.
+        Of the chip below the leg ends, for what oscillates; infinite if there is none.
     times : int
         Of a period; even.
     """
