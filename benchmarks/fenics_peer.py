@@ -53,6 +53,7 @@ from hotlever.materials import PARAMETERS
 from hotlever.measurement import with_measured_circuit
 from hotlever.probe import MeshOptions, Probe, mesh_layout
 from hotlever.quantities import OBSERVABLES
+from hotlever.spieser2017 import FITTED_OBSERVABLES
 from problems import (
     BIAS,
     EXAMPLE,
@@ -350,7 +351,8 @@ def paper_fit(measurement, probe, plain):
     problem = peer_problem(
         probe, lever.space.mesh, degree=3, quadrature=5, bias=measurement.bias_V[order].tolist()
     )
-    data = np.stack([measurement.observable(name)[order] for name in OBSERVABLES])
+    names = FITTED_OBSERVABLES["option III"]
+    data = np.stack([measurement.observable(name)[order] for name in names])
     largest = np.nanmax(np.abs(data), axis=1, keepdims=True)
     present = np.isfinite(data)
     parameters = lmfit.Parameters()
@@ -376,7 +378,7 @@ def paper_fit(measurement, probe, plain):
             processor += answer["processor_seconds"]
             if "error" in answer:
                 return np.full(present.sum(), FAR)
-            model = np.stack([answer[column.name] for column in OBSERVABLES.values()])
+            model = np.stack([answer[OBSERVABLES[name].name] for name in names])
             return ((model - data) / largest)[present]
 
         began = time.perf_counter()

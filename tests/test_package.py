@@ -176,6 +176,23 @@ def test_the_help_waits_for_no_numpy(tmp_path):
     assert not {"numpy", "scipy", "pydantic"} & set(modules)
 
 
+@pytest.mark.parametrize("stated", [None, "3"])
+def test_commands_start_one_thread_of_blas_unless_told_otherwise(monkeypatch, stated):
+    name = "OPENBLAS_NUM_THREADS"
+    monkeypatch.delenv(name, raising=False)
+    if stated:
+        monkeypatch.setenv(name, stated)
+    script = (
+        "import atexit, os, sys; from hotlever.cli import main;"
+        f"atexit.register(lambda: print(os.environ['{name}'], file=sys.stderr));"
+        "sys.argv[1:] = ['--version']; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stderr.split() == [stated or "1"]
+
+
 def test_datasets_offer_figures_before_matplotlib_is_loaded():
     script = (
         "import sys; from hotlever.datasets import labelled; data = labelled({'tip_K': [1.0]});"

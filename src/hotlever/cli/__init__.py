@@ -33,6 +33,9 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     gc.set_threshold(100_000)
     if arguments is None:
         arguments = sys.argv[1:]
+        # solves run in one thread of BLAS, see `hotlever.work`: others would wait for work, busily,
+        # which takes a tenth of a sweep's processor time while modules are imported
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         # else Python looks through all there is once more as it ends: a fifth of a sweep
         atexit.register(gc.freeze)
         _keep_to_ourselves()
