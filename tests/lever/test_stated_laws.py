@@ -147,6 +147,15 @@ def test_a_table_that_begins_above_the_base_is_refused():
         metal_film_probe(materials={"film": film, "nitride": NITRIDE})
 
 
+def test_a_table_that_begins_above_the_coldest_leg_end_is_refused():
+    """It was taken to go on as it begins."""
+    rho = {"temperature_K": [290.0, 900.0], "values": [2e-5, 3e-5]}
+    probe = metal_film_probe().with_(**{"film.resistivity": rho, "circuit.ground.kind": "ground"})
+    assert probe.with_(**{"circuit.ground.base_temperature_K": 300}).circuit.end_rises()
+    with pytest.raises(InputError, match=r"film: the table of resistivity begins at 290 K.* 260 K"):
+        probe.with_(**{"circuit.ground.base_temperature_K": 260})
+
+
 def test_the_probe_of_a_file_with_tables_holds_their_values(tmp_path):
     rows = "\n".join(f"{T},{1e6 * resistivity(T):.9g}" for T in np.linspace(250, 1300, 12))
     (tmp_path / "rho.csv").write_text(f"T (K),rho (µΩ cm)\n{rows}\n")

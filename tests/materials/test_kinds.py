@@ -21,6 +21,7 @@ from hotlever.materials.silicon import (
     hole_mobility,
     inversion_temperature,
 )
+from hotlever.studies.simulation_based_calibration import MinimosSilicon
 
 OPTION_III = published("option III").material
 #: One material of each kind, and of each choice that a kind offers.
@@ -181,6 +182,18 @@ def test_boron_doped_silicon_has_an_inversion_temperature():
     assert MATERIALS["p-silicon"].inversion_temperature() == pytest.approx(
         inversion_temperature(OPTION_III.n_d, 2.23, 0.4, 0.8, conductivity_p)
     )
+
+
+def test_a_law_of_ones_own_has_its_own_inversion_temperature():
+    """It was that of the kind that the class is made of, two kelvins off here."""
+    silicon = MinimosSilicon(**MATERIALS["n-silicon"].model_dump(exclude={"kind"}))
+    T, n = np.linspace(500.0, 1200.0, 70001), np.array([silicon.n_d, 2e17])
+    coldest = [T[silicon.electrical_conductivity(T, each)[0].argmin()] for each in n]
+    assert silicon.inversion_temperature(n) == pytest.approx(coldest, abs=0.02)
+    # of samples of a posterior, all at once
+    several = silicon.model_copy(update={"p": np.array([2.4, 2.65]), "n_d": n})
+    one = silicon.model_copy(update={"p": 2.65, "n_d": 2e17})
+    assert several.inversion_temperature()[1] == pytest.approx(one.inversion_temperature())
 
 
 # --- thin layers, metals, dielectrics ---------------------------------------------------------

@@ -128,6 +128,8 @@ def test_what_cannot_be_in_the_range_is_said(stated, says):
         ({"resistivity": "a*T"}, "resistivity: unknown name 'a'.*other names need a value"),
         ({"resistivity": "1e-8*T", "tcr": 1e-3}, "tcr means nothing where resistivity is a law"),
         ({"kappa_scale": 1.1}, "kappa_scale means nothing where kappa is no law"),
+        ({"kappa": 0.5, "lorenz_ratio": 1.2}, "lorenz_ratio means nothing where kappa is stated"),
+        ({"kappa": "1e-3*T", "lorenz_ratio": 1.2}, "lorenz_ratio means nothing where kappa is sta"),
         ({"rho0": 1e-5}, "unknown key 'rho0'"),
         ({"kappa": {"temperature_K": [300.0], "values": [1.0]}}, "1 temperature and 1 value"),
         ({"kappa": {"temperature_K": [300, 300], "values": [1, 2]}}, "300 K follows 300 K"),

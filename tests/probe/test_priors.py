@@ -16,6 +16,7 @@ from hotlever.probe.priors import (
     priors_of,
 )
 from hotlever.probe.probe_parameters import nuisances, parameter_of, parameters_of
+from of_materials import metal_film_probe
 
 PROBE = Probe.reference()
 LOG_3 = math.log(3.0)
@@ -175,3 +176,21 @@ def test_in_contact_the_gap_is_known_as_the_height_of_the_tip_that_it_is():
     table = parameters_of(over.with_(sample="glass"))
     assert table["surface_gap_um"].spread == table["height_um"].spread
     assert parameters_of(over)["surface_gap_um"].spread == 0.1
+
+
+def test_films_are_known_no_better_than_their_makers_know_them():
+    """How much heat they carry was held, so that a calibration of 7 K was off by 26 K."""
+    known = default_priors(metal_film_probe())
+    shares = {name: prior.spread for name, prior in known.items() if name.startswith("film.")}
+    assert shares == dict.fromkeys(("film.resistivity", "film.tcr", "film.lorenz_ratio"), 0.2)
+    assert known["nitride.kappa_exponent"] == Prior(0.33, 0.15, relative=False)
+    stated = metal_film_probe().with_(**{"film.kappa": 0.5})
+    assert default_priors(stated)["film.kappa"] == Prior(0.5, 0.2)
+
+
+def test_a_share_of_what_is_negative_is_of_its_size():
+    """A resistivity that falls with the temperature had no prior, and was held."""
+    probe = metal_film_probe().with_(**{"film.tcr": -1e-4})
+    assert default_priors(probe)["film.tcr"] == Prior(-1e-4, 2e-5, relative=False)
+    found = priors_of({"film.tcr": "-2e-4 ± 10%"}, probe, "here")
+    assert found["film.tcr"] == Prior(-2e-4, 2e-5, relative=False)

@@ -9,8 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hotlever.errors import InputError
+from hotlever.materials.kinds import MetalFilm
 from hotlever.probe import Probe, ThreeLeg
-from of_materials import metal_film_sections
+from of_materials import metal_film_probe, metal_film_sections
 
 CONTRACT = """
 [probe]
@@ -174,6 +175,22 @@ def test_a_tip_on_the_axis_is_at_zero_and_not_at_minus_zero(run, tmp_path):
     sections["probe"]["tip_um"] = [56.0, -0.0]
     Probe.from_sections(sections, "test").to_file(tmp_path / "lever.toml")
     assert "tip at (56, 0) µm" in run("probe", "show", tmp_path / "lever.toml")[1]
+
+
+def test_another_preset_takes_the_place_of_what_the_former_gave():
+    """The name changed alone, and the film stayed palladium."""
+    sections = metal_film_sections()
+    film = {**sections["materials"]["film"], "preset": "Au"}
+    sections["materials"] = {**sections["materials"], "film": film}
+    gold = Probe.from_sections(sections, "test")
+    palladium = metal_film_probe()
+    assert palladium.with_(**{"film.preset": "Au"}) == gold
+    assert palladium.with_material("film", MetalFilm, preset="Au") == gold
+    # what is said with it counts, if it is what palladium has too
+    melts = palladium.materials["film"].melting_point_K
+    changed = palladium.with_(**{"film.melting_point_K": melts, "film.preset": "Au"})
+    assert changed.materials["film"].melting_point_K == melts
+    assert changed.materials["film"].heat_capacity == gold.materials["film"].heat_capacity
 
 
 def test_what_no_drawing_has_is_refused_before_one_is_saved(tmp_path):

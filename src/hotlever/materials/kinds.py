@@ -417,10 +417,13 @@ class LowDopedSilicon(Silicon):
 
         Of its own doping by default; NaN where there is none below 1700 K.
         """
+
+        def conductivity(T: Array, n: Array, **of_carriers: Array) -> Evaluated:
+            # the method, whose law a class of one's own may have replaced
+            return self.model_copy(update=of_carriers).electrical_conductivity(T, n)
+
         return silicon.inversion_temperature(
-            self.n_d if n is None else n,
-            **self.of_carriers,
-            conductivity=partial(self._departing, type(self).conductivity),
+            self.n_d if n is None else n, **self.of_carriers, conductivity=conductivity
         )
 
 
@@ -531,7 +534,7 @@ class MetalFilm(Stored):
     resistivity: float | StatedLaw = _number_or_law(OF_METAL["resistivity"])
     tcr: float | None = field_of(OF_METAL["tcr"], default=None)
     resistivity_scale: float | None = field_of(OF_METAL["resistivity_scale"], default=None)
-    lorenz_ratio: float = field_of(OF_METAL["lorenz_ratio"])
+    lorenz_ratio: float | None = field_of(OF_METAL["lorenz_ratio"])
     kappa: float | StatedLaw | None = _number_or_law(
         OF_METAL["kappa"],
         default=None,
@@ -550,14 +553,13 @@ class MetalFilm(Stored):
             raise ValueError("tcr is missing")
         return self
 
-    @property
-    def parameters(self) -> dict[str, Parameter]:
-        """Those of the parameters that count here."""
-        own = super().parameters
-        used = {name for law in self.stated.values() for name in law.names}
-        if self.kappa is not None and "lorenz_ratio" not in used:
-            del own["lorenz_ratio"]
-        return own
+    @classmethod
+    def without_use(cls, values: Mapping[str, Any]) -> dict[str, str]:
+        """Return what means nothing in a section of values, see `Kind.without_use`."""
+        useless = super().without_use(values)
+        if values.get("kappa") is not None and "lorenz_ratio" not in names_stated(values):
+            useless["lorenz_ratio"] = "kappa is stated"
+        return useless
 
     @property
     def laws(self) -> tuple[Law | StatedLaw, ...]:

@@ -185,9 +185,10 @@ OF_METAL = _table(
     Parameter(
         *("lorenz_ratio", "L/L₀", "1", 1.0, 0.2, 5.0),
         "heat carried over what Wiedemann and Franz give",
+        spread=0.2,
         value=1.0,
     ),
-    Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.01, 0.01, 5.0, "thermal conductivity"),
+    Parameter("kappa", "κ", "W cm⁻¹ K⁻¹", 0.01, 0.01, 5.0, "thermal conductivity", spread=0.2),
     _scale("kappa", "c_κ"),
     Parameter(
         *("seebeck", "S", "µV K⁻¹", 1.0, -100.0, 100.0),
@@ -209,6 +210,9 @@ OF_DIELECTRIC = _table(
     Parameter(
         *("kappa_exponent", "m", "1", 1.0, -1.5, 1.5),
         "power of the temperature in the thermal conductivity",
+        # of glasses and nitrides 0 to 0.4
+        spread=0.15,
+        relative=False,
         value=0.0,
     ),
     _scale("kappa", "c_κ"),

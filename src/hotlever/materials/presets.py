@@ -244,6 +244,20 @@ def material_of(
     return material_class.from_values(material_class.useful({**usual, **stated}, stated), where)
 
 
+def without_preset(values: Mapping[str, Any], stated: Collection[str]) -> dict[str, Any]:
+    """Return values of a section, where another preset is to come, without those of its preset.
+
+    What differs from the preset was said beside it, and stays, as do those that are `stated`.
+    """
+    preset = PRESETS.get(values.get("preset", ""))
+    of_preset = {} if preset is None else preset.values
+    return {
+        name: value
+        for name, value in values.items()
+        if name in stated or name not in of_preset or value != of_preset[name]
+    }
+
+
 def remade(
     material: Kind | Material, material_class: type[Record], values: Mapping[str, Any], name: str
 ) -> Record:
@@ -259,7 +273,10 @@ def remade(
         raise InputError(
             f"{name}: found {material_class.__name__}, expected a class made of {base.__name__}"
         )
-    own = {**material.model_dump(exclude_none=True), **values}
+    own = material.model_dump(exclude_none=True)
+    if values.get("preset") is not None:
+        own = without_preset(own, values)
+    own = {**own, **values}
     if not issubclass(material_class, Kind):
         return material_class.from_values(own, f"[{name}]")
     own = material_class.useful(own, values)

@@ -256,8 +256,10 @@ class ProbeParts(Record):
                     f"{full_name(region.material, 'n_d')} = {low.n_d:g} must be below "
                     f"{full_name(region.dopant_from, 'n_hd')} = {high.n_hd:g}"
                 )
+        # a leg end may be colder than the others
+        coldest_K = self.circuit.base_temperature_K + min([0.0, *self.circuit.end_rises().values()])
         for name, kind in self.made_of.items():
-            if reason := kind.impossible(self.circuit.base_temperature_K):
+            if reason := kind.impossible(coldest_K):
                 of = f"{name}: " if name in self.materials else ""
                 raise ValueError(of + reason)
         return self

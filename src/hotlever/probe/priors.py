@@ -154,6 +154,17 @@ class PriorUse:
         return f"{self.value:.4g} ± {self.spread:.2g}"
 
 
+def of_share(value: float, share: float) -> Prior:
+    """Return what is known to a share: of the logarithm, or of the size of a negative value.
+
+    Examples
+    --------
+    >>> of_share(-1e-4, 0.2)
+    Prior(value=-0.0001, spread=2e-05, relative=False)
+    """
+    return Prior(value, share) if value >= 0 else Prior(value, share * -value, relative=False)
+
+
 class PriorShift(NamedTuple):
     """How far data moved a parameter from its prior, in standard deviations of the prior.
 
@@ -198,9 +209,11 @@ def default_priors(
     """
     materials, table = of_materials(probe), parameters_of(probe)
     priors = {
-        name: Prior(parameter.value, parameter.spread, parameter.relative)
+        name: of_share(parameter.value, parameter.spread)
+        if parameter.relative
+        else Prior(parameter.value, parameter.spread, relative=False)
         for name, parameter in table.items()
-        if parameter.spread is not None and (parameter.value > 0 or not parameter.relative)
+        if parameter.spread is not None and (parameter.value != 0 or not parameter.relative)
     }
     in_units = {name: name in materials for name, prior in priors.items() if not prior.relative}
     order = sorted(priors, key=lambda name: (name in in_units, in_units.get(name, False)))
@@ -317,7 +330,10 @@ def priors_of(
         else:
             value, spread, written = parsed(text, here)
             own = table[name].value if value is None else value
-            priors[name] = Prior(own, spread, written != "unit")
+            negative = own < 0 and written == "share"
+            priors[name] = (
+                of_share(own, spread) if negative else Prior(own, spread, written != "unit")
+            )
             _check(priors[name], table[name], here, written)
     counting = parameters_of(probe, in_time=in_time)
     return {name: prior for name, prior in priors.items() if name in counting or name in SCALES}

@@ -13,7 +13,7 @@ from hotlever.errors import InputError, quoted, unknown_name
 from hotlever.files import read_text, write_text
 from hotlever.materials import HIGH_DOPED, LOW_DOPED, REFERENCE, Kind
 from hotlever.materials.kinds import Silicon
-from hotlever.materials.presets import classes_at_hand, materials_of, remade
+from hotlever.materials.presets import classes_at_hand, materials_of, remade, without_preset
 from hotlever.materials.stated import names_stated
 from hotlever.probe.circuit import Contact
 from hotlever.probe.parts import (
@@ -472,10 +472,12 @@ def _changed_sections(probe: ProbeParts, changes: Mapping[str, Any]) -> dict[str
         if not isinstance(inside.setdefault(last, {}), Mapping):
             # a layer of which no more was said than where it is drawn
             inside[last] = {"drawn": inside[last]}
+        stated = {own for where, own in keys.values() if where == section}
+        if key == "preset" and value is not None:
+            inside[last] = without_preset(inside[last], stated)
         inside[last][key] = value
         if section in probe.materials:
-            kind, stated = type(probe.materials[section]), {own for _, own in keys.values()}
-            inside[last] = kind.useful(inside[last], stated)
+            inside[last] = type(probe.materials[section]).useful(inside[last], stated)
     sections = {name: with_values(section) for name, section in sections.items()}
     shape = PARAMETRIC.get(str(sections["probe"]["shape"]))
     if shape is not None and not isinstance(probe.shape, shape):
