@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shlex
 from collections.abc import Callable
 
 import numpy as np
@@ -54,6 +55,25 @@ async def test_reader_shows_the_numbers_and_notes_of_the_command(
     off = f"{100 * (coarse / float(row['reader_V']) - 1):+.1f}"
     stated = said.partition("coarse lever, here ")[2].partition(" % in voltage")[0]
     assert float(stated) == pytest.approx(float(off), abs=0.1)
+
+
+@visited
+async def test_the_command_of_a_tilted_surface_does_what_the_page_shows(user, session, tmp_path, run):
+    """It was refused: it stated a distance twice, without which a tilt means nothing."""
+    chosen = {"distance_um": 0.4, "tilt_deg": 1.5, "accommodation": 0.9}
+    session.chosen["reader"] = chosen
+    await user.open("/reader")
+    await until(lambda: "full lever: the numbers" in text_of(user, "aria-live=polite"))
+    line = next(text for text in texts(user) if text.startswith("hotlever reader"))
+    words = shlex.split(line)[1:]
+    assert "surface_tilt_deg=1.5" in words
+    # at the distance of the page, whose curves begin nearer
+    at = words.index("--distance") + 1
+    words[at] = words[at].partition(":")[0] + ":0.4um:2"
+    status, out, _ = run(*words[: words.index("-o")])
+    assert status == 0
+    row = [*csv.DictReader(out.splitlines())][-1]
+    assert text_of(user, "data-number=reader_V") == f"{float(row['reader_V']):.4f} V"
 
 
 def test_a_tilted_surface_is_asked_for_only_where_it_is_below_the_lever():

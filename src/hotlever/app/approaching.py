@@ -16,7 +16,7 @@ import numpy as np
 
 from hotlever.air.bodies import BaseLine
 from hotlever.app.live import coloured
-from hotlever.app.session import Task, probe_of, surrounded_probe
+from hotlever.app.session import Task, lever_told, probe_of
 from hotlever.app.workers import Report
 from hotlever.errors import ComputationError, InputError
 from hotlever.lever import Branch, Lever
@@ -28,7 +28,12 @@ from hotlever.probe.shapes import Shape
 from hotlever.tasks.arguments import make_lever, notes_of
 from hotlever.tasks.commands import arguments_of
 from hotlever.tasks.parsing import parse_bias, parse_distances
-from hotlever.tasks.surfaces import jumping_at_tip, over_a_surface, reader_noise
+from hotlever.tasks.surfaces import (
+    jumping_at_tip,
+    over_a_surface,
+    read_over_a_surface,
+    reader_noise,
+)
 from hotlever.types import Array, Index
 from hotlever.work import each, one_blas_thread
 
@@ -82,9 +87,8 @@ def answer(
     noise = reader_noise(told["bandwidth"], told["amplifier"], told["hooge"], told["vibration"])
     ends = parse_distances(told["distance"])
     distances = np.geomspace(ends[0], ends[-1], ends.size)
-    medium = told["medium"]
-    probe = surrounded_probe(report, told, finds_air=True)
-    probe = over_a_surface(report, probe, medium, distances)
+    probe = read_over_a_surface(report, lever_told(told), distances)
+    probe = over_a_surface(report, probe, told["medium"], distances)
     bias = float(parse_bias(told["bias"], probe.lowest_bias_V).item())
     stated = probe.surroundings
     if quick and jump_K is not None:

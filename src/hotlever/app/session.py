@@ -351,10 +351,14 @@ def run(report: Report, task: Task) -> None:
     run_command(task.words, report)
 
 
-def surrounded_probe(report: Report, told: Mapping[str, Any], *, finds_air: bool = False) -> Probe:
+def lever_told(told: Mapping[str, Any]) -> LeverArguments:
+    """Return the lever of a command whose arguments are given by name."""
+    return LeverArguments(told["probe"], told["medium"], told["set"], told["physics"])
+
+
+def surrounded_probe(report: Report, told: Mapping[str, Any]) -> Probe:
     """Return the probe, in its medium, of a command whose arguments are given by name."""
-    lever = LeverArguments(told["probe"], told["medium"], told["set"], told["physics"])
-    return read_surrounded_probe(report, lever, finds_air=finds_air)
+    return read_surrounded_probe(report, lever_told(told))
 
 
 def probe_of(name: str) -> Probe:

@@ -5,6 +5,7 @@ Tables and figures, at rest or in time.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -229,11 +230,9 @@ def approach(
     distances = parse_distances(distance)
     noise = reader_noise(bandwidth, amplifier, hooge, vibration)
     pressures = None if pressure is None else parse_pressures(pressure)
-    read = read_surrounded_probe(reporter, lever, finds_air=True)
-    changes = parse_settings(lever.set, read)
-    refuse_set(changes, "distance", ["surface_gap_um"])
+    read = read_over_a_surface(reporter, lever, distances)
     if pressures is not None:
-        refuse_set(changes, "pressure", ["pressure_mbar"])
+        refuse_set(parse_settings(lever.set, read), "pressure", ["pressure_mbar"])
     above = over_a_surface(reporter, read, lever.medium, distances)
     biases = None if bias is None else parse_bias(bias, above.lowest_bias_V)
     reader = Reader(above, noise)
@@ -267,6 +266,15 @@ def approach(
     give_table(
         reporter, table, columns, output, plot, lambda figures: figures.reader_overview(data)
     )
+
+
+def read_over_a_surface(reporter: Reporter, lever: LeverArguments, distances: Array) -> Probe:
+    """Read a probe at some distances (µm) from a surface, which settings may tilt."""
+    stated = lever.set or []
+    refuse_set([text.partition("=")[0].strip() for text in stated], "distance", ["surface_gap_um"])
+    # a tilt means nothing without a surface, and the farthest one allows most of it
+    gap = f"surface_gap_um={distances.max():.12g}"
+    return read_surrounded_probe(reporter, replace(lever, set=[*stated, gap]), finds_air=True)
 
 
 def over_a_surface(reporter: Reporter, probe: Probe, medium: str | None, distances: Array) -> Probe:

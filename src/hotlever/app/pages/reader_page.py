@@ -162,7 +162,7 @@ class ReaderPage(LivePage):
         """Return the command of the reader at the bias, whatever the distance."""
         nearest, farthest = self.of_file["nearest_um"], self.of_file["farthest_um"]
         tilt, accommodation = self.chosen["tilt_deg"], self.chosen["accommodation"]
-        changes = {} if tilt is None else {"surface_gap_um": nearest, "surface_tilt_deg": tilt}
+        changes = {} if tilt is None else {"surface_tilt_deg": tilt}
         if accommodation is not None:
             changes["accommodation"] = accommodation
         options = {
