@@ -16,17 +16,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from elements import named, until
+from elements import all_of, named, until
 from nicegui import ui
 from nicegui.testing import User, user_simulation
 from PIL import Image
 
 from hotlever.app import live
+from hotlever.app.pages import plots
 from hotlever.app.project import EXAMPLES, Project
 from hotlever.app.server import add_pages
 from hotlever.app.session import Jobs, Session, Task
 from hotlever.app.workers import Report
-from hotlever.errors import BranchEndError, HotleverError
+from hotlever.errors import BranchEndError, HotleverError, InputError
 from hotlever.lever import Lever
 from hotlever.probe import Probe
 
@@ -216,6 +217,64 @@ def test_a_lever_that_moves_shows_nearly_what_it_shows_at_rest(tmp_path):
     at = left + (hottest + 0.5) / picture.shape[1] * (right - left)
     assert at == pytest.approx(48.6, abs=1.0)
     assert full["now"]["line"].max() == pytest.approx(full["now"]["hottest_K"], abs=2.0)
+
+
+@visited
+async def test_plots_follow_a_lever_that_is_hotter_beside_its_tip(user, session, tmp_path, run):
+    """The hottest parts of the profile were beyond its axis, and those of a lever beside."""
+    run("probe", "import", str(EXAMPLES / "reference-probe.gds"), "-o", "drawn.toml")
+    text = Path("drawn.toml").read_text()
+    Path("off.toml").write_text(text.replace("tip_um = [48.58, 0.0]", "tip_um = [53.0, 0.0]"))
+    off, usual = (
+        live.answer(Here(), Task("sweep", files), 12.0, 12.0, False)
+        for files in (("off.toml",), ())
+    )
+    assert off["now"]["line"].max() > off["curves"]["tip_K"].max()
+    await user.open("/")
+    with user.client:
+        shown = plots.LivePlots()
+    (profile,) = (plot for plot in all_of(user, ui.plotly) if "along" in plot.props["aria-label"])
+    for answer in (off, usual):
+        shown.show(answer)
+        shown.beside(usual, "")
+        low, high = profile.figure["layout"]["yaxis"]["range"]
+        drawn = np.concatenate([trace["y"] for trace in profile.figure["data"]])
+        assert low - 0.1 < drawn.min()
+        assert drawn.max() <= high
+
+
+@visited
+async def test_the_outline_of_the_map_follows_a_dimension(user, session, tmp_path):
+    """It stayed that of before where neither the lever's ends nor the scale of colours moved."""
+    first, second = (
+        live.answer(
+            Here(), Task("sweep", (), {"set": [f"heater_width_um={width}"]}), 4.0, 6.0, True
+        )
+        for width in (1.6, 1.7)
+    )
+    assert first["box"] == second["box"]
+    assert first["now"]["scale_K"] == second["now"]["scale_K"]
+    await user.open("/")
+    with user.client:
+        shown = plots.LivePlots()
+    sent: list[Any] = []
+    heat = named(user, "Map of the temperature", ui.plotly)
+    shown.show(first)
+    shown._ready.add(heat)  # as once a browser has drawn it
+    heat.run_plot_method = lambda *what: sent.append(what)
+    shown.show(first)
+    assert [name for name, _ in sent] == ["relayout"]
+    shown.show(second)
+    assert len(sent) == 1  # more than the picture has changed: the whole figure is sent
+    paths = [shape["path"] for shape in heat.figure["layout"]["shapes"]]
+    assert paths == [plots.outlined(ring)["path"] for ring in second["outline"]]
+
+
+def test_a_negative_bias_is_refused_in_words_that_are_true(tmp_path):
+    """It was said that no steady state lies there, of levers that the command sweeps there."""
+    held = {"set": ["circuit.reader.kind=supply", "circuit.reader.bias_V=2"]}
+    with pytest.raises(InputError, match="found a bias of -4 V, expected 0 or more"):
+        live.answer(Here(), Task("sweep", (), held), -4.0, 12.0, True)
 
 
 def test_commands_run_in_processes_that_can_be_ended(tmp_path):

@@ -58,7 +58,9 @@ async def test_reader_shows_the_numbers_and_notes_of_the_command(
 
 
 @visited
-async def test_the_command_of_a_tilted_surface_does_what_the_page_shows(user, session, tmp_path, run):
+async def test_the_command_of_a_tilted_surface_does_what_the_page_shows(
+    user, session, tmp_path, run
+):
     """It was refused: it stated a distance twice, without which a tilt means nothing."""
     chosen = {"distance_um": 0.4, "tilt_deg": 1.5, "accommodation": 0.9}
     session.chosen["reader"] = chosen

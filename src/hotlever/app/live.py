@@ -22,7 +22,7 @@ from PIL import Image
 
 from hotlever.app.session import Task, probe_of, surrounded_probe
 from hotlever.app.workers import Report
-from hotlever.errors import ComputationError, HotleverError
+from hotlever.errors import ComputationError, HotleverError, InputError
 from hotlever.figures.style import HEAT
 from hotlever.lever import Branch, Lever
 from hotlever.lever.branch import Reach, branch_end
@@ -121,7 +121,10 @@ class LiveLever:
 
     @cached_property
     def curves(self) -> dict[str, Any]:
-        """I-V curve, temperature by power and the knee, by the tip temperature of the branch."""
+        """I-V curve, temperature by power and the knee, by the tip temperature of the branch.
+
+        And how hot the lever gets, which may be beside the tip.
+        """
         u = np.linspace(0.0, self.branch.end_u, 121)
         observables = self.branch.electrical_outputs(u)
         knee = self.branch.knee
@@ -130,8 +133,15 @@ class LiveLever:
             "current_mA": observables["current_mA"],
             "power_mW": observables["lever_V"] * observables["current_mA"],
             "tip_K": self.branch.tip_K(u),
+            "hottest_K": float(self._temperatures(u[-1:]).max()),
             "knee": None if knee is None else asdict(knee),
         }
+
+    def _temperatures(self, u: Array) -> Array:
+        """Return the temperatures (K) at the nodes in a state."""
+        x = self.branch.equations.space.expanded(self.branch.states(u))[:, 0]
+        base_K = self.branch.base_temperature_K
+        return np.asarray(self.space.nodal(x, base_K, self.circuit.end_rises())[0])
 
     @property
     def map(self) -> _Map:
@@ -168,9 +178,8 @@ class LiveLever:
             name: float(value[0])
             for name, value in self.branch.electrical_outputs(reading.u).items()
         }
-        x = self.branch.equations.space.expanded(self.branch.states(reading.u))
         low, knee = self.branch.base_temperature_K, self.branch.knee
-        drawn, T = self.map, self.space.nodal(x[:, 0], low, self.circuit.end_rises())[0]
+        drawn, T = self.map, self._temperatures(reading.u)
         step_K = 100.0
         high = step_K * np.ceil(max(float(T.max()), low + 1.0) / step_K)
         return {
@@ -209,10 +218,17 @@ def answer(
 
     Raises
     ------
+    InputError
+        If the bias is negative.
     BranchEndError
         If the lever has no state at this bias; a reduced lever that ends below leaves the answer to
         a coarse one.
     """
+    if bias < 0.0:
+        raise InputError(
+            f"found a bias of {bias:g} V, expected 0 or more; where polarity counts, with held "
+            "supplies or thermoelectricity, hotlever sweep takes negative ones"
+        )
     probe, most = surrounded_probe(report, arguments_of(task.words)), max(most, bias)
     live = _quick(probe, most, reduced) if quick else _full(report, probe, most)
     if live.model == "reduced lever" and not live.reaches(bias):

@@ -271,6 +271,10 @@ class LivePlots:
         self._beside: Any = None
         self._along: Any = None
         self._map: Any = None
+        #: Base and hottest temperature, and how long the current's way is, of the lever and of
+        #: that beside it.
+        self._reach: Any = None
+        self._reach_beside: Any = None
 
     def show(self, answer: dict[str, Any]) -> None:
         """Draw an answer of the live lever; what is as before is not sent again."""
@@ -284,12 +288,9 @@ class LivePlots:
             self._move(self._profile, 0, profile)
         else:
             # of one height for all biases, so that the profile moves and not its axis
-            highest = float(np.max(curves["tip_K"]))
-            layout = self._profile.figure["layout"]
-            layout["yaxis"]["range"] = [answer["base_K"], highest]
-            layout["xaxis"]["range"] = [0.0, answer["along"][-1]]
+            self._reach = answer["base_K"], curves["hottest_K"], answer["along"][-1]
             self._profile.figure["data"][0] |= profile
-            self._profile.update()
+            self._scale_profile()
         self._show_map(answer["box"], answer["outline"], now["scale_K"], now["picture"])
         self._curves, self._along = curves, answer["along"]
 
@@ -301,8 +302,23 @@ class LivePlots:
         curves, now = (answer["curves"], answer["now"]) if answer else ({}, {})
         self._draw(3, 4, curves, now, self._beside)
         profile = points(answer["along"], now["line"]) if answer else points([], [])
-        self._move(self._profile, 1, profile)
+        reach = (answer["base_K"], curves["hottest_K"], answer["along"][-1]) if answer else None
+        if reach == self._reach_beside:
+            self._move(self._profile, 1, profile)
+        else:
+            self._reach_beside = reach
+            self._profile.figure["data"][1] |= profile
+            self._scale_profile()
         self._beside = curves or None
+
+    def _scale_profile(self) -> None:
+        """Have the axes of the profile hold both levers, at whatever bias."""
+        both = [reach for reach in (self._reach, self._reach_beside) if reach]
+        lowest, highest, along = zip(*both, strict=True)
+        layout = self._profile.figure["layout"]
+        layout["yaxis"]["range"] = [min(lowest), max(highest)]
+        layout["xaxis"]["range"] = [0.0, max(along)]
+        self._profile.update()
 
     def _draw(
         self, curve: int, dot: int, curves: dict[str, Any], now: dict[str, Any], before: Any
@@ -329,16 +345,17 @@ class LivePlots:
         source = f"data:image/png;base64,{b64encode(picture).decode('ascii')}"
         layout = self._heat.figure["layout"]
         layout["images"][0]["source"] = source
-        if (box, scale) == self._map and self._heat in self._ready:
+        # cold legs are as dark as a dark page, the hottest places nearly as light as a light one
+        layout["shapes"] = [outlined(ring) for ring in outline]
+        now = box, scale, layout["shapes"]
+        if now == self._map and self._heat in self._ready:
             self._heat.run_plot_method("relayout", {"images[0].source": source})
             return
-        self._map = (box, scale)
+        self._map = now
         size = {"sizex": right - left, "sizey": top - bottom}
         layout["images"][0] |= {"x": left, "y": top, **size}
         layout["xaxis"]["range"] = [left, right]
         layout["yaxis"]["range"] = [bottom, top]
-        # cold legs are as dark as a dark page, the hottest places nearly as light as a light one
-        layout["shapes"] = [outlined(ring) for ring in outline]
         self._heat.figure["data"][0]["marker"] |= {"cmin": scale[0], "cmax": scale[1]}
         self._heat.update()
 
