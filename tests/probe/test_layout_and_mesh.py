@@ -62,13 +62,17 @@ def test_etching_moves_every_edge_but_those_of_the_doping(name):
             assert new_high[1] - high[1] == pytest.approx(bias)
     assert after.box[1] - before.box[1] == pytest.approx([bias, bias])
     long, wide = np.sort(before.heater.sides)[::-1]
-    assert np.sort(after.heater.sides)[::-1] == pytest.approx([long, wide + 2 * bias])
+    # the shoulders at its ends are edges too; what the dopant comes from is none
+    assert np.sort(after.heater.sides)[::-1] == pytest.approx([long - 2 * bias, wide + 2 * bias])
     assert after.heater_taper.length_um == before.heater_taper.length_um
+    assert after.heater_taper.centre == pytest.approx(before.heater_taper.centre)
+    assert after.tip == pytest.approx(before.tip)
 
 
 def test_a_heater_that_fills_its_gap_does_so_after_etching():
     probe = Probe.u_shape().with_(heater_length_um=6.0, edge_bias_um=0.25)
     assert (probe.shape.etched.gap_um, probe.shape.etched.heater_length_um) == (5.5, 5.5)
+    assert probe.layout().heater_taper.length_um == 6.0
 
 
 @pytest.mark.parametrize(("bias", "left"), [(1.7, "gap_um is -0.2"), (-0.9, "heater_width_um is")])

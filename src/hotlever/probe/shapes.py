@@ -214,7 +214,9 @@ class ThreeLeg(Parametric):
 
     def _by_edge_bias(self) -> dict[str, float]:
         widths = ("centre_leg_width_um", "outer_leg_width_um", "bridge_width_um", "heater_width_um")
-        return {"length_um": 1.0, "gap_um": -2.0, **dict.fromkeys(widths, 2.0)}
+        # silicon is wider behind the heater and before it, and grows towards it
+        narrower = ("gap_um", "heater_length_um")
+        return {"length_um": 1.0, **dict.fromkeys(widths, 2.0), **dict.fromkeys(narrower, -2.0)}
 
     @property
     def _reader_centre(self) -> float:
@@ -247,7 +249,8 @@ class ThreeLeg(Parametric):
         reader_to = reader_from + here.reader_length_um
         tip = (heater_from + here.heater_length_um / 2, 0.0)
         reader_middle = (here._reader_centre, -(inner + outer) / 2)
-        taper = Taper(tip, (1.0, 0.0), here.heater_length_um)
+        # dopant comes from the window as it is drawn
+        taper = Taper(tip, (1.0, 0.0), self.heater_length_um)
         reader_taper = Taper(reader_middle, (1.0, 0.0), here.reader_length_um)
         behind = rectangle(0, -outer, reader_from, -inner)
         reader = rectangle(reader_from, -outer, reader_to, -inner)
@@ -327,7 +330,10 @@ class UShape(Parametric):
 
     def _by_edge_bias(self) -> dict[str, float]:
         widths = ("leg_width_um", "bridge_width_um", "heater_width_um")
-        narrower = ("gap_um", "heater_length_um") if self._filled else ("gap_um",)
+        # where the bar is wider than the heater, or nothing is between heater and legs, silicon
+        # grows towards it
+        ends_are_etched = self._filled or self.heater_width_um < self.bridge_width_um
+        narrower = ("gap_um", "heater_length_um") if ends_are_etched else ("gap_um",)
         return {"length_um": 1.0, **dict.fromkeys(widths, 2.0), **dict.fromkeys(narrower, -2.0)}
 
     def layout(self) -> Layout:
@@ -338,7 +344,8 @@ class UShape(Parametric):
         back = here.length_um - here.bridge_width_um
         middle, half = back + here.bridge_width_um / 2, here.heater_width_um / 2
         tip = (middle, 0.0)
-        taper = Taper(tip, (0.0, 1.0), here.heater_length_um)
+        # dopant comes from the window as it is drawn
+        taper = Taper(tip, (0.0, 1.0), self.heater_length_um)
         across = rectangle(middle - half, -heater, middle + half, heater)
 
         def side(name: str, part: Part, sign: int) -> list[Region]:
