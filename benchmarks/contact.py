@@ -61,10 +61,9 @@ from hotlever.lever.similar import SimilarLevers
 from hotlever.measurement.data import as_attributes
 from hotlever.probe import Probe
 from hotlever.probe.mesh import face_of
-from hotlever.probe.priors import METERS
 from hotlever.probe.probe_parameters import usual_parameters
 from hotlever.probe.tip import OUT_OF_CONTACT
-from hotlever.quantities import FITTED
+from hotlever.quantities import FITTED, METERS
 from problems import table
 
 # --- full 3-D ------------------------------------------------------------------------------------

@@ -111,7 +111,11 @@ OF_A_LEVER = {
     "threadpoolctl": 1,
     "nbklu": 6,
 }
+#: The same of one that reads spectra.
+OF_SPECTRA = {"numpy": 180, "pydantic": 60, "typer": 40, "platformdirs": 10, "threadpoolctl": 1}
 OF_SCIPY = {"linalg", "sparse"}
+#: What SciPy's optimisers bring along.
+OPTIMISED = {"constants", "fft", "optimize", "spatial", "special"}
 
 
 def imported_by(commands: Sequence[str], folder: Path) -> list[str]:
@@ -129,7 +133,8 @@ def imported_by(commands: Sequence[str], folder: Path) -> list[str]:
     return (folder / "modules.txt").read_text().split()
 
 
-DATA = EXAMPLES / "lever-a.csv"
+DATA, SPECTRA = EXAMPLES / "lever-a.csv", EXAMPLES / "raman"
+HOT_PLATE = SPECTRA / "hot-plate"
 
 
 @pytest.mark.parametrize(
@@ -143,10 +148,20 @@ DATA = EXAMPLES / "lever-a.csv"
         (
             (f"fit {DATA} -o fit.json", f"calibrate {DATA} -o calibration.json --table table.csv"),
             {**OF_A_LEVER, "hotlever": 180, "scipy": 400},
-            OF_SCIPY | {"constants", "fft", "interpolate", "optimize", "spatial", "special"},
+            OF_SCIPY | OPTIMISED | {"interpolate"},
+        ),
+        (
+            ("contact --sample polymer,100nm,silicon --radius 5nm --bias 1:3:3 -o contact.csv",),
+            {**OF_A_LEVER, "hotlever": 130, "scipy": 370, "xarray": 130},
+            OF_SCIPY | OPTIMISED | {"interpolate"},
+        ),
+        (
+            (f"join {SPECTRA / 'bias-log.csv'} {SPECTRA / 'tip'} --calibrate-from {HOT_PLATE}",),
+            {**OF_SPECTRA, "hotlever": 60, "scipy": 360, "xarray": 130},
+            OF_SCIPY | OPTIMISED | {"ndimage"},
         ),
     ],
-    ids=["solved", "estimated"],
+    ids=["solved", "estimated", "in contact", "spectra"],
 )
 def test_plain_commands_import_what_they_need_and_no_more(tmp_path, commands, limits, of_scipy):
     """Not matplotlib, nor Shapely, nor Dask, which xarray brings for a number out of a dataset.

@@ -439,6 +439,9 @@ OBSERVABLES = {
 OF_A_CONTACT = {"apex": MEASURANDS["T_apex"], "melting": MEASURANDS["T_melt"]}
 #: What a fit compares.
 FITTED = OBSERVABLES | OF_A_CONTACT
+#: Standard deviations of scales where nothing is said, relative: of a meter, and of a thermometer,
+#: by the rise above the base (the hot plate's own accuracy, gradients in the laser's spot).
+METERS, THERMOMETER = 1e-3, 0.015
 Observable = Literal["current", "reader", "tip", "bridge", "apex", "melting"]
 
 

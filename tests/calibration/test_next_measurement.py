@@ -18,7 +18,7 @@ from hotlever.estimate.surrogate import Rows
 from hotlever.lever.lever import COARSE, Lever
 from hotlever.measurement import Measurement
 from hotlever.probe import Probe
-from hotlever.probe.priors import THERMOMETER
+from hotlever.quantities import THERMOMETER
 
 pytestmark = pytest.mark.usefixtures("coarse_meshes")
 

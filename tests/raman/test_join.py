@@ -9,7 +9,7 @@ import xarray as xr
 from hotlever.errors import InputError
 from hotlever.estimate.residuals import errors_of_scales
 from hotlever.measurement import read_measurement
-from hotlever.probe.priors import THERMOMETER
+from hotlever.quantities import THERMOMETER
 from hotlever.raman.spectrum_tables import join, read_bias_log
 
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from hotlever.datasets import labelled
 from hotlever.lever.lever import COARSE
-from hotlever.probe.priors import THERMOMETER
+from hotlever.quantities import THERMOMETER
 from hotlever.studies.knee_study import Suspect, carried, knee_K, what_to_measure
 from hotlever.studies.published_lever.ensemble import (
     ANY,

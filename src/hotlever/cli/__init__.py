@@ -29,8 +29,9 @@ _received: list[int] = []
 
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line; exit status 0 done, 1 not finished, 2 the input is at fault."""
-    # what modules consist of stays: looking at it again and again takes a tenth of a sweep
-    gc.set_threshold(100_000)
+    # what modules consist of stays, some 200 000 objects: looking at it again and again takes a
+    # tenth of a sweep
+    gc.set_threshold(300_000)
     if arguments is None:
         arguments = sys.argv[1:]
         # solves run in one thread of BLAS, see `hotlever.work`: others would wait for work, busily,

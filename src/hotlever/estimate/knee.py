@@ -35,8 +35,9 @@ from hotlever.measurement import Measurement, with_measured_circuit
 from hotlever.measurement.rows import averaged, note_on_averages
 from hotlever.piecewise import spline_through
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.priors import METERS, default_priors
+from hotlever.probe.priors import default_priors
 from hotlever.probe.probe_parameters import RESISTANCE
+from hotlever.quantities import METERS
 from hotlever.text import value_with_error
 from hotlever.types import Array
 from hotlever.work import one_blas_thread

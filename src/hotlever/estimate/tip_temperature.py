@@ -40,10 +40,9 @@ from hotlever.measurement import Measurement
 from hotlever.measurement.data import resolution_of
 from hotlever.piecewise import spline_through
 from hotlever.probe import Circuit, Probe
-from hotlever.probe.priors import THERMOMETER
 from hotlever.probe.shapes import full_bias_name
 from hotlever.probe.surroundings import Surroundings
-from hotlever.quantities import FITTED, OF_A_CONTACT
+from hotlever.quantities import FITTED, OF_A_CONTACT, THERMOMETER
 from hotlever.spieser2017 import RAMAN_ERROR_K
 from hotlever.text import BAND
 from hotlever.types import Array, Progress

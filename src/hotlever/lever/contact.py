@@ -204,7 +204,9 @@ def _side_by_side(
     before, ended = as_far_as_possible(lambda: free(data))
     (along,) = before.tip_K.dims
     both = np.isin(data[along].values, before[along].values)
-    return data.isel({along: both}), before, ended or failure
+    # mostly all; of an array that chooses xarray asks what `hotlever.datasets.quantity` spares it
+    touched = data if both.all() else data.isel({along: both})
+    return touched, before, ended or failure
 
 
 def _unless(failure: ComputationError | None, reached: xr.Dataset) -> xr.Dataset:

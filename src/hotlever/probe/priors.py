@@ -30,7 +30,7 @@ from hotlever.materials.parameters import Parameter, own_name
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.probe_parameters import nuisances, of_materials, parameters_of
 from hotlever.probe.shapes import EDGE_BIAS
-from hotlever.quantities import OBSERVABLES
+from hotlever.quantities import METERS, OBSERVABLES, THERMOMETER
 from hotlever.records import StandardError
 from hotlever.spieser2017 import PUBLISHED_SCATTER
 from hotlever.text import with_unit
@@ -44,9 +44,7 @@ LAWS = {law: tuple(departure.names) for law, departure in DEPARTURES.items()} | 
 }
 #: Scales of what is shown, and the observable that each belongs to.
 SCALES = {row.scale: observable for observable, row in OBSERVABLES.items() if row.scale}
-#: Their standard deviations where nothing is said, relative: of a meter, and of a thermometer, by
-#: the rise above the base (the hot plate's own accuracy, gradients in the laser's spot).
-METERS, THERMOMETER = 1e-3, 0.015
+#: Their standard deviations where nothing is said, relative.
 USUAL_SCALES = {
     scale: THERMOMETER if OBSERVABLES[observable].is_temperature else METERS
     for scale, observable in SCALES.items()

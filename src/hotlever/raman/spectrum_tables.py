@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hotlever.errors import InputError, excerpt, unknown_name
-from hotlever.probe.priors import THERMOMETER
+from hotlever.quantities import THERMOMETER
 from hotlever.raman.lineshape import PeakOptions
 from hotlever.raman.spectrum import Spectrum, aliases, file_and_label, sample_temperature
 from hotlever.tables import TextTable, read_table
@@ -248,7 +248,7 @@ def join(log: TextTable, spectra: xr.Dataset) -> str:
 
     The error in its column is of each temperature alone. By how much all are off together, for the
     calibration, laser heating and stress, is stated as ``raman_scale``, a share of the rise, with
-    what no spectrum tells (`hotlever.probe.priors.THERMOMETER`), unless the log says it. What of
+    what no spectrum tells (`hotlever.quantities.THERMOMETER`), unless the log says it. What of
     those does not grow with the rise counts as of each.
 
     Parameters

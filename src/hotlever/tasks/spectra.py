@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -133,8 +134,9 @@ def join_spectra(
     if setup.thermometer is None:
         raise InputError("join needs temperatures: give --calibration or --calibrate-from")
     _, table = setup.measure(spectra)
-    missing = table.file.values[table.temperature_K.isnull().values]
-    if missing.size:
+    read = zip(table.file.values, table.temperature_K.values, strict=True)
+    missing = [file for file, temperature in read if isnan(temperature)]
+    if missing:
         reporter.note(f"no temperature from {', '.join(missing)}: empty cells")
     _answer(reporter, join(log, table), output)
 

@@ -173,9 +173,10 @@ def what_the_current_tells(data: xr.Dataset, known: float = 1e-4) -> str:
     import numpy as np
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        error = known * np.abs(data.current_mA / data.current_by_resistance)
-        whole = data.tip_K_per_mW + data.interface_K_per_mW + data.spreading_K_per_mW
-        relative = (error / whole).values
+        error = known * np.abs(data.current_mA.values / data.current_by_resistance.values)
+        parts = data.tip_K_per_mW, data.interface_K_per_mW, data.spreading_K_per_mW
+        whole = np.sum([part.values for part in parts], axis=0)
+        relative = error / whole
     if not np.isfinite(relative).any():
         return ""
     best = int(np.nanargmin(relative))
@@ -183,7 +184,7 @@ def what_the_current_tells(data: xr.Dataset, known: float = 1e-4) -> str:
     accuracy = f"to {share:.2g} of it" if share < 1 else f"no better than {share:.2g} times over"
     return (
         f"a change of I_h known to {known:g} of I_h tells the sum of resistances, "
-        f"{1e3 * whole.values[best]:.3g} K/W, best at {data.bias_V.values[best]:.4g} V: {accuracy}"
+        f"{1e3 * whole[best]:.3g} K/W, best at {data.bias_V.values[best]:.4g} V: {accuracy}"
     )
 
 

@@ -11,8 +11,8 @@ from hotlever import figures
 from hotlever import spieser2017 as paper
 from hotlever.materials import PARAMETERS
 from hotlever.materials.departures import DEPARTURES, departure_of
-from hotlever.probe.priors import THERMOMETER
 from hotlever.probe.probe_parameters import parameter_named
+from hotlever.quantities import THERMOMETER
 from hotlever.report.reproduce.findings import Findings
 from hotlever.studies.knee_study import Suspect, carried, compare_suspects, what_to_measure
 from hotlever.studies.published_lever.ensemble import (
