@@ -14,6 +14,7 @@ from hotlever.lever.lever import COARSE, Lever
 from hotlever.lever.observables import shown_at_knee_by_parameter
 from hotlever.lever.similar import SimilarLevers
 from hotlever.materials import heat as heat_laws
+from hotlever.piecewise import spline_through
 from hotlever.probe import Probe
 from hotlever.probe.probe_parameters import dimensions_of, nuisances
 from hotlever.probe.tip import Tip
@@ -181,3 +182,24 @@ def test_what_the_knee_shows_moves_as_its_derivatives_say(coarse, name):
     # V, mA, V and K for twice the value; the knee of a lever with another κ is as hot
     moved = (above - below) / (2.0 * share)
     np.testing.assert_allclose(value * slopes, moved, rtol=1e-2, atol=0.02)
+
+
+def test_a_finer_mesh_is_solved_where_it_is_not_foretold():
+    """What was passed over is between its neighbours: nobody sees that it was not solved."""
+    probe = Probe.reference()
+    similar, fine = (
+        SimilarLevers(Lever(probe, COARSE)),
+        SimilarLevers(Lever(probe, replace(COARSE, refinement=1.5))),
+    )
+    branch = similar.lever(probe).branch(1100.0)
+    equations, places = fine.equations(probe), branch.u[branch.solved]
+    u, x = similar.full_states(branch, equations)
+    assert 0.5 * places.size < u.size < 0.9 * places.size
+    assert set(u.tolist()) <= set(places.tolist())
+    assert u[-1] == places[-1]
+    every = fine.lever(probe).branch(1100.0)
+    shown = every.curve(places)
+    lacking = np.vstack([equations.observed(x), equations.space.tip_rise(x)]).T - branch.curve(u)
+    found = branch.curve(places) + spline_through(u, lacking)(places)
+    np.testing.assert_allclose(found[:, :3], shown[:, :3], rtol=3e-5)
+    assert np.abs(branch.curve(places) / shown - 1.0)[:, :3].max() > 1e-4

@@ -372,25 +372,16 @@ class ExperimentAtRest:
         values = np.zeros(by_fast.shape[:2])
         values[:, :TIP_RISE] = equations.observed(x).T - fast.curve(u)[:, :TIP_RISE]
         values[:, TIP_RISE] = equations.space.tip_rise(x) - fast.rise(u)
-        # what the slopes lack is less by far, and every other state tells it
-        some = np.unique(np.append(np.arange(0, u.size, 2), u.size - 1))
-        slopes = np.zeros((some.size, *by_fast.shape[1:]))
+        slopes = np.zeros(by_fast.shape)
         if self.first_order:
-            constraint = parametrisation.constraint(u[some])
-            of_full = by_parameter(equations, x[:, some], self.names, constraint=constraint)
-            slopes = of_full - by_fast[some]
-
-        def lacking(at: Array, each: Array) -> BSpline:
-            if fast.starts_cold:
-                # without power nothing is lacking
-                cold = int(np.searchsorted(at, 0.0))
-                at, each = (np.insert(row, cold, 0.0, axis=0) for row in (at, each))
-            return spline_through(at, each)
-
-        correction = Correction(
-            probe.values(self.names), lacking(u, values), lacking(u[some], slopes)
-        )
-        return replace(self, correction=correction)
+            constraint = parametrisation.constraint(u)
+            slopes = by_parameter(equations, x, self.names, constraint=constraint) - by_fast
+        if fast.starts_cold:
+            # without power nothing is lacking
+            cold = int(np.searchsorted(u, 0.0))
+            u, values, slopes = (np.insert(each, cold, 0.0, axis=0) for each in (u, values, slopes))
+        lacking = spline_through(u, values), spline_through(u, slopes)
+        return replace(self, correction=Correction(probe.values(self.names), *lacking))
 
     def exact_at(self, probe: Probe) -> tuple[Self, PredictionAtRest]:
         """Return a model that is exact at a probe, and its prediction there.
