@@ -238,6 +238,19 @@ def test_band_shows_bias_and_power(tmp_path):
     save_figure(figure, tmp_path / "band.png")
 
 
+def test_no_band_is_drawn_where_no_error_is_stated():
+    """It had no width there, as of what is known exactly."""
+    x = np.linspace(1.0, 6.0, 6)
+    stderr = np.array([1.0, 2.0, np.nan, np.nan, 3.0, 4.0])
+    band = labelled(
+        {"power_mW": x, "tip_K": 300.0 + x, "tip_stderr_K": stderr}, "bias", {"bias": x}
+    )
+    upper, _, lower, _ = tip_band(band).axes
+    assert_allclose(upper.get_lines()[0].get_ydata(), 300.0 + x)
+    drawn = np.concatenate([path.vertices[:, 0] for path in lower.collections[0].get_paths()])
+    assert set(drawn) == {1.0, 2.0, 5.0, 6.0}
+
+
 @pytest.mark.parametrize(("count", "held", "panels"), [(4, (), 7), (200, ("n_d", "p"), 5)])
 def test_figure_has_a_panel_for_each_free_quantity(tmp_path, count, held, panels):
     figure = lever_parameters(levers(count, held))

@@ -291,3 +291,15 @@ def test_figure_without_calibration_or_without_series(examples):
     law = published_raman_calibration()
     table = read_lines(lines, Thermometer(law, reference=522.39))
     assert len(figures.thermometry(lines, table, law).axes) == 3
+
+
+def test_spectra_colder_than_the_room_are_drawn_with_their_law(examples):
+    """They were beyond the end of the axis, and the law ended before them."""
+    lines = measure(read_spectra([examples / "tip"])[:1])
+    # a line at 522.4 cm⁻¹ that is shifted by 1.9 cm⁻¹ to the other side
+    table = read_lines(lines, Thermometer(published_raman_calibration(), reference=520.5))
+    assert table.temperature_K.item() < 250.0
+    _, axes, _ = figures.thermometry(lines, table, published_raman_calibration()).axes
+    cold = table.shift_per_cm.item()
+    assert max(axes.get_xlim()) > cold
+    assert axes.get_lines()[0].get_xdata().max() > cold - 0.1

@@ -177,10 +177,9 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
         by_bias, by_power, middle_name = band.tip_K.values, band.tip_at_power_K.values, "median"
     else:
         stated = _stated(band)
-        away = (
-            ndtri((0.025, 0.16, 0.5, 0.84, 0.975))[:, None] * band.tip_stderr_K.fillna(0.0).values
-        )
+        away = ndtri((0.025, 0.16, 0.5, 0.84, 0.975))[:, None] * band.tip_stderr_K.values
         by_bias = by_power = band.tip_K.values + away
+        by_bias[2] = band.tip_K.values  # where no error is stated too
         middle_name = "prediction" if stated else "the nearest lever"
     panels = [("bias", by_bias, "bias V$_b$ (V)")]
     # with held supplies there may be several temperatures at one power

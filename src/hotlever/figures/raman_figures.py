@@ -108,8 +108,9 @@ def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -
     low, high = calibration.range_K
     room = calibration.room_temperature_K
     measured = table.isel(spectrum=np.isfinite(table.temperature_K.values))
-    top = max([high, *measured.temperature_K.values]) + 40.0
-    temperature = np.linspace(min(low, room), top, 300)
+    temperatures = measured.temperature_K.values.tolist()
+    top = max([high, *temperatures]) + 40.0
+    temperature = np.linspace(min([low, room, *temperatures]), top, 300)
     shift, _ = calibration.anharmonic.shift(temperature, room)
     axes.plot(shift, temperature, color=BLUE, lw=1.6, label="anharmonic law")
     label = f"line: {line.constant_K:.1f} K − {-line.slope_K_cm:.1f} K cm × shift"
@@ -123,7 +124,9 @@ def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -
         axes.errorbar(*points, **style)
     axes.axhspan(low, high, color="0.4", alpha=0.12, lw=0, label="calibrated range")
     axes.set(xlabel="shift against room temperature (cm⁻¹)", ylabel="temperature (K)")
-    axes.set_xlim(float(shift.min()) - 0.5, 1.0)
+    # what is colder than the room is shifted the other way
+    highest = max([0.5, float(shift.max()), *measured.shift_per_cm.values.tolist()])
+    axes.set_xlim(float(shift.min()) - 0.5, highest + 0.5)
     axes.invert_xaxis()
     axes.legend(loc="upper left")
 
