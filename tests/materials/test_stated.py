@@ -122,6 +122,15 @@ def test_what_cannot_be_in_the_range_is_said(stated, says):
     assert re.search(says, reason)
 
 
+def test_one_row_of_a_table_that_cannot_be_is_found():
+    """It was looked for at 401 temperatures, between which a wrong row may lie."""
+    T = np.arange(290.0, 1291.0)
+    values = np.where(T == 790.0, -1e-5, 1e-5)
+    law = {"temperature_K": T.tolist(), "values": values.tolist()}
+    film = material_of({"kind": "metal-film", "preset": "Pt", "resistivity": law}, "")
+    assert "is -1e-05 Ω cm at 790 K" in film.impossible(293.0)
+
+
 @pytest.mark.parametrize(
     ("section", "says"),
     [
@@ -131,6 +140,7 @@ def test_what_cannot_be_in_the_range_is_said(stated, says):
         ({"kappa": 0.5, "lorenz_ratio": 1.2}, "lorenz_ratio means nothing where kappa is stated"),
         ({"kappa": "1e-3*T", "lorenz_ratio": 1.2}, "lorenz_ratio means nothing where kappa is sta"),
         ({"rho0": 1e-5}, "unknown key 'rho0'"),
+        ({"kappa": "a0*(T/300)", "a0": 0.03}, "a0: other materials have a parameter of this name"),
         ({"kappa": {"temperature_K": [300.0], "values": [1.0]}}, "1 temperature and 1 value"),
         ({"kappa": {"temperature_K": [300, 300], "values": [1, 2]}}, "300 K follows 300 K"),
         ({"kappa": {"temperature_K": [300, 400], "values": [1]}}, "2 temperatures and 1 value"),

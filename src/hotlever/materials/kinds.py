@@ -39,6 +39,7 @@ from hotlever.materials.parameters import (
     declare,
     field_bounds,
     field_of,
+    is_declared,
 )
 from hotlever.materials.stated import StatedLaw, names_stated, number_or_law
 from hotlever.records import Record
@@ -271,6 +272,11 @@ class Kind(Record):
 
     @model_validator(mode="after")
     def _formulas_name_numbers(self) -> Self:
+        for name in filter(is_declared, self.model_extra or {}):
+            # it would be printed as that one, in its unit
+            raise ValueError(
+                f"{name}: other materials have a parameter of this name, expected another"
+            )
         for own, law in self.stated.items():
             for name in law.names:
                 if name not in self.parameters:

@@ -254,6 +254,11 @@ def declare(parameter: Parameter, owner: str) -> None:
         _DECLARED[name], _OWNERS[name] = parameter, owner
 
 
+def is_declared(name: str) -> bool:
+    """Return whether some kind or class of materials has a parameter of this name."""
+    return name in _DECLARED
+
+
 def constant_of(name: str, value: float) -> Parameter:
     """Return the parameter that a number is which a formula names: it stays within a factor of 5.
 

@@ -135,7 +135,10 @@ class StatedLaw(Record):
         to_K: float,
     ) -> str:
         """Say where its value is none that can be, between temperatures (K); empty if nowhere."""
-        T = np.linspace(from_K, min(to_K, self.temperature_range[1]), 401)
+        ends = from_K, min(to_K, self.temperature_range[1])
+        # between the rows of a table it is monotone
+        rows = self.edges[(self.edges > ends[0]) & (self.edges < ends[1])]
+        T = np.union1d(np.linspace(*ends, 401), rows)
         value, by = self.inside(T, parameters)
         low, high = within
         wrong = ~((value >= low) & (value <= high)) | ~np.isfinite(by["T"])
