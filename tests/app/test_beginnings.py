@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import csv
 import re
 import shlex
@@ -18,8 +19,10 @@ from nicegui.testing import User
 from test_app_pages import Here, drop, text_of, until, visited
 
 from app_in_browser import bad_files
-from hotlever.app.pages.start import QUESTIONS
-from hotlever.app.project import DRAWINGS, EXAMPLES, safe_name
+from hotlever.app import showing
+from hotlever.app.pages.measurements import MeasurementsPage
+from hotlever.app.pages.start import QUESTIONS, choose_file
+from hotlever.app.project import DRAWINGS, EXAMPLES, Project, safe_name
 from hotlever.app.session import Task
 from hotlever.probe import Probe
 
@@ -113,6 +116,25 @@ async def test_a_line_is_corrected_by_hand_as_by_the_command(
     line = "{center_cm-1} ± {center_stderr_cm-1} cm⁻¹, width {fwhm_cm-1} cm⁻¹"
     line += ", {temperature_K} ± {temperature_error_K} K ({flags})"
     assert texts[0] == line.format(**row)
+
+
+def test_a_temperature_beyond_the_calibrated_ones_is_said_to_be_at_its_spectrum(tmp_path):
+    """It was said in the table alone."""
+    Project(tmp_path).take_example_folders("raman", "hot-plate", "tip")
+    with contextlib.chdir(tmp_path):
+        task = Task("raman", ("tip",), {"calibrate_from": ["hot-plate"]})
+        spectrum = showing.spectrum(Here(), "tip/tip_11.txt", task, {})
+    assert spectrum["text"].endswith("K (low-shoulder, extrapolated)")
+
+
+@visited
+async def test_a_measurement_chosen_at_the_start_hides_the_result_of_another(
+    user, session, tmp_path
+):
+    session.chosen["measurements"] = {**MeasurementsPage.first, "opened": "b.fit.json"}
+    assert choose_file(session, "a.csv") == "measurements"
+    assert session.chosen["measurements"]["data"] == ["a.csv"]
+    assert session.chosen["measurements"]["opened"] == ""
 
 
 @visited

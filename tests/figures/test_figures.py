@@ -245,7 +245,10 @@ def test_no_band_is_drawn_where_no_error_is_stated():
     band = labelled(
         {"power_mW": x, "tip_K": 300.0 + x, "tip_stderr_K": stderr}, "bias", {"bias": x}
     )
-    upper, _, lower, _ = tip_band(band).axes
+    figure = tip_band(band)
+    upper, _, lower, _ = figure.axes
+    # at a power errors are others
+    assert "95 % at a bias" in texts(figure)
     assert_allclose(upper.get_lines()[0].get_ydata(), 300.0 + x)
     drawn = np.concatenate([path.vertices[:, 0] for path in lower.collections[0].get_paths()])
     assert set(drawn) == {1.0, 2.0, 5.0, 6.0}

@@ -310,7 +310,7 @@ def _with_room(values: Array) -> list[float]:
 
 def _summary(line: MeasuredLine, table: Any) -> str:
     """Say what was read from a line, with the digits of the command's table."""
-    flags = ", ".join(line.flags)
+    flags = str(table.flags.item()).replace(";", ", ")
     if line.peak is None:
         return flags
     peak, T = line.peak, float(table.temperature_K.values[0])

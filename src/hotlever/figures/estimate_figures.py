@@ -162,8 +162,8 @@ def correlation_matrix(names: Sequence[str], correlation: Array, lever: str = ""
 def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     """Draw the band of predicted tip temperature against bias and power, and its width.
 
-    Of a lever that does not show its data the tip temperature alone is drawn, and the title says
-    so.
+    Errors of a fit are those at a bias, by the power too; a posterior has those at a power. Of a
+    lever that does not show its data the tip temperature alone is drawn, and the title says so.
 
     Parameters
     ----------
@@ -172,10 +172,12 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     measured : xarray.Dataset, optional
         From `Measurement.dataset`; drawn as points.
     """
-    stated = True
+    stated, at = True, ""
     if "quantile" in band.coords:
         by_bias, by_power, middle_name = band.tip_K.values, band.tip_at_power_K.values, "median"
     else:
+        # at a power, of which the bias is not quite known, errors are others
+        at = " at a bias"
         stated = _stated(band)
         away = ndtri((0.025, 0.16, 0.5, 0.84, 0.975))[:, None] * band.tip_stderr_K.values
         by_bias = by_power = band.tip_K.values + away
@@ -195,8 +197,8 @@ def tip_band(band: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
             upper.plot(x, rows[2], color=BLUE, label=middle_name)
             if stated:
                 _band(upper, x, rows, 0.0)
-                upper.fill_between([], [], color=BLUE, alpha=0.55, label="68 %")
-                upper.fill_between([], [], color=BLUE, alpha=0.25, label="95 %")
+                upper.fill_between([], [], color=BLUE, alpha=0.55, label=f"68 %{at}")
+                upper.fill_between([], [], color=BLUE, alpha=0.25, label=f"95 %{at}")
             for axes in lower:
                 _band(axes, x, rows, rows[2])
                 axes.axhline(0, color=BLUE, lw=0.8)
@@ -386,9 +388,10 @@ def calibration_curves(calibration: Estimate) -> Figure:
     with figure(8.0, 6.0, 2, 2, letters=True) as (fig, grid):
         by_power, by_bias, iv, budget = grid.ravel()
         entitle(fig, more=calibration.probe.title, is_described=bool(described))
-        name = "calibration and 95 % band" if described else "the nearest lever"
+        # at a power, of which the bias is not quite known, errors are others
+        name = "calibration, 95 % at a bias" if described else "the nearest lever"
         if described and "apex_K" in table:
-            name = "tip and 95 % band"
+            name = "tip, 95 % at a bias"
         for axes, along in ((by_power, "power_mW"), (by_bias, "bias_V")):
             if described:
                 low, high = table.tip_low_K, table.tip_high_K

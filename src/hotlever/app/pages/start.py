@@ -80,7 +80,8 @@ def choose_file(session: Session, name: str) -> str:
     if name.lower().endswith(".toml"):
         session.choose_lever(name)
         return SimulatePage.name
-    session.choices(MeasurementsPage.name, MeasurementsPage.first)["data"] = [name]
+    chosen = session.choices(MeasurementsPage.name, MeasurementsPage.first)
+    chosen |= {"data": [name], "opened": ""}  # no result of another one
     return MeasurementsPage.name
 
 
