@@ -508,8 +508,10 @@ def _number_or_law(parameter: Parameter, **others: Any) -> Any:
 class Stored(Kind):
     """What materials have in common whose heat capacity is a number or a stated law."""
 
-    heat_capacity: Annotated[float | StatedLaw | None, number_or_law((0.5, 10.0))] = Field(
-        default=None, description="heat capacity (J cm⁻³ K⁻¹), which counts in time"
+    heat_capacity: float | StatedLaw | None = _number_or_law(
+        OF_METAL["heat_capacity"],
+        default=None,
+        description="heat capacity (J cm⁻³ K⁻¹), which counts in time",
     )
 
     def enthalpy(self, T: Array) -> Evaluated:

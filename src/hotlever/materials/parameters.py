@@ -84,6 +84,14 @@ def _emissivity(value: float) -> Parameter:
     )
 
 
+def _heat_capacity() -> Parameter:
+    return Parameter(
+        *("heat_capacity", "c", "J cm⁻³ K⁻¹", 1.0, 1.0, 5.0),
+        "heat capacity, which counts in time",
+        counts="in time",
+    )
+
+
 def _scale(of: str, symbol: str) -> Parameter:
     """Return the row of the scale of a law that a probe file states."""
     meaning = f"scale of {of} where that is a table or a formula"
@@ -199,6 +207,7 @@ OF_METAL = _table(
         value=0.0,
     ),
     _emissivity(0.1),
+    _heat_capacity(),
 )
 OF_DIELECTRIC = _table(
     Parameter(
@@ -217,6 +226,7 @@ OF_DIELECTRIC = _table(
     ),
     _scale("kappa", "c_κ"),
     _emissivity(0.15),
+    _heat_capacity(),
 )
 
 #: Units and bounds of what a table or a formula may state: far wider than those of numbers, since

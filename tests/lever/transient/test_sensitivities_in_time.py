@@ -13,7 +13,9 @@ from hotlever.lever.transient.history import time_steps
 from hotlever.lever.transient.sensitivities import with_sensitivities
 from hotlever.materials import PARAMETERS
 from hotlever.probe import Probe
+from hotlever.probe.probe_parameters import heat_capacities
 from hotlever.quantities import observables_of
+from of_materials import strip_probe
 
 #: So that every observable is there.
 BRIDGE = {"bridge_upper_ohm": 5600.0, "bridge_lower_ohm": 2000.0}
@@ -80,6 +82,17 @@ def test_a_larger_heat_capacity_only_stretches_the_time(coarse):
     expected = -10.0 * (tip[2] - tip[0]) / 0.2
     found = data.sensitivity.sel(observable="tip", parameter="heat_capacity_scale").values[1]
     assert found == pytest.approx(expected, rel=1e-3)
+
+
+def test_heat_capacities_of_films_stretch_the_time_together():
+    """They were no parameters, so that no pulse of such a lever could be fitted."""
+    lever = Lever(strip_probe(), COARSE)
+    names = heat_capacities(lever.probe)
+    assert names == ("nitride.heat_capacity", "film.heat_capacity")
+    data = with_sensitivities(lever, step(0.1), [0.95, 1.0, 1.05], names, tolerance_K=1e-3)
+    tip = data.tip_K.values
+    slopes = data.sensitivity.sel(observable="tip").values[1]
+    assert slopes @ lever.probe.values(names) == pytest.approx(-10 * (tip[2] - tip[0]), rel=5e-3)
 
 
 @pytest.mark.parametrize(
