@@ -11,6 +11,7 @@ from hotlever.errors import InputError
 from hotlever.lever import Lever
 from hotlever.probe import MeshOptions, Probe, Tip
 from hotlever.probe.mesh import SolidMeshOptions, mesh_solid
+from hotlever.probe.probe_parameters import parameters_of
 
 TIP = Tip(height_um=0.7, half_angle_deg=25, apex_radius_um=0.03)
 
@@ -130,3 +131,11 @@ def test_terminals_are_whole_end_faces():
         area = np.linalg.norm(np.cross((b - a).T, (c - a).T), axis=1).sum() / 2
         width = np.linalg.norm(np.subtract(terminal.end, terminal.start))
         assert area == pytest.approx(width * layout.thickness_um)
+
+
+@pytest.mark.parametrize(("angle", "most"), [(20.0, 30.0), (70.0, 80.0)])
+def test_a_fit_leaves_the_tip_a_cone(angle, most):
+    """Up to half again of a blunt one's angle it was solved at more than 90°."""
+    tip = {"tip.height_um": 0.1, "tip.half_angle_deg": angle}
+    found = parameters_of(Probe.reference().with_(**tip))["half_angle_deg"]
+    assert found.bounds == (pytest.approx(0.5 * angle), pytest.approx(most))

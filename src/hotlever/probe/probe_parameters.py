@@ -15,7 +15,7 @@ from hotlever.materials.parameters import own_name, parameter_named
 from hotlever.probe.circuit import MOST_OFFSET_V
 from hotlever.probe.parts import ProbeParts
 from hotlever.probe.shapes import EDGE_BIAS, MOST_EDGE_BIAS
-from hotlever.probe.tip import OUT_OF_CONTACT
+from hotlever.probe.tip import MOST_HALF_ANGLE_DEG, OUT_OF_CONTACT
 
 #: Relative spread of a resistor that was measured.
 RESISTANCE = 1e-3
@@ -154,7 +154,9 @@ def parameters_of(
         add(name, 0.05 if name in matter else None, **own)
     of_micrograph = 0.2
     for name in _of_the_tip(probe):
-        add(name, of_micrograph)
+        # half again of a blunt cone's angle would be no cone, see `Tip`
+        blunt = name == "half_angle_deg" and 1.5 * probe.values([name])[0] > MOST_HALF_ANGLE_DEG
+        add(name, of_micrograph, **({"upper": MOST_HALF_ANGLE_DEG} if blunt else {}))
     if probe.contact is not None and 0 < probe.contact.interface_K_per_mW < OUT_OF_CONTACT:
         # nothing is known of it but its power of ten
         add("interface_K_per_mW", math.log(10.0), (1e-3, 1e3))

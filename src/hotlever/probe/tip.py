@@ -21,6 +21,8 @@ from hotlever.units import product_conversion, quantity
 
 #: Resistance of an interface (K/mW) that lets no heat through: the tip is out of contact.
 OUT_OF_CONTACT = 1e12
+#: Half-angle (°) of the bluntest cone.
+MOST_HALF_ANGLE_DEG = 80.0
 
 
 class Tip(Record):
@@ -37,7 +39,7 @@ class Tip(Record):
     """
 
     height_um: float = bounded("from the lever's surface to the apex", 0.01, 100)
-    half_angle_deg: float = bounded("between the axis and the side", 1, 80, 20.0)
+    half_angle_deg: float = bounded("between the axis and the side", 1, MOST_HALF_ANGLE_DEG, 20.0)
     apex_radius_um: float = bounded("of the flat end", 1e-4, 10, 0.02)
     in_air: bool = Field(
         default=False,
