@@ -184,6 +184,13 @@ def test_plain_commands_import_what_they_need_and_no_more(tmp_path, commands, li
     assert {part for part in parts if not part.startswith("_")} - {"version"} <= of_scipy
 
 
+def test_plots_of_sweeps_and_histories_load_no_dask(tmp_path):
+    commands = "sweep --bias 1:3:3 -o a.csv --plot a.png", "pulse --pulse 8V,5us --plot b.png"
+    modules = imported_by(commands, tmp_path)
+    assert "matplotlib" in modules
+    assert "dask.base" not in modules
+
+
 def test_the_help_waits_for_no_numpy(tmp_path):
     """It computes nothing, and would take half as long again."""
     modules = imported_by(["--help"], tmp_path)

@@ -289,7 +289,7 @@ def history_overview(history: xr.Dataset) -> Figure:
     data = history.isel(time=history.time > 0) if settled(history) else history
     style: Any = {"marker": marker(data, "time"), "ms": 3}
     energies = {"supplied_nJ": ("supplied", PURPLE), "stored_nJ": ("stored", VERMILION)}
-    if data.air_stored_nJ.any():
+    if data.air_stored_nJ.values.any():
         energies["air_stored_nJ"] = "in the air", BLUE
     energies["lost_nJ"] = "lost", ORANGE
     with figure(7.4, 5.2, 2, 2, letters=True, sharex=True) as (fig, grid):

@@ -106,8 +106,9 @@ def curve(axes: Axes, data: xr.Dataset, along: str, name: str, *line: str, **sty
 
     One without values, as the reader's of a lever that has none, is left out.
     """
-    if data[name].notnull().any():
-        axes.plot(data[along], data[name], *line, **style)
+    values = data[name].values
+    if not np.isnan(values).all():
+        axes.plot(data[along].values, values, *line, **style)
     axes.set(ylabel=axis_label(name))
     # of axes above each other the lowest has the label
     if axes.xaxis.get_tick_params().get("labelbottom", True):
@@ -144,7 +145,7 @@ def marker(data: xr.Dataset, along: str, mark: str = "o") -> str:
 
 def settled(history: xr.Dataset) -> bool:
     """Whether the bias stays what it is: time is then drawn logarithmic."""
-    return float(history.bias_V.max()) == float(history.bias_V.min())
+    return bool(np.ptp(history.bias_V.values) == 0.0)
 
 
 def beside(axes: Axes) -> None:
