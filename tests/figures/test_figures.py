@@ -16,6 +16,7 @@ from hotlever import figures
 from hotlever.datasets import labelled
 from hotlever.errors import InputError
 from hotlever.estimate import Measurement, read_calibration
+from hotlever.estimate.many import compare_levers
 from hotlever.figures import (
     lever_parameters,
     posterior_corner,
@@ -183,6 +184,18 @@ def test_every_source_of_an_error_is_drawn_however_many_there_are():
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == len(lines) > 10
 
 
+def test_a_lever_alone_is_drawn_as_different_from_no_mean():
+    """Beyond the range of all others it was said to be as the mean is."""
+    whole = read_calibration(STORED / "calibration.json")
+    rows = whole.tip_table["bias_V"] < 6.0
+    calibrations = {"whole": whole, "part": replace(whole, tabulated=whole.tip_table.rows(rows))}
+    figure = figures.calibrated_levers(calibrations, compare_levers(calibrations))
+    difference = figure.axes[1].get_lines()[0]
+    finite = np.isfinite(difference.get_ydata())
+    assert finite.any()
+    assert difference.get_xdata()[finite].max() < 6.0 < difference.get_xdata().max()
+
+
 def test_every_sweep_is_drawn_however_many_there_are(coarse):
     sweep = coarse.sweep([1.0, 2.0])
     (axes,) = figures.iv_curves({f"lever {number}": sweep for number in range(9)}).axes
@@ -236,6 +249,23 @@ def test_band_shows_bias_and_power(tmp_path):
     )
     assert widest == pytest.approx(20.0)
     save_figure(figure, tmp_path / "band.png")
+
+
+def test_what_other_supplies_heat_is_drawn_whole(coarse):
+    """Powers below zero were beyond the axis, and legs without a resistance in the legend."""
+    sweep = coarse.sweep([1.0, 2.0, 3.0])
+    held = sweep.assign(power_mW=sweep.power_mW - 0.1, legs_ohm=np.nan * sweep.legs_ohm)
+    assert figures.temperature_power(held).axes[1].get_xlim()[0] < float(held.power_mW.min()) < 0
+    assert "legs" not in texts(figures.resistances(held))
+    assert "legs" in texts(figures.resistances(sweep))
+
+
+def test_a_figure_says_of_how_many_curves_it_shows_some():
+    x = np.arange(20.0)
+    values = np.add.outer(np.arange(9.0), x)
+    many = labelled({"tip_K": (("state", "bias"), values)}, coordinates={"bias": x})
+    assert "8 of 9 curves" in texts(many.hotlever.plot())
+    assert " of 8" not in texts(many.isel(state=slice(8)).hotlever.plot())
 
 
 def test_no_band_is_drawn_where_no_error_is_stated():

@@ -272,6 +272,7 @@ def test_figure_holds_spectra_calibration_and_residuals(hot_plate):
     figure = figures.thermometry(lines, table, found, lines)
     stack, upper, lower = figure.axes
     labels = [text.get_text() for text in stack.texts]
+    assert stack.get_legend().get_title().get_text() == "9 of 25 spectra"
     assert labels[0] == "295 K"
     assert labels[-1] == "895 K"
     assert len(labels) == 9

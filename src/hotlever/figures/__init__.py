@@ -72,7 +72,7 @@ from hotlever.figures.probe_figures import (
     probe_drawing,
 )
 from hotlever.figures.raman_figures import one_spectrum, raman_check, thermometry
-from hotlever.figures.style import COLOURS, entitle, figure, save_figure
+from hotlever.figures.style import COLOURS, entitle, figure, save_figure, some_of
 from hotlever.lever import probe_of
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ def _panel(axes: Axes, name: str, values: xr.DataArray) -> None:
         axes.plot(x, curve, ".-", label=label, color=COLOURS[number % len(COLOURS)])
     axes.set(xlabel=_label(along, values[along]), ylabel=_label(name, values))
     if others:
-        axes.legend()
+        axes.legend(title=some_of(min(len(curves), 8), len(curves), "curves"))
 
 
 def _label(name: str, values: xr.DataArray) -> str:

@@ -445,13 +445,16 @@ def calibrated_levers(calibrations: Mapping[str, Estimate], levers: xr.Dataset) 
     """
     along, count = levers.attrs["along"], levers.sizes["lever"]
     tips, many = tips_along(calibrations, along), count > len(LINES)
+    # one alone differs from no mean
+    several = tips.tip_K.notnull().sum("lever") > 1
+    mean = tips.tip_K.mean("lever").where(several)
     named: Any = {"rotation": 45, "ha": "right", "parse_math": False, "fontsize": 7}
     with figure(8.0, 7.6, 3, 2, letters=True) as (fig, grid):
         curves, differences, *by_lever = grid.ravel()
         for tip, (line, colour) in zip(tips.tip_K, cycle(LINES), strict=False):
             style: Any = {"color": colour, "ls": line, "lw": 0.8 if many else 1.2}
             curves.plot(tips[along], tip, label=tip.lever.item(), **style)
-            differences.plot(tips[along], tip - tips.tip_K.mean("lever"), **style)
+            differences.plot(tips[along], tip - mean, **style)
         half = BAND * tips.tip_stderr_K.mean("lever")
         band: Any = {"color": "0.88", "lw": 0, "label": "95 % of a lever"}
         differences.fill_between(tips[along], -half, half, **band)

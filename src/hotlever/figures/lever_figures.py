@@ -36,6 +36,7 @@ from hotlever.figures.style import (
     from_zero,
     marker,
     settled,
+    some_of,
 )
 from hotlever.probe import Probe
 from hotlever.spieser2017 import BASE_TEMPERATURE_K, POWER_LAW_SPREAD_K, PublishedPoint
@@ -174,7 +175,8 @@ def temperature_power(
                 below.plot(data.power_mW, data.tip_K - expected(data.power_mW), **style)
         below.axhspan(-POWER_LAW_SPREAD_K, POWER_LAW_SPREAD_K, color="0.92", zorder=0)
         below.axhline(0, color="0.4", lw=0.8)
-        below.set(xlabel=axis_label("power_mW"), ylabel="T$_{tip}$ − law (K)", xlim=(0, None))
+        below.set(xlabel=axis_label("power_mW"), ylabel="T$_{tip}$ − law (K)")
+        below.set(xlim=from_zero(sweep.power_mW))
         axes.legend(loc="upper left")
         where: Any = {"xycoords": "axes fraction", "color": "0.4", "fontsize": 8}
         below.annotate(f"±{POWER_LAW_SPREAD_K:.0f} K", (0.02, 0.06), **where)
@@ -190,9 +192,12 @@ def resistances(sweep: xr.Dataset) -> Figure:
             ("heater_ohm", "heater R$_h$", VERMILION, "o"),
             ("legs_ohm", "legs R$_{l1}$ + R$_{l2}$", BLUE, "^"),
         ):
-            style: Any = {"color": colour, "marker": marker(sweep, "bias", mark), "label": label}
-            axes.plot(sweep.tip_K, sweep[name] / 1000, **style)
-        axes.set(xlabel=axis_label("tip_K"), ylabel="resistance (kΩ)", ylim=(0, None))
+            if sweep[name].notnull().any():  # legs with different currents have none
+                style: Any = {"color": colour, "marker": marker(sweep, "bias", mark)}
+                axes.plot(sweep.tip_K, sweep[name] / 1000, **style, label=label)
+        axes.set(
+            xlabel=axis_label("tip_K"), ylabel="resistance (kΩ)", ylim=from_zero(sweep.lever_ohm)
+        )
         entitle(fig, sweep)
         axes.legend()
     return fig
@@ -512,7 +517,7 @@ def reader_overview(data: xr.Dataset) -> Figure:
         noise.set(ylabel=f"noise at {at} (nV/√Hz)", yscale="log")
         noise.legend(fontsize=7)
         if len(curves) > 1:
-            slope.legend(fontsize=7)
+            slope.legend(fontsize=7, title=some_of(len(curves), len(points), "curves"))
         for axes in (voltage, slope, noise, resolution):
             axes.set(xlabel=axis_label(x_name))
         for axes in (slope, noise, resolution):

@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hotlever.figures.style import BLACK, BLUE, GREEN, VERMILION, figure, panel_letters
+from hotlever.figures.style import BLACK, BLUE, GREEN, VERMILION, figure, panel_letters, some_of
 from hotlever.raman.lineshape import WINDOW, Peak, in_window
 from hotlever.raman.series import MeasuredLine
 from hotlever.raman.thermometer import RamanCalibration
@@ -72,6 +72,7 @@ def _in_window(line: MeasuredLine) -> tuple[Array, Array]:
 
 def _stack(axes: Axes, stacked: Sequence[tuple[str, MeasuredLine]], most: int = 9) -> None:
     """At most so many spectra above each other, each scaled to its line, with the fit."""
+    title = some_of(min(most, len(stacked)), len(stacked), "spectra")
     if len(stacked) > most:
         chosen = np.unique(np.linspace(0, len(stacked) - 1, most).round().astype(int))
         stacked = [stacked[index] for index in chosen]
@@ -100,7 +101,7 @@ def _stack(axes: Axes, stacked: Sequence[tuple[str, MeasuredLine]], most: int = 
     axes.set(xlim=WINDOW, ylim=(-0.15, len(stacked) + 0.25))
     axes.plot([], [], ".", color="0.4", label="counts")
     axes.plot([], [], color=BLUE, label="fit")
-    axes.legend(loc="upper left")
+    axes.legend(loc="upper left", title=title)
 
 
 def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -> None:

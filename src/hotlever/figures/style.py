@@ -153,6 +153,11 @@ def beside(axes: Axes) -> None:
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
+def some_of(shown: int, count: int, what: str) -> str | None:
+    """Return the title of a legend of which not all is shown; None if all is."""
+    return f"{shown} of {count} {what}" if shown < count else None
+
+
 def from_zero(values: Any) -> tuple[float | None, None]:
     """Return limits of an axis that begins at zero, unless some values are below it."""
     return (None if np.nanmin(values, initial=0.0) < 0.0 else 0.0), None
