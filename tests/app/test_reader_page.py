@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from elements import texts
+from elements import plots, texts
 from test_app_pages import text_of, until, visited
 
 from hotlever.app import approaching
@@ -52,6 +52,10 @@ async def test_reader_shows_the_numbers_and_notes_of_the_command(
     said = " ".join(texts(user))
     assert f"at a bias of {BIAS:g} V the voltage has an extremum between " in said
     assert "it is taken as 1" in said
+    # the sensitivity passes through zero there, and is not joined
+    titles = {one["layout"]["yaxis"]["title"]["text"]: one["data"][0]["y"] for one in plots(user)}
+    (drawn,) = (y for title, y in titles.items() if "d ln R" in title)
+    assert np.isnan(drawn).any()
     off = f"{100 * (coarse / float(row['reader_V']) - 1):+.1f}"
     stated = said.partition("coarse lever, here ")[2].partition(" % in voltage")[0]
     assert float(stated) == pytest.approx(float(off), abs=0.1)

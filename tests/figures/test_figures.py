@@ -268,6 +268,29 @@ def test_a_figure_says_of_how_many_curves_it_shows_some():
     assert " of 8" not in texts(many.isel(state=slice(8)).hotlever.plot())
 
 
+def test_a_sensitivity_that_turns_is_not_joined_through_its_zero():
+    """On axes by decades it was drawn as finite where the voltage does not tell the distance."""
+    slope = np.array([[0.7, -0.09, -0.05]]).T
+    one = ("distance", "bias")
+    data = xr.Dataset(
+        {
+            "reader_V": (one, 4.0 + slope),
+            "dlnR_dz_per_um": (one, slope),
+            "noise_V_per_rtHz": (one, 1e-8 + 0 * slope),
+            "resolution_nm_per_rtHz": (one, 1e-5 / np.abs(slope)),
+            "source_V_per_rtHz": (("source", *one), 1e-8 + 0 * slope[None]),
+            "surface_gap_um": ("distance", [0.3, 1.6, 3.0]),
+        },
+        coords={"distance": [0.3, 1.6, 3.0], "bias": [12.0], "source": ["amplifier"]},
+        attrs={"read_at": "supply"},
+    )
+    data = data.assign_coords(bias_V=("bias", [12.0]))
+    _, sensitivity, _, resolution = figures.reader_overview(data).axes
+    for axes in (sensitivity, resolution):
+        (drawn,) = axes.get_lines()
+        assert_allclose(np.isnan(drawn.get_ydata()), [False, True, False, False])
+
+
 def test_no_band_is_drawn_where_no_error_is_stated():
     """It had no width there, as of what is known exactly."""
     x = np.linspace(1.0, 6.0, 6)

@@ -28,6 +28,7 @@ from hotlever.figures.style import (
     PURPLE,
     SKY,
     VERMILION,
+    apart_at_turns,
     axis_label,
     bridge_beside,
     curve,
@@ -503,8 +504,11 @@ def reader_overview(data: xr.Dataset) -> Figure:
             style = {"color": colour, "label": label}
             x = curve[x_name]
             voltage.plot(x, curve.reader_V, mark, **style)
-            slope.plot(x, 10.0 * np.abs(curve.dlnR_dz_per_um), mark, **style)
-            resolution.plot(x, 1e3 * curve.resolution_nm_per_rtHz, mark, **style)
+            for axes, values in (
+                (slope, 10.0 * np.abs(curve.dlnR_dz_per_um)),
+                (resolution, 1e3 * curve.resolution_nm_per_rtHz),
+            ):
+                axes.plot(*apart_at_turns(curve.dlnR_dz_per_um, x, values), mark, **style)
         voltage.set(ylabel="reader voltage (V)")
         slope.set(ylabel="|d ln R/dz| (10$^{-4}$/nm)", yscale="log")
         resolution.set(ylabel="resolution (pm/√Hz)", yscale="log")

@@ -19,6 +19,7 @@ from hotlever.errors import InputError
 from hotlever.files import FIGURE_TYPES, whole_file
 from hotlever.materials.parameters import parameter_named
 from hotlever.quantities import QUANTITIES
+from hotlever.types import Array
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -151,6 +152,20 @@ def settled(history: xr.Dataset) -> bool:
 def beside(axes: Axes) -> None:
     """Put the legend to the right of axes, where it hides nothing."""
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def apart_at_turns(slope: Any, *columns: Any) -> list[Array]:
+    """Return columns with a gap wherever a slope changes its sign, and so passes through zero.
+
+    Its size by decades would be joined there as if it stayed what it is on either side.
+
+    Examples
+    --------
+    >>> apart_at_turns([2.0, 1.0, -1.0], [3.0, 4.0, 5.0])
+    [array([ 3.,  4., nan,  5.])]
+    """
+    turns = np.flatnonzero(np.diff(np.sign(slope)) != 0) + 1
+    return [np.insert(np.asarray(column, dtype=float), turns, np.nan) for column in columns]
 
 
 def some_of(shown: int, count: int, what: str) -> str | None:

@@ -14,7 +14,7 @@ from hotlever.app.pages import plots
 from hotlever.app.pages.frame import caption
 from hotlever.app.pages.live_page import LivePage
 from hotlever.app.session import Task
-from hotlever.figures.style import BLUE, VERMILION
+from hotlever.figures.style import BLUE, VERMILION, apart_at_turns
 
 
 class ReaderPlots:
@@ -56,9 +56,12 @@ class ReaderPlots:
         self._draw(answer)
         for plot, key, factor, by_decades in self._curves:
             for number, columns in enumerate((answer["curves"], answer["now"])):
-                values = factor * np.asarray(columns[key])
-                values = np.abs(values) if by_decades else values
-                plot.figure["data"][number] |= plots.points(columns["surface_gap_um"], values)
+                x, values = columns["surface_gap_um"], factor * np.asarray(columns[key])
+                if by_decades and number == 0:
+                    x, values = apart_at_turns(columns["dlnR_dz_per_um"], x, np.abs(values))
+                elif by_decades:
+                    values = np.abs(values)
+                plot.figure["data"][number] |= plots.points(x, values)
             plot.update()
 
     def _draw(self, answer: dict[str, Any]) -> None:
