@@ -291,6 +291,17 @@ def test_a_sensitivity_that_turns_is_not_joined_through_its_zero():
         assert_allclose(np.isnan(drawn.get_ydata()), [False, True, False, False])
 
 
+def test_errors_of_few_temperatures_are_an_area(coarse):
+    """Where every other row had one they were lines that nobody saw."""
+    sweep = coarse.sweep([2.0, 4.0, 6.0, 8.0])
+    tip = sweep.tip_K.where(sweep.bias % 4 == 0)
+    data = sweep.assign(tip_K=tip, tip_error_K=5.0 + 0.0 * tip)
+    figure = figures.data_and_model(data, sweep, ("tip",))
+    lower = next(axes for axes in figure.axes if axes.get_ylabel() == "data − model (K)")
+    (path,) = lower.collections[0].get_paths()
+    assert path.get_extents().bounds == (4.0, -5.0, 4.0, 10.0)
+
+
 def test_no_band_is_drawn_where_no_error_is_stated():
     """It had no width there, as of what is known exactly."""
     x = np.linspace(1.0, 6.0, 6)

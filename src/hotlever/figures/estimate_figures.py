@@ -124,8 +124,10 @@ def _differences(axes: Axes, measured: xr.Dataset, model: xr.Dataset, name: str)
         return
     axes.plot(x, difference * factor, "o-", color=VERMILION, lw=0.8, ms=3.5)
     if unit == "K":
-        error = measured[column.replace("_K", "_error_K")]
-        axes.fill_between(x, -error, error, color="0.9", label="± dT")
+        # rows without a temperature would cut the errors of the others into lines
+        seen = np.isfinite(difference)
+        error = measured[column.replace("_K", "_error_K")].values[seen]
+        axes.fill_between(x[seen], -error, error, color="0.9", label="± dT")
         return
     usual = DiagnosisOptions.usual_scatter
     off = np.abs(difference) > usual * np.nanmax(np.abs(data), initial=0.0)
