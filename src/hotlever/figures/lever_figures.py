@@ -193,7 +193,7 @@ def resistances(sweep: xr.Dataset) -> Figure:
             ("heater_ohm", "heater R$_h$", VERMILION, "o"),
             ("legs_ohm", "legs R$_{l1}$ + R$_{l2}$", BLUE, "^"),
         ):
-            if sweep[name].notnull().any():  # legs with different currents have none
+            if not np.isnan(sweep[name].values).all():  # legs with different currents have none
                 style: Any = {"color": colour, "marker": marker(sweep, "bias", mark)}
                 axes.plot(sweep.tip_K, sweep[name] / 1000, **style, label=label)
         axes.set(
