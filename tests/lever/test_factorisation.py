@@ -124,8 +124,7 @@ def test_factors_in_a_cycle_of_references_leave_a_solver_that_serves(options):
 @KLU_INSTALLED
 def test_few_factors_wait_for_another_matrix():
     matrix = random_matrix(1)
-    two = FactorisationOptions(spare=2 * matrix.shape[0])
-    factorisation = KLU(matrix.indices, matrix.indptr, two)
+    factorisation = KLU(matrix.indices, matrix.indptr, FactorisationOptions(spare=2))
     several = [factorisation.factorised(matrix.data) for _ in range(5)]
     assert len(factorisation._unused) == 0
     several.clear()

@@ -38,15 +38,15 @@ class FactorisationOptions:
         exactly, relative in each row (W. Oettli and W. Prager, Numer. Math. 6, 405 (1964)).
         Otherwise pivots are chosen anew.
     spare : int
-        Factors that are no longer in use, and wait for another matrix, have so many unknowns
-        together at most: those of a curve of a coarse mesh, or eight of the reference probe, which
-        has 4 MB each.
+        Factors that are no longer in use, and wait for another matrix, at most: those of a curve
+        that the next one is solved with. Those of the reference probe have 4 MB each, on a coarse
+        mesh 1 MB.
     """
 
     solver: Literal["superlu", "klu"] | None = None
     pivot_threshold: float = 0.01
     backward_error: float = 1e-12
-    spare: int = 40_000
+    spare: int = 32
 
 
 class Factorisation(ABC):
@@ -146,7 +146,7 @@ class KLU(Factorisation):
             solver = _KLUSolver(self._rows, self._starts, self._options.pivot_threshold)
         if not (solver.has_pivots and self._refactorised(solver, entries)):
             solver.factorise(entries)
-        return _KLUFactors(solver, self._unused, self._options.spare // self.size)
+        return _KLUFactors(solver, self._unused, self._options.spare)
 
     def _refactorised(self, solver: _KLUSolver, entries: Array) -> bool:
         """Factorise with the pivots that there are; return whether they serve."""
