@@ -148,12 +148,13 @@ def _panel(axes: Axes, name: str, values: xr.DataArray) -> None:
     along, *others = sorted(map(str, values.dims), key=lambda dim: -values.sizes[dim])
     curves = values.transpose(*others, along).values.reshape(-1, values.sizes[along])
     x = values[along] if values[along].dtype.kind in "fi" else np.arange(values.sizes[along])
-    for number, curve in enumerate(curves[:8]):
+    drawn = curves[:8]
+    for number, curve in enumerate(drawn):
         label = f"{others[0]} {values[others[0]].values[number]}" if others else None
         axes.plot(x, curve, ".-", label=label, color=COLOURS[number % len(COLOURS)])
     axes.set(xlabel=_label(along, values[along]), ylabel=_label(name, values))
     if others:
-        axes.legend(title=some_of(min(len(curves), 8), len(curves), "curves"))
+        axes.legend(title=some_of(len(drawn), len(curves), "curves"))
 
 
 def _label(name: str, values: xr.DataArray) -> str:

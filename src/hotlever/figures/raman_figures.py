@@ -72,7 +72,7 @@ def _in_window(line: MeasuredLine) -> tuple[Array, Array]:
 
 def _stack(axes: Axes, stacked: Sequence[tuple[str, MeasuredLine]], most: int = 9) -> None:
     """At most so many spectra above each other, each scaled to its line, with the fit."""
-    title = some_of(min(most, len(stacked)), len(stacked), "spectra")
+    count = len(stacked)
     if len(stacked) > most:
         chosen = np.unique(np.linspace(0, len(stacked) - 1, most).round().astype(int))
         stacked = [stacked[index] for index in chosen]
@@ -101,7 +101,7 @@ def _stack(axes: Axes, stacked: Sequence[tuple[str, MeasuredLine]], most: int = 
     axes.set(xlim=WINDOW, ylim=(-0.15, len(stacked) + 0.25))
     axes.plot([], [], ".", color="0.4", label="counts")
     axes.plot([], [], color=BLUE, label="fit")
-    axes.legend(loc="upper left", title=title)
+    axes.legend(loc="upper left", title=some_of(len(stacked), count, "spectra"))
 
 
 def _calibration(axes: Axes, calibration: RamanCalibration, table: xr.Dataset) -> None:

@@ -81,16 +81,16 @@ class SimilarLevers:
         # that of the next one; where they did, to 5e-5 of the lever voltage, a state is passed over
         done: list[int] = []
         lacking, foretold = np.zeros_like(coarse), False
-        potentials = ~equations.space.is_temperature
+        potentials, lines = ~equations.space.is_temperature, branch.parametrisation
         for k, place in enumerate(places):
             if foretold and k < places.size - 1:
                 foretold = False
                 continue
             one, behind = slice(k, k + 1), done[-3:]
             # of a parabola through three, or what fewer tell
-            powers = np.vander(places[behind]), np.vander([place], len(behind))
-            guess = coarse[:, one] + lacking[:, behind] @ np.linalg.solve(powers[0].T, powers[1].T)
-            lines = branch.parametrisation
+            here = np.vander([place], len(behind)).T
+            weights = np.linalg.solve(np.vander(places[behind]).T, here)
+            guess = coarse[:, one] + lacking[:, behind] @ weights
             roots = solve_at(equations, places[one], guess, newton, parametrisation=lines)
             lacking[:, one] = roots.x - coarse[:, one]
             off = np.abs(roots.x - guess)[potentials].max()

@@ -328,9 +328,9 @@ def priors_of(
         else:
             value, spread, written = parsed(text, here)
             own = table[name].value if value is None else value
-            negative = own < 0 and written == "share"
+            is_share = written == "share"
             priors[name] = (
-                of_share(own, spread) if negative else Prior(own, spread, written != "unit")
+                of_share(own, spread) if is_share else Prior(own, spread, written != "unit")
             )
             _check(priors[name], table[name], here, written)
     counting = parameters_of(probe, in_time=in_time)

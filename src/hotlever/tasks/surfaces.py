@@ -26,6 +26,7 @@ from hotlever.tasks.arguments import (
 from hotlever.tasks.parsing import (
     parse_bias,
     parse_distances,
+    parse_pairs,
     parse_pressures,
     parse_settings,
     parse_times,
@@ -233,7 +234,7 @@ def approach(
     pressures = None if pressure is None else parse_pressures(pressure)
     read = read_over_a_surface(reporter, lever, distances)
     if pressures is not None:
-        refuse_set(parse_settings(lever.set, read), "pressure", ["pressure_mbar"])
+        refuse_set(parse_pairs("--set", lever.set), "pressure", ["pressure_mbar"])
     above = over_a_surface(reporter, read, lever.medium, distances)
     biases = None if bias is None else parse_bias(bias, above.lowest_bias_V)
     reader = Reader(above, noise)
@@ -271,11 +272,11 @@ def approach(
 
 def read_over_a_surface(reporter: Reporter, lever: LeverArguments, distances: Array) -> Probe:
     """Read a probe at some distances (µm) from a surface, which settings may tilt."""
-    stated = lever.set or []
-    refuse_set([text.partition("=")[0].strip() for text in stated], "distance", ["surface_gap_um"])
+    refuse_set(parse_pairs("--set", lever.set), "distance", ["surface_gap_um"])
     # a tilt means nothing without a surface, and the farthest one allows most of it
     gap = f"surface_gap_um={distances.max():.12g}"
-    return read_surrounded_probe(reporter, replace(lever, set=[*stated, gap]), finds_air=True)
+    settings = [*(lever.set or []), gap]
+    return read_surrounded_probe(reporter, replace(lever, set=settings), finds_air=True)
 
 
 def over_a_surface(reporter: Reporter, probe: Probe, medium: str | None, distances: Array) -> Probe:

@@ -269,12 +269,9 @@ class LivePlots:
             plot.on("plotly_afterplot", lambda _, p=plot: self._ready.add(p), [], throttle=1.0)
         self._curves: Any = None
         self._beside: Any = None
-        self._along: Any = None
         self._map: Any = None
-        #: Base and hottest temperature, and how long the current's way is, of the lever and of
-        #: that beside it.
-        self._reach: Any = None
-        self._reach_beside: Any = None
+        #: By trace of the profile, base and hottest temperature, and how long the current's way is.
+        self._reach: dict[int, Any] = {}
 
     def show(self, answer: dict[str, Any]) -> None:
         """Draw an answer of the live lever; what is as before is not sent again."""
@@ -282,17 +279,10 @@ class LivePlots:
         knee = curves["knee"] or dict.fromkeys(("lever_V", "current_mA", "power_mW", "tip_K"))
         for plot, (x, y) in self._by_columns.items():
             plot.figure["data"][1] |= {"x": [knee[x]], "y": [knee[y]]}
-        same = self._draw(0, 2, curves, now, self._curves)
-        profile = points(answer["along"], now["line"])
-        if same and np.array_equal(self._along, answer["along"]):
-            self._move(self._profile, 0, profile)
-        else:
-            # of one height for all biases, so that the profile moves and not its axis
-            self._reach = answer["base_K"], curves["hottest_K"], answer["along"][-1]
-            self._profile.figure["data"][0] |= profile
-            self._scale_profile()
+        self._draw(0, 2, curves, now, self._curves)
+        self._draw_profile(0, answer)
         self._show_map(answer["box"], answer["outline"], now["scale_K"], now["picture"])
-        self._curves, self._along = curves, answer["along"]
+        self._curves = curves
 
     def beside(self, answer: dict[str, Any] | None, text: str) -> None:
         """Draw an answer of the lever beside, and say what it is; nothing if there is none."""
@@ -301,20 +291,22 @@ class LivePlots:
             return
         curves, now = (answer["curves"], answer["now"]) if answer else ({}, {})
         self._draw(3, 4, curves, now, self._beside)
-        profile = points(answer["along"], now["line"]) if answer else points([], [])
-        reach = (answer["base_K"], curves["hottest_K"], answer["along"][-1]) if answer else None
-        if reach == self._reach_beside:
-            self._move(self._profile, 1, profile)
-        else:
-            self._reach_beside = reach
-            self._profile.figure["data"][1] |= profile
-            self._scale_profile()
+        self._draw_profile(1, answer)
         self._beside = curves or None
 
-    def _scale_profile(self) -> None:
-        """Have the axes of the profile hold both levers, at whatever bias."""
-        both = [reach for reach in (self._reach, self._reach_beside) if reach]
-        lowest, highest, along = zip(*both, strict=True)
+    def _draw_profile(self, trace: int, answer: dict[str, Any] | None) -> None:
+        """Draw the profile of one lever as a trace, on axes that hold both whole."""
+        profile, reach = points([], []), None
+        if answer:
+            profile = points(answer["along"], answer["now"]["line"])
+            # of one height for all biases, so that the profile moves and not its axis
+            reach = answer["base_K"], answer["curves"]["hottest_K"], answer["along"][-1]
+        if reach == self._reach.get(trace):
+            self._move(self._profile, trace, profile)
+            return
+        self._reach[trace] = reach
+        self._profile.figure["data"][trace] |= profile
+        lowest, highest, along = zip(*filter(None, self._reach.values()), strict=True)
         layout = self._profile.figure["layout"]
         layout["yaxis"]["range"] = [min(lowest), max(highest)]
         layout["xaxis"]["range"] = [0.0, max(along)]
@@ -322,8 +314,8 @@ class LivePlots:
 
     def _draw(
         self, curve: int, dot: int, curves: dict[str, Any], now: dict[str, Any], before: Any
-    ) -> bool:
-        """Draw curves and a state on them as traces; return whether only the state has moved."""
+    ) -> None:
+        """Draw curves and a state on them as traces; only the state, if they are as before."""
         same = bool(before and curves) and all(
             np.array_equal(before[name], curves[name]) for name in ("lever_V", "tip_K")
         )
@@ -335,7 +327,6 @@ class LivePlots:
                 plot.figure["data"][curve] |= points(curves.get(x, []), curves.get(y, []))
                 plot.figure["data"][dot] |= here
                 plot.update()
-        return same
 
     def _show_map(
         self, box: list[float], outline: Any, scale: tuple[float, float], picture: bytes
